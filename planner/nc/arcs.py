@@ -10,8 +10,10 @@ half length h, at sqrt(R^2 - h^2) from it; R > 0 means at most half a turn, R < 
 RADIUS_MIN (a rounded half circle), and where h and R agree to HALF_CIRCLE the centre is the chord's middle:
 the square root would turn a rounding of 1e-13 into 4e-7.
 
-The sweep is the angle from p0 to p1 in the arc's direction, in (FULL_TURN, 2 pi + FULL_TURN]: closer than
-FULL_TURN the arc is read as a full turn. P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x)
+The sweep is the angle from p0 to p1 in the arc's direction, in (0, 2 pi]. An arc about a centre is a full turn
+where p1 is p0 to SAME_PLACE, as in LinuxCNC's motion (pmCircleInit goes by a length, not by an angle: an arc of
+8 mm and radius 1e7 mm turns by less than 1e-6). An arc with R is none: p0 and p1 do not say where its centre is.
+P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x)
 about y, (y, z) about x.
 """
 
@@ -32,7 +34,11 @@ CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_
 RADIUS_MIN = {1.0: 0.00127, MM_PER_INCH: 0.00005 * MM_PER_INCH}
 CLOSURE_RELATIVE = 1e-3
 HALF_CIRCLE = 1e-12  # relative
-FULL_TURN = 1e-6  # [rad]
+SAME_PLACE = (
+    1e-7  # two points are one [mm]: a tenth of the finest digit of programs, far above the rounding of sums
+)
+# Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the rounding of a turn written out.
+FULL_TURN = 1e-6
 
 
 class ArcError(ValueError):
@@ -73,6 +79,11 @@ def arc_from_centre(
     return Arc(centre, _sweep(start, end, centre, normal, clockwise, turns))
 
 
+def is_hardly_turned(arc: Arc) -> bool:
+    """Whether it turns so little that some controls make a full turn of it."""
+    return abs(arc.sweep) <= FULL_TURN
+
+
 def arc_from_radius(
     start: FloatArray,
     end: FloatArray,
@@ -105,7 +116,9 @@ def arc_from_radius(
     centre = start.copy()
     centre[a] = (start[a] + end[a]) / 2.0 - left * db / (2.0 * half)
     centre[b] = (start[b] + end[b]) / 2.0 + left * da / (2.0 * half)
-    return Arc(centre, _sweep(start, end, centre, normal, clockwise, turns))
+    angle = 2.0 * math.asin(min(half / size, 1.0)) if height else math.pi
+    angle = (angle if radius > 0.0 else 2.0 * math.pi - angle) + 2.0 * math.pi * (turns - 1)
+    return Arc(centre, -angle if clockwise else angle)
 
 
 def closes(start: FloatArray, end: FloatArray, centre: FloatArray, *, normal: int, unit: float) -> bool:
@@ -136,11 +149,14 @@ def _sweep(
 ) -> float:
     a, b = IN_PLANE[normal]
     ua, ub = start[a] - centre[a], start[b] - centre[b]
-    va, vb = end[a] - centre[a], end[b] - centre[b]
-    angle = math.atan2(ua * vb - ub * va, ua * va + ub * vb)
+    da, db = end[a] - start[a], end[b] - start[b]
+    # the cross product with the chord, not with the other radius: that loses the digits of the chord where the radius is large
+    angle = math.atan2(ua * db - ub * da, ua * (ua + da) + ub * (ub + db))
     if clockwise:
         angle = -angle
-    if angle < FULL_TURN:
+    if math.hypot(da, db) <= SAME_PLACE:
+        angle = 2.0 * math.pi
+    elif angle <= 0.0:
         angle += 2.0 * math.pi
     angle += 2.0 * math.pi * (turns - 1)
     return -angle if clockwise else angle

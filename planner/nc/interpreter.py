@@ -13,6 +13,7 @@ recorded and reading goes on with the next line, so that `info` can show them al
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,12 +40,20 @@ _FEED_LEAST = (
 _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
+class OpenArc(NamedTuple):
+    """An arc that does not close: its line, whether it would with its centre read the other way, whether I J K are not all 0."""
+
+    line: int
+    otherwise: bool
+    centred: bool
+
+
 class Interpreter:
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`, `faults()`, `notes`.
 
     Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
 
-    open_arcs : line of every arc that does not close, and whether it would with its centre read the other way
+    open_arcs : every arc that does not close
     by_word : rows that were executed word by word, not by the compiled loop
     ended : M2, M30 or a second % was executed; later chunks are not
     two_axes : the program has X and Z and no Y, and was not found to be one for a lathe
@@ -67,7 +76,7 @@ class Interpreter:
         self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.found)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
-        self.open_arcs: list[tuple[int, bool]] = []
+        self.open_arcs: list[OpenArc] = []
         self.ended = False
         self.two_axes = False
         self.by_word = 0
@@ -168,8 +177,12 @@ class Interpreter:
 
     @property
     def all_arcs_close_otherwise(self) -> bool:
-        """Whether there are arcs that do not close, and all of them would with their centres read the other way."""
-        return bool(self.open_arcs) and all(otherwise for _, otherwise in self.open_arcs)
+        """Whether there are arcs that do not close, and all of them would with their centres read the other way.
+
+        One line decides nothing, and neither does I0 J0: one odd arc is a mistake, not the way in which a whole program is written.
+        """
+        lines = {arc.line for arc in self.open_arcs if arc.centred}
+        return len(lines) > 1 and all(arc.otherwise for arc in self.open_arcs)
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
@@ -217,7 +230,8 @@ class Interpreter:
         except WordFault as fault:
             message = fault.message
             if isinstance(fault, moves.ArcFault):
-                self.open_arcs.append((block.line, fault.otherwise))
+                centred = any(block.value.get(letter) for letter in "IJK")
+                self.open_arcs.append(OpenArc(block.line, fault.otherwise, centred))
                 message += f"; {_IF_LATHE}" if self.two_axes else ""
             self.report(fault.word, message)
             return block.m.get("stopping") in (20, 300)

@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import codes, compensation, drilling, feeds, further_moves, moves, offsets, threads
+from planner.nc.arcs import is_hardly_turned
 from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block
 from planner.nc.cutter import Cutter
@@ -155,6 +156,10 @@ class Mover:
             )
         try:
             arc, normal = moves.arc(state, block, target)
+            if is_hardly_turned(arc):
+                length = moves.arc_length(state.position, target, arc, normal)
+                text = f"an arc of {length:.4g} mm hardly turns; some controls make a full circle of it"
+                self.found.assume(text, block.line, block.motion_word())
             if feeds.on_surface(state):
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0

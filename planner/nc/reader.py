@@ -17,7 +17,7 @@ from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
-from planner.nc.interpreter import Interpreter
+from planner.nc.interpreter import Interpreter, OpenArc
 from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, has_two_axes, is_turned
 from planner.nc.leader import without_leader
 from planner.nc.lexer import Words, split_words, text_alone
@@ -159,10 +159,10 @@ def execute(
     return interpreter, program, faults
 
 
-def _with_note(program: Program, open_arcs: Sequence[tuple[int, bool]]) -> Program:
+def _with_note(program: Program, open_arcs: Sequence[OpenArc]) -> Program:
     """The program, with the arcs for whose sake it was read with absolute centres."""
     note = (
-        f"line {open_arcs[0][0]}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
+        f"line {open_arcs[0].line}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
         "(--arc-centres absolute|incremental says which)"
     )
     return dataclasses.replace(

@@ -34,7 +34,7 @@ class Reading:
     strict       : refuse everything that would be assumed
     ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands ("$X"); in one normal form
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
-                   incremental unless only absolute centres close every arc of the program
+                   incremental unless arcs on more than one line close with absolute centres only, as all of the program do
     extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
     dialect      : whose language parameters, expressions and subprograms are: "linuxcnc", "fanuc" (Haas too), "heidenhain",
                    "siemens", or "auto", by what the program holds

@@ -51,10 +51,6 @@ class Making:
             )
         return found / self.unit
 
-    def note(self, text: str) -> None:
-        """Keep a note of the command's line."""
-        self.interpreter.note(text, self.line)
-
     def assume(self, text: str) -> None:
         """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
         if self.interpreter.found.strict:

@@ -26,9 +26,8 @@ SURFACE_STEP = (
 )
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
 _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
-_SLOWEST = (
-    0.1  # feed of a block under G93, at least [programmed units per minute]: as LinuxCNC has it, and never 0
-)
+# Below this feed [programmed units per minute] LinuxCNC takes this one under G93 (inverse_time_rate_straight).
+LINUXCNC_SLOWEST = 0.1
 
 
 def set_feed(state: State, block: Block, found: Findings) -> None:
@@ -131,8 +130,13 @@ def surface_parts(state: State, start: float, end: float) -> list[float]:
     return sorted(part for part in parts if 0.0 < part <= 1.0)
 
 
-def feed_of_time(state: State, block: Block, length: float) -> None:
-    """Under G93 the feed of a block of this length [mm]."""
-    if state.feed_mode == "inverse time":
-        state.feed_unit = state.unit
-        state.feed = max(length * block.value["F"], _SLOWEST * state.unit) / SECONDS_PER_MINUTE
+def feed_of_time(state: State, block: Block, length: float, found: Findings) -> None:
+    """Under G93 the feed of a block of this length [mm]; that of one that goes nowhere is any."""
+    if state.feed_mode != "inverse time":
+        return
+    state.feed_unit = state.unit
+    state.feed = (length or state.unit) * block.value["F"] / SECONDS_PER_MINUTE
+    per_minute = length * block.value["F"] / state.unit
+    if 0.0 < per_minute < LINUXCNC_SLOWEST:
+        text = f"G93 asks for less than {LINUXCNC_SLOWEST:g} units/min, and keeps its time; LinuxCNC takes {LINUXCNC_SLOWEST:g}"
+        found.assume(text, block.line, block.at["F"])

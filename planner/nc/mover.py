@@ -117,7 +117,7 @@ class Mover:
         if kind == Kind.LINE:
             feeds.check_feed(state, block)
             length = float(np.linalg.norm(target - state.position))
-            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length))
+            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length), self.found)
         if kind == Kind.LINE and feeds.on_surface(state):
             further_moves.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
@@ -164,7 +164,9 @@ class Mover:
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
                 state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
-            feeds.feed_of_time(state, block, moves.arc_length(state.position, target, arc, normal))
+            feeds.feed_of_time(
+                state, block, moves.arc_length(state.position, target, arc, normal), self.found
+            )
             if self.cutter is not None:
                 self.cutter.arc(target, arc, block.line)
         finally:

@@ -235,7 +235,7 @@ _READING: dict[str, tuple[Any, Any]] = {
         _choice(
             "--dialect",
             _one_of(DIALECTS),
-            "whose language parameters, expressions and subprograms are; auto: by what the program holds",
+            "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
             "|".join(DIALECTS),
         ),
     ),

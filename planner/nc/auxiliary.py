@@ -20,6 +20,7 @@ _PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640:
 # Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
 # make room for themselves.
 ROWS_AT_ONCE = 4
+_LONG = 60.0  # a dwell of a minute is no usual one [s]
 _SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
@@ -81,7 +82,15 @@ def dwell(state: State, store: Store, block: Block, assumed: Assumed, found: Fin
     if seconds is None or seconds < 0:
         word = block.at["one-shot"] if seconds is None else block.at["P"]
         raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
+    assume_seconds(state, block, seconds if "P" in block.value and not assumed.printer else 0.0, found)
     store.add_dwell(seconds, block.line, state)
+
+
+def assume_seconds(state: State, block: Block, seconds: float, found: Findings) -> None:
+    """Say it if a dwell is so long that its P is most likely in another unit."""
+    if seconds >= _LONG and not state.seconds_meant:
+        text = f"a dwell of {seconds:g} s: P is read in seconds, as LinuxCNC and grbl have it; Fanuc's is in ms: --dialect fanuc"
+        found.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
 def path_control(state: State, block: Block, found: Findings) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.nc import codes, cycles
+from planner.nc import auxiliary, codes, cycles
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block import Block
 from planner.nc.cycles import CycleStep, Hole
@@ -32,7 +32,7 @@ def drill(state: State, store: Store, block: Block, found: Findings) -> None:
     here = _per_unit(state)
     series = _series(state, state.motion, float(here[c]))
     words = _words(state, block, series)
-    _check_words(state, block, words)
+    _check_words(state, block, words, found)
     hole = _hole(state, block, series, words)
     repeats = _repeats(block, hole)
     if series.level < hole.clear - _ROUNDING:
@@ -53,7 +53,7 @@ def drill(state: State, store: Store, block: Block, found: Findings) -> None:
     _say(state, block, found)
 
 
-def _check_words(state: State, block: Block, words: dict[str, float]) -> None:
+def _check_words(state: State, block: Block, words: dict[str, float], found: Findings) -> None:
     """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it must."""
     code, word = state.motion, block.motion_word()
     name = f"G{codes.number(code)}"
@@ -62,6 +62,8 @@ def _check_words(state: State, block: Block, words: dict[str, float]) -> None:
     if code in cycles.DWELLING and words["P"] < 0:
         raise WordFault(block.at["P"], "a dwell must not be negative; write its seconds, such as P0.5")
     _check_spindle(state, code, word)
+    if "P" in block.value and code in cycles.DWELLING | cycles.TAPPING.keys():
+        auxiliary.assume_seconds(state, block, words["P"], found)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
 
 

@@ -1,4 +1,4 @@
-"""Numbers without a point, as Fanuc and Haas controls read them: a length is in least increments, a dwell in milliseconds.
+"""Lengths without a point, as Fanuc and Haas controls read them: in least increments.
 
 X100 is 0.1 mm where the machine's least increment is 0.001 mm, and 0.01 inch under G20, whose increment has the same digits one place
 further on (0.0001 inch). X100. is 100 everywhere. Which of G20 and G21 holds is taken from the lines before it in the file.
@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.units import MILLISECOND
 from planner.machine import Machine
 from planner.nc.lexer import Words
-from planner.nc.reading import FANUC
 
 LENGTHS = frozenset(ord(letter) for letter in "XYZUVWIJKRQ")
 INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
@@ -25,12 +23,10 @@ INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 class Integers:
     """What numbers without a point mean.
 
-    increment    : of lengths [mm], or None: they are whole units
-    milliseconds : P of G4 is in milliseconds
+    increment : of lengths [mm], or None: they are whole units
     """
 
     increment: float | None = None
-    milliseconds: bool = False
 
     def scale(self, words: Words) -> FloatArray:
         """(R,) what a length without a point is multiplied by on each row."""
@@ -43,27 +39,21 @@ class Integers:
         return np.where(inch[at], self.increment * INCH_INCREMENT, self.increment)
 
     def applied(self, words: Words) -> Words:
-        """The words with their numbers in units and seconds."""
-        if self.increment is None and not self.milliseconds:
+        """The words with their numbers in units."""
+        if self.increment is None:
             return words
         row = np.repeat(np.arange(len(words.line)), np.diff(words.first))
         value = words.value.copy()
         whole = value == np.rint(value)
-        if self.increment is not None:
-            lengths = _without_point(words, np.flatnonzero(whole & np.isin(words.letter, list(LENGTHS))))
-            value[lengths] *= self.scale(words)[row[lengths]]
-        if self.milliseconds:
-            dwell = np.zeros(len(words.line), dtype=bool)
-            dwell[row[(words.letter == ord("G")) & (value == 4.0)]] = True
-            times = np.flatnonzero(whole & (words.letter == ord("P")) & dwell[row])
-            value[_without_point(words, times)] *= MILLISECOND
+        lengths = _without_point(words, np.flatnonzero(whole & np.isin(words.letter, list(LENGTHS))))
+        value[lengths] *= self.scale(words)[row[lengths]]
         return dataclasses.replace(words, value=value)
 
 
-def integers_of(machine: Machine | None, dialect: str | None) -> Integers:
-    """What numbers without a point mean on a machine, in a program of that dialect."""
+def integers_of(machine: Machine | None) -> Integers:
+    """What numbers without a point mean on a machine."""
     given = machine.dialect.least_increment if machine is not None and machine.dialect is not None else None
-    return Integers(given, dialect == FANUC)
+    return Integers(given)
 
 
 def _without_point(words: Words, found: Array) -> Array:

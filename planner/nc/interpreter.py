@@ -23,6 +23,7 @@ from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, off
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block, read_block
 from planner.nc.cutter import CutterFault
+from planner.nc.dwell_times import DwellWords
 from planner.nc.faults import FaultList, Findings, Notes
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover
@@ -77,6 +78,7 @@ class Interpreter:
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []
+        self._dwells = DwellWords()
         self.ended = False
         self.two_axes = False
         self.by_word = 0
@@ -129,6 +131,10 @@ class Interpreter:
     def notes(self) -> Notes:
         """What was assumed, each once, with its first line and how often."""
         return self.found.notes(self.assumed.notes())
+
+    def in_seconds(self, words: Words) -> Words:
+        """The next words of the program with the times of dwells in seconds, as `execute` takes them."""
+        return self._dwells.in_seconds(words) if self.state.fanuc else words
 
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""

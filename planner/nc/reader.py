@@ -125,9 +125,8 @@ def execute(
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
-        return interpreter, *expand(
-            interpreter, text_alone(data), HEIDENHAIN, integers_of(machine, HEIDENHAIN), tee
-        )
+        interpreter.state.seconds_meant = True
+        return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
     if language != SIEMENS and not reading.strict:
         data, leader = without_leader(data)
         if leader:
@@ -144,14 +143,15 @@ def execute(
     interpreter.state.fanuc = (
         reading.dialect == FANUC or dialect in (FANUC, LATHE) or has_further_systems(words)
     )
-    integers = integers_of(machine, dialect)
+    interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
+    integers = integers_of(machine)
     words = integers.applied(words)
     if dialect is not None:
         interpreter.assumed.refuse_extruder()
         from planner.nc.language.expand import expand
 
         return interpreter, *expand(interpreter, words, dialect, integers, tee)
-    interpreter.execute(words)
+    interpreter.execute(interpreter.in_seconds(words))
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.assumed.follows and not len(faults):

@@ -36,8 +36,8 @@ class Reading:
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
                    incremental unless arcs on more than one line close with absolute centres only, as all of the program do
     extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
-    dialect      : whose language parameters, expressions and subprograms are: "linuxcnc", "fanuc" (Haas too), "heidenhain",
-                   "siemens", or "auto", by what the program holds
+    dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells: "linuxcnc", "fanuc" (Haas too),
+                   "heidenhain", "siemens", or "auto", by what the program holds
     block_delete : leave out the lines that start with "/"
 
     Raises InputError for a value that is not one of these.

@@ -110,7 +110,8 @@ class State:
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     strict       : nothing is assumed (`Reading.strict`)
-    fanuc        : G10 L2 and L20 are those of Fanuc and Haas
+    fanuc        : G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
+    seconds_meant : the unit of dwells is known
     change_timed : how long a tool change takes is known
     in_thread    : the last block was cut in step with the spindle
     further      : axes beside x, y and z
@@ -150,6 +151,7 @@ class State:
     in_thread: bool = False
     strict: bool = False
     fanuc: bool = False
+    seconds_meant: bool = False
     further: Further = field(default_factory=Further)
 
     @property

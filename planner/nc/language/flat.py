@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from planner.machine import Machine
+from planner.nc.dwell_times import DwellWords
 from planner.nc.events import plain
 from planner.nc.faults import require_none
 from planner.nc.integers import LENGTHS
@@ -34,6 +35,7 @@ class Flat:
 
     def __init__(self, source: str, *, points: bool = False):
         self.points = points
+        self._dwells = DwellWords()
         name = PurePath(source).name.translate(_NO_COMMENT)
         self.lines = [f"({name}, expanded by feedrate-planner: parameters, loops and calls written out)"]
 
@@ -41,10 +43,12 @@ class Flat:
         """The rows of a chunk."""
         letters, values, first = words.letter.tolist(), words.value.tolist(), words.first.tolist()
         known: dict[float, str] = {}
+        dwells = set(self._dwells.find(words)) if self.points else set()
         for row in range(len(first) - 1):
             text = " ".join(
                 chr(letters[w])
                 + (known.get(values[w]) or known.setdefault(values[w], flat_number(values[w])))
+                + ("." if w in dwells and values[w].is_integer() else "")
                 for w in range(first[row], first[row + 1])
                 if letters[w] not in _LEFT_OUT
             )
@@ -58,10 +62,9 @@ class Flat:
 
 
 def _with_points(text: str) -> str:
-    """A line whose lengths, and P beside G4, have a point."""
-    letters = _LENGTHS + "P" if "G4" in text.split() else _LENGTHS
+    """A line whose lengths have a point."""
     return " ".join(
-        f"{word}." if word[0] in letters and "." not in word else word for word in text.split(" ")
+        f"{word}." if word[0] in _LENGTHS and "." not in word else word for word in text.split(" ")
     )
 
 

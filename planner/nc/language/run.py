@@ -138,6 +138,7 @@ class ProgramRun:
 
     def _execute(self, words: Words) -> None:
         self.executed += len(words.line)
+        words = self.interpreter.in_seconds(words)
         self.tee(words)
         self.interpreter.execute(words)
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import re
 
-from planner.base.units import MILLISECOND
 from planner.nc.language.fanuc import calls
 from planner.nc.language.fanuc.control import FanucControl
 from planner.nc.language.fanuc.text import SPELLING
@@ -33,7 +32,6 @@ from planner.nc.language.tree import (
     Named,
     Number,
     Numbered,
-    Operation,
     Parameter,
     PlainRows,
     Procedure,
@@ -247,8 +245,6 @@ class FanucParser(FanucControl):
             if target == Numbered(Number(0.0)):
                 raise ProgramFault(line.place, "#0 has no value and cannot be given one")
         assignments = tuple(pair for pair in assignments if pair[0] != Numbered(Number(_STOP)))
-        if "G4" in codes:
-            words = tuple(_seconds(word) for word in words)
         if words or assignments:
             self.body.append(Line(line.place, words, assignments))
         if self.modal is not None and any(chr(word.letter) in "XYZ" for word in words):
@@ -279,15 +275,6 @@ class FanucParser(FanucControl):
             self.body.append(Line(line.place, (), ((name, value),)))
             kept.append((number, name))
         self.modal = call._replace(arguments=tuple(kept))
-
-
-def _seconds(word: Word) -> Word:
-    """P of G4 is in milliseconds, unless it is written with a point."""
-    if chr(word.letter) != "P" or (
-        isinstance(word.value, Number) and word.value.value != round(word.value.value)
-    ):
-        return word
-    return word._replace(value=Operation("*", (word.value, Number(MILLISECOND))))
 
 
 def _targets(texts: list[str]) -> frozenset[int] | None:

@@ -24,6 +24,7 @@ LAYERS = (
     "planner.base.files",
     "planner.base.glossary",
     "planner.base.processor",
+    "planner.base.own_folders",
     "planner.base.kept",
     "planner.base.linking",
     "planner.base.compiling",

@@ -4,6 +4,9 @@ A kernel's name there is made of its own bytecode and settings, of the values of
 kernel that it calls; further of the types of its arguments, of the processor, and of the versions of Python and numba. So a kernel is
 compiled again when it, or one that it calls in another file, computes something else, and not when a comment changes, a file is
 copied or gets a new date. Versions that are older than `OTHERS_KEPT` are removed when a new one is written.
+
+A file ends with the SHA-256 of what is before: what a disk, a crash or another program has changed is not there, and is compiled
+anew. It says nothing of who wrote the file: kernels come only from where nobody else can write (own_folders.py).
 """
 
 from __future__ import annotations
@@ -15,23 +18,29 @@ import pickle
 import re
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
+from planner.base.own_folders import fault_of, fault_of_file
 from planner.base.processor import processor
 
 FORMAT = 1  # of the files
 # Other versions of a kernel are kept so long [s], 30 days: they may be of another processor or checkout that shares the folder.
 OTHERS_KEPT = 30 * 86_400.0
-_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_CACHE = "NUMBA_CACHE_DIR"
+PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _NOT_OF_CODE = {
-    "NUMBA_CACHE_DIR",
+    _CACHE,
     "NUMBA_NUM_THREADS",
 }  # numba's variables that machine code does not depend on
-# What reading a file raises that something else has written, or only half of it.
-_UNREADABLE = (pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError, ImportError)
+_DIGEST = hashlib.sha256().digest_size
+
+
+class KernelCacheWarning(UserWarning):
+    """Compiled kernels cannot be kept, or not where they were to be."""
 
 
 class Kept(NamedTuple):
@@ -74,15 +83,18 @@ def place(function: FunctionType, content: bytes, arguments: object) -> KernelNa
 
 
 def read(where: KernelName) -> tuple[Kept, str] | None:
-    """The kernel of this name and its file, or None. Raises OSError if it is there and cannot be read."""
-    for folder in (*folders(), installed()):
+    """The kernel of this name and its file, or None: what is damaged, or may be somebody else's, is not there."""
+    for folder in (*folders(), *([] if fault_of(installed()) else [installed()])):
         name = os.path.join(folder, where.name)
         try:
             with open(name, "rb") as file:
-                return Kept(*pickle.load(file)), name
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except _UNREADABLE:
+                if fault_of_file(os.fstat(file.fileno())):
+                    continue
+                content = file.read()
+            code, digest = content[:-_DIGEST], content[-_DIGEST:]
+            if hashlib.sha256(code).digest() == digest:
+                return Kept(*pickle.loads(code)), name
+        except Exception:  # whatever it is, the kernel can be compiled
             continue
     return None
 
@@ -90,14 +102,17 @@ def read(where: KernelName) -> tuple[Kept, str] | None:
 def write(where: KernelName, kernel: Kept) -> str:
     """Keep a kernel, in place of its old versions; returns its file. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
+    code = pickle.dumps(tuple(kernel), protocol=pickle.HIGHEST_PROTOCOL)
     for folder in folders():
         written = os.path.join(folder, where.name)
         part = f"{written}.{os.getpid()}"
         try:
-            os.makedirs(folder, exist_ok=True)
+            os.makedirs(folder, mode=0o755, exist_ok=True)
             try:
                 with open(part, "wb") as file:
-                    pickle.dump(tuple(kernel), file, protocol=pickle.HIGHEST_PROTOCOL)
+                    file.write(code + hashlib.sha256(code).digest())
+                    file.flush()
+                    os.fsync(file.fileno())  # or a power failure could leave the name without the content
                 os.replace(part, written)
             except BaseException:
                 _remove([part])
@@ -112,27 +127,46 @@ def write(where: KernelName, kernel: Kept) -> str:
         ]
         _remove(os.path.join(folder, name) for name in same if _is_old(os.path.join(folder, name)))
         return written
-    raise faults[0]
+    raise faults[0] if faults else OSError("there is no folder that is yours alone")
 
 
 def folders() -> list[str]:
-    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the package, or the user's
-    cache directory."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
+    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the sources of a checkout, or
+    the user's cache directory. An installation gets no further files: who removes it removes all of it.
+
+    Folders that others can write are left out (own_folders.py); one that NUMBA_CACHE_DIR names with a warning.
+    """
+    named = os.environ.get(_CACHE)
     if named:
-        return [os.path.join(named, "planner")]
+        folder = os.path.join(named, "planner")
+        fault = fault_of(folder)
+        if not fault:
+            return [folder]
+        _say_once(f"{_CACHE}: {folder} {fault}; compiled kernels are neither read nor kept there")
+    checkout = os.path.isfile(os.path.join(os.path.dirname(PACKAGE), "pyproject.toml"))
+    beside = [os.path.join(PACKAGE, "__pycache__", "kernels")] if checkout else []
+    found = [*beside, *(os.path.join(folder, "planner", "kernels") for folder in _of_user())]
+    return [folder for folder in found if not fault_of(folder)]
+
+
+def _of_user() -> list[str]:
+    """The user's cache directory. A relative one in XDG_CACHE_HOME counts as none, as its specification says."""
     if sys.platform == "win32":
-        of_user = os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
-    elif sys.platform == "darwin":
-        of_user = os.path.expanduser("~/Library/Caches")
-    else:
-        of_user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return [os.path.join(_PACKAGE, "__pycache__", "kernels"), os.path.join(of_user, "planner", "kernels")]
+        return [os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")]
+    if sys.platform == "darwin":
+        return [os.path.expanduser("~/Library/Caches")]
+    named = os.environ.get("XDG_CACHE_HOME", "")
+    return [named if os.path.isabs(named) else os.path.expanduser("~/.cache")]
+
+
+@cache
+def _say_once(sentence: str) -> None:
+    warnings.warn(sentence, KernelCacheWarning, stacklevel=4)
 
 
 def installed() -> str:
     """Where those lie that came with the installation (setup.py)."""
-    return os.path.join(_PACKAGE, "kernels")
+    return os.path.join(PACKAGE, "kernels")
 
 
 def _is_old(file: str) -> bool:

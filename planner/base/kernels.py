@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from planner.base import kept
+from planner.base.kept import KernelCacheWarning
 
 FIRST, LAST = (0, 68), (0, 68)  # versions of numba that the tests have run with
 PLATFORM = "linux"  # where they have
@@ -38,10 +39,6 @@ _SCALARS: dict[type, str] = {float: "f8", int: "i8", bool: "?", type(None): "non
 _warned = False
 _files: set[str] = set()
 _one_at_a_time = threading.RLock()
-
-
-class KernelCacheWarning(UserWarning):
-    """Compiled kernels cannot be kept."""
 
 
 class Compilation:
@@ -134,19 +131,19 @@ class Kernel:
             return found
 
     def _loaded(self, where: kept.KernelName) -> Callable[..., Any] | None:
-        try:
-            found = kept.read(where)
-        except OSError as fault:
-            _warn(fault)
-            return None
+        found = kept.read(where)
         if found is None:
             return None
-        from planner.base.linking import linker
-
         kernel, file = found
+        try:
+            from planner.base.linking import linker
+
+            linked = linker().function(kernel, self.py_func)
+        except Exception:  # whatever it is, the kernel can be compiled
+            return None
         self.loaded += 1
         _files.add(file)
-        return linker().function(kernel, self.py_func)
+        return linked
 
     def _compiled(self, args: tuple[Any, ...], where: kept.KernelName | None) -> Callable[..., Any]:
         from planner.base.compiling import compiled, to_keep

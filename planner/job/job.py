@@ -14,9 +14,9 @@ import numpy as np
 
 from planner.base.names import OPTIMAL, SECOND_ORDER
 from planner.constraints import filter_error, normal_limit
+from planner.delivery import mending, periods
 from planner.delivery.filters import kept
 from planner.delivery.pacing import TimedT
-from planner.delivery.periods import standing, with_standstills
 from planner.feedrate.solution import Status
 from planner.geometry.point_matching import SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
@@ -34,9 +34,12 @@ from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.verify import Verdict, verify
+from planner.verify.excess import OF_CHORDS
 
 Delivered = tuple[Trajectory, Verdict]
 FILTERS = "filters"
+# A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this share of its time [-].
+CHEAP = 1e-4
 # A motion that turns in less time than the filters are long is nearer to its path than the closed form says. Twice its acceleration is
 # as fast as 3 and 4 times for less processor time, and faster than once (40 jobs with filters, the first ones of the campaign behind
 # seed 70000).
@@ -56,6 +59,7 @@ class Job:
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
     most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
     motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
+    mended    : of trajectories that failed, what was delivered of the same motion run slower in places
     slowed_by : what made one of the motions slower than its limits did, noted as it happens: `FILTERS` or nothing
     """
 
@@ -67,6 +71,7 @@ class Job:
     judged: tuple[Machine, Toolpath] | None = None
     most: float = np.inf
     motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
+    mended: WeakKeyDictionary[Trajectory, Delivered] = field(default_factory=WeakKeyDictionary)
     slowed_by: set[str] = field(default_factory=set)
 
     @property
@@ -145,25 +150,58 @@ class Job:
                 self.slowed_by.add(FILTERS)
             return made
 
-    def deliver_in_time(self, motion: TimedT) -> Delivered | None:
+    def deliver_in_time(self, motion: TimedT, *, as_it_is: bool = False) -> Delivered | None:
         """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer than `most`."""
         if motion.end <= self.most:
             motion = self.behind_filters(motion)
-        return self.deliver(motion) if motion.end <= self.most else None
+        return self.deliver(motion, as_it_is=as_it_is) if motion.end <= self.most else None
 
-    def deliver(self, motion: MotionInTime, not_limited: tuple[str, ...] = (), seed: int = 0) -> Delivered:
+    def deliver(
+        self, motion: MotionInTime, not_limited: tuple[str, ...] = (), *, as_it_is: bool = False
+    ) -> Delivered:
         """Sample a motion at the interpolation period and have it judged, between the samples too.
 
         not_limited : quantities that are reported and not judged, "jerk" for example
-        seed        : of the times at which the verifier looks; use another one if a verdict was fed back into the motion
+        as_it_is    : whatever the verdict finds; else the motion is run slower where that mends it (delivery/mending.py). If only the
+                      chords between samples are in the way, and that costs more than `CHEAP`, a motion planned with less tolerance may
+                      be faster: then the motion is delivered as it is, and the slower one is in `mended`.
 
         Standstills are added where the chords between samples would cut off a full stop (delivery/periods.py).
 
         Returns the trajectory and the verdict.
         """
+        made, stands = self._delivered(motion, not_limited, 0)
+        if as_it_is or made[1].passed:
+            return made
+        slower, mended = motion, made
+        for again in range(mending.ROUNDS):
+            found = mending.mended(slower, stands, mended[1], self.real[0].dt, again)
+            if found is None:
+                return made
+            places = len(mended[1].excesses)
+            self.tell("slower in places", found=found.end, before=slower.end, places=places)
+            slower = found
+            mended, stands = self._delivered(slower, not_limited, again + 1)
+            if mended[1].passed:
+                break
+        if not mended[1].passed:
+            return made
+        if set(made[1].kinds) & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
+            self.mended[made[0]] = mended
+            return made
+        return mended
+
+    def _delivered(
+        self, motion: MotionInTime, not_limited: tuple[str, ...], seed: int
+    ) -> tuple[Delivered, periods.Standing]:
+        """Trajectory and verdict, and where the motion was made to stand longer.
+
+        seed : of the times at which the verifier looks; another one if a verdict was fed back into the motion
+        """
         machine, toolpath = self.real
         with self.stage("sample"):
-            motion = self.settled(motion, not_limited)
+            stands = periods.standing(motion, toolpath, machine, "jerk" not in not_limited)
+            motion = periods.with_standstills(motion, stands)
             whole = motion if toolpath.extrusion is None else Extruding(motion, toolpath, machine.dt)
             trajectory = sample_motion(whole, machine.dt)
             places = SegmentsInOrder(toolpath)
@@ -188,12 +226,7 @@ class Job:
             )
         trajectory = self._named(trajectory, places)
         self.motion_of[trajectory] = motion
-        return trajectory, verdict
-
-    def settled(self, motion: MotionInTime, not_limited: tuple[str, ...] = ()) -> MotionInTime:
-        """The motion as it is delivered, with the standstills that its samples need."""
-        machine, toolpath = self.real
-        return with_standstills(motion, standing(motion, toolpath, machine, "jerk" not in not_limited))
+        return (trajectory, verdict), stands
 
     def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the

@@ -126,6 +126,10 @@ class Method(ABC):
         made = self.plan_job(job)
         if made.verdict is None or (made.verdict.passed and (_inside(made) or not self.keeps_tolerance)):
             return made
+        return faster(self._planned_again(job, made), _slower_in_places(job, made))
+
+    def _planned_again(self, job: Job, made: Plan) -> Plan:
+        """The plan of another method, or with less tolerance, in the place of one that leaves it."""
         rival = self._rival(job, made) if made.grid_points <= INSTEAD_POINTS else None
         if self.keeps_tolerance:
             made = self._with_less(made, job if rival is None else _faster_than(rival, job))
@@ -213,6 +217,12 @@ def faster(plan: Plan, other: Plan) -> Plan:
     if plan.verdict.passed != other.verdict.passed:
         return plan if plan.verdict.passed else other
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
+
+
+def _slower_in_places(job: Job, plan: Plan) -> Plan:
+    """The plan with its motion run slower where the verdict found something, if that is kept; else as it is."""
+    found = job.mended.get(plan.trajectory) if plan.trajectory is not None else None
+    return plan if found is None else dataclasses.replace(plan, trajectory=found[0], verdict=found[1])
 
 
 def _faster_than(plan: Plan, job: Job) -> Job:

@@ -79,7 +79,7 @@ class BezierMethod(Method):
         with job.stage("solve"):
             motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
         motion = job.behind_filters(motion)
-        made = job.deliver(motion)
+        made = job.deliver(motion, as_it_is=not self.allocate)
         with job.stage("report"):
             rounded = _corner_table(motion, limits)
         return job.plan(

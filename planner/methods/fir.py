@@ -62,7 +62,7 @@ class FirMethod(Method):
             filtered = superpose(schedule.command())
             motion = motion_of(schedule.guide, filtered)
         return job.plan(
-            job.deliver(motion) if self.plain else job.deliver_in_time(motion),
+            job.deliver(motion, as_it_is=True) if self.plain else job.deliver_in_time(motion),
             method="fir-plain" if self.plain else "fir",
             corner="fir",
             solver="pulses",

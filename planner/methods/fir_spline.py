@@ -133,7 +133,7 @@ class FirSplineMethod(Method):
             motion = _motion(dataclasses.replace(speeds, guide=guide), job.toolpath)
         delay = 1e3 * (speeds.T1 + speeds.T2)
         return job.plan(
-            job.deliver(motion) if self.plain else job.deliver_in_time(motion),
+            job.deliver(motion, as_it_is=True) if self.plain else job.deliver_in_time(motion),
             method="fir-spline-plain" if self.plain else "fir-spline",
             corner=corner,
             solver="filters",

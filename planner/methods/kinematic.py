@@ -74,7 +74,7 @@ class KinematicMethod(Method):
         with job.stage("solve"):
             chain = self._chain(job.toolpath, job.machine, exact)
             motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
-        made = job.deliver_in_time(motion)
+        made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)
         with job.stage("report"):
             rounded = _corner_table(chain, job.machine)
         return job.plan(

@@ -30,6 +30,7 @@ from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
 from planner.path.samples import RESOLUTION
+from planner.verify.excess import OF_CHORDS, Kind
 
 RIVAL_POINTS = SIZES.rivals_planned
 RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)
@@ -84,10 +85,8 @@ def counted_time(plan: Plan) -> float:
     planned again with less tolerance (delivery/periods.py). Chords that leave the contour leave the exact path of G61 as well."""
     if plan.trajectory is None or plan.verdict is None:
         return float("inf")
-    by_chords: tuple[str, ...] = ("vertex", "contour")
-    if any(fault.startswith(by_chords) for fault in plan.verdict.faults):
-        by_chords = (*by_chords, "exact path")
-    chords = all(fault.startswith((*by_chords, "eq. 18")) for fault in plan.verdict.faults)
+    kinds = set(plan.verdict.kinds)
+    chords = kinds <= OF_CHORDS | ({Kind.EXACT} if kinds & {Kind.CONTOUR, Kind.VERTEX} else set())
     return plan.trajectory.cycle_time if chords else float("inf")
 
 

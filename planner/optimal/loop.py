@@ -29,7 +29,7 @@ What is tried more than once:
   final grid                     rounds of reshaping are on a coarse one   1                 finer solve   that of the plan
   tighter limits in places       excess above 1e-5 between points          2, long jobs 4    ranges        runs slower by the rest
   less feed in places            filters leave the tolerance               16                solve         waiting, slower runs
-  the whole slower               excess below 0.5 % in the verdict         3                 verdict       the verdict stands
+  slower in places               the verdict finds something               6                 verdict       the verdict stands
   another plan                   "auto", a bound on its time is lower, or  4                 a plan        the fastest that passes
                                    the plan fails its verdict
 
@@ -54,11 +54,10 @@ from planner.base.threads import beside, threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
 from planner.feedrate.solution import Status
-from planner.job.job import Delivered, Job
+from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.job.records import Tables
 from planner.methods.kinematic import KinematicMethod
-from planner.motion.timing import Motion, MotionInTime
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, Stopped, better, chances, counted_time
@@ -69,13 +68,10 @@ from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order
 from planner.optimal.result import plan_of_solution, pricing_of
 from planner.optimal.rounds import reshaped, tell_of
-from planner.optimal.tighten import SEEN_EXCESS_MAX, within_limits, without_seen_excess
+from planner.optimal.tighten import within_limits
 from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
 
-# Of 345 plans 9 exceeded a limit between the places looked at, and one of these once more (benchmarks/retries.py); each time with ten
-# times the margin. A shaped motion did three times (55117 of the campaign).
-SEEN_ROUNDS = 3
 PRICED_BESIDE = SIZES.priced_beside
 
 
@@ -164,10 +160,10 @@ def _plan_of(job: Job, settings: Settings, found: list[OnPath], useless: Callabl
         if settings.order.jerk_limited:
             pricing = pricing_of(best, job.machine)
         if pricing is not None and len(best.samples) > PRICED_BESIDE and threads() > 1:
-            made, prices = beside(lambda: judged(job, motion, not_limited), pricing)
+            made, prices = beside(lambda: job.deliver(motion, not_limited), pricing)
             pricing = None
         else:
-            made = judged(job, motion, not_limited)
+            made = job.deliver(motion, not_limited)
     else:
         best = found.pop()
     tables = Tables(prices=prices, pricing=pricing)
@@ -281,23 +277,3 @@ def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, Pa
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
     return settings.effort.grids(len(coarse)), coarse
-
-
-def judged(
-    job: Job,
-    motion: Motion,
-    not_limited: tuple[str, ...],
-    made_of: Callable[[Motion], MotionInTime] | None = None,
-    most: float = SEEN_EXCESS_MAX,
-) -> Delivered:
-    """Setpoints and verdict of a motion, or of what is `made_of` it. If the verdict finds a tiny excess, of `most` at most, the motion
-    is slowed down, and judged at other times, from which nothing was fed back."""
-    made = job.deliver(motion if made_of is None else made_of(motion), not_limited)
-    for again in range(SEEN_ROUNDS):
-        gentler = without_seen_excess(motion, made[1], again, most)
-        if gentler is None:
-            break
-        job.tell("slower for verdict", found=gentler.end, before=motion.end, round=again + 1)
-        motion = gentler
-        made = job.deliver(motion if made_of is None else made_of(motion), not_limited, seed=again + 1)
-    return made

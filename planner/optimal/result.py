@@ -13,7 +13,7 @@ from planner.job.plan import Plan
 from planner.job.records import NO_TABLES, PriceList, Pricing, Tables
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
-from planner.motion.timing import Motion
+from planner.motion.slowed import times_of_pieces
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
 from planner.optimal.reshape import corridor_prices, dear_runs, price_bands
@@ -37,10 +37,9 @@ def plan_of_solution(
         delivered = job.motion_of[made[0]]  # with the standstills that its samples need
         if isinstance(delivered, ShapedMotion):
             delivered = delivered.motion  # what the solution is of
-        assert isinstance(delivered, Motion)
         with job.stage("report"):
             rounded = corner_table(best.samples, best.problem, best.solution)
-            grid = history(best.problem, best.solution, delivered.law)
+            grid = history(best.problem, best.solution, *times_of_pieces(delivered))
         job.note(*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
         made,

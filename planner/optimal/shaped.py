@@ -39,7 +39,7 @@ from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, shaper_of
 from planner.motion.timing import Motion
 from planner.optimal.compare_plans import counted_time
-from planner.optimal.loop import Settings, judged, time_optimal
+from planner.optimal.loop import Settings, time_optimal
 from planner.optimal.on_path import OnPath
 from planner.optimal.result import plan_of_solution
 from planner.optimal.settling import Settling
@@ -69,8 +69,6 @@ CANDIDATES = (
     Candidate(np.inf, 1.75, 0.5, False),
 )
 STOPPING = Candidate(COLLINEAR_ANGLE, 1.0, 0.5, False)
-# What the verdict may see of a limit above it, between the places where D was looked at [-]: 9e-3 of a jerk on a random job.
-SEEN_MOST = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -200,7 +198,6 @@ def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:
             sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
         )  # fmt: skip
     not_limited = () if settings.order.jerk_limited else ("jerk",)
-    shaper = found.delivered.shaper
-    made = judged(job, found.motion, not_limited, lambda planned: ShapedMotion(planned, shaper), SEEN_MOST)
+    made = job.deliver(found.delivered, not_limited)
     plan = plan_of_solution(job, found.planned, made, method=settings.method, corner=settings.corner)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

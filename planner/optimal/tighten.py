@@ -20,7 +20,6 @@ from planner.base.kernels import njit
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.constraints import normal_limit, own
-from planner.constraints.limits import LIMITS
 from planner.constraints.problem import FeedrateProblem
 from planner.delivery.pacing import runs_of, slower_runs
 from planner.geometry.toolpath import Toolpath
@@ -31,7 +30,6 @@ from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_piec
 from planner.motion.trajectory import Trajectory
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
-from planner.verify import Verdict
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
@@ -48,12 +46,9 @@ SETTLED = 1e-6  # a round that changes the time by less is the last [share of it
 # rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
-# A verdict's excess up to this is made good by slowing down [-]; more is a mistake to be seen.
-SEEN_EXCESS_MAX = 5e-3
 # Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
 # of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
 SEEN_BEFORE = 1.0 + 2e-5
-ORDER = {limit.name: limit.order for limit in LIMITS}
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -222,21 +217,6 @@ def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatAr
 def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
     """(G,) the largest factor of each run."""
     return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
-
-
-def without_seen_excess(
-    motion: Motion, verdict: Verdict, again: int, most: float = SEEN_EXCESS_MAX
-) -> Motion | None:
-    """The motion slowed down to keep the limits that its verdict says it exceeds, if that is next to nothing: the verifier looks
-    between the places that `excess` looks at, and at differences of positions. None where nothing can or need be done, or it is more
-    than `most` [-]; `again` counts the times before. The slower motion needs a verdict at other times."""
-    limited = [check for check in verdict.limits.values() if check.limited]
-    over = [check for check in limited if check.broken]
-    if not over or max(check.ratio for check in limited) > 1.0 + most:
-        return None
-    factor = max(check.ratio ** (1.0 / ORDER[check.name.partition(".")[0]]) for check in over)
-    more = SLOWING_MORE * 10.0**again
-    return slower(motion, np.full(len(motion.samples.piece) - 1, factor * (1.0 + more)))
 
 
 def slower(motion: Motion, factor: FloatArray) -> Motion:

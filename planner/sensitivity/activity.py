@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.job.records import GridHistory
-from planner.motion.time_law import TimeLaw
 
 # An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with jerk limits are within
 # 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 % (pentagon, zig-zag, arcs, spiral); more does not help.
@@ -21,12 +21,13 @@ HELD = 1e-2
 NONE, REST = "none", "rest"
 
 
-def history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) -> GridHistory:
-    """The profile of a solution in the time of a law, with the active limits. Raises NotSolvedError if there is no solution."""
+def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray, end: float) -> GridHistory:
+    """The profile of a solution of P points, which are passed at the times t (P,) [s], up to the `end` [s], with the active limits.
+    Raises NotSolvedError if there is no solution."""
     names = (*active_names(problem), NONE, REST)
     none, rest = len(names) - 2, len(names) - 1
     moving = problem.interval
-    lasting = np.diff(law.t, append=law.end)
+    lasting = np.diff(t, append=end)
     holders = np.zeros(len(problem))
     closest, active = np.full(len(problem), 1.0 - HELD), np.full(len(problem), none)
     for limit, ratio in ratios_by_limit(problem, solution):
@@ -40,7 +41,7 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, law: TimeLaw) 
     time[none], time[rest] = lasting[moving & (holders == 0)].sum(), lasting[~moving].sum()
     active[~moving] = rest
     return GridHistory(
-        t=law.t,
+        t=t,
         s=problem.s,
         feed=np.sqrt(solution.feed_sq),
         active=active,

@@ -14,6 +14,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.constraints.limits import ACCELERATION, CHORD_ERROR, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Toolpath
 from planner.job.records import GridHistory
+from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST
 from planner.tube import price
@@ -61,6 +62,8 @@ def found_history(
     motion : as it is delivered
     start  : what held the start's motion
     """
+    slowed = motion if isinstance(motion, Slowed) else Slowed(motion=motion, places=())
+    motion = slowed.motion
     if not isinstance(motion, Spliced):
         return None
     axes = toolpath.axes
@@ -81,8 +84,9 @@ def found_history(
                 _of_start(rows, start, part, begin)
             rows.stand(begin + part.end - part.begin, part.hold)
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
-    single, which = np.unique(t, return_inverse=True)
-    seen = motion.at(single, SEEN)
+    t = slowed.run_at(t)
+    single, which = np.unique(np.minimum(t, slowed.end), return_inverse=True)
+    seen = slowed.at(single, SEEN)
     return GridHistory(
         t=t,
         s=seen.s[which],

@@ -17,6 +17,7 @@ sharp each check is:
     error_allocation.py
                   eq. 18 and 19 at every programmed corner, and the comparison with eq. 20, on the motion's own curvature
     corners.py    the record of that
+    excess.py     the kinds of faults, and the spans of time in which limits are exceeded
     exact.py      blocks under G61: the samples run along the path itself
     held.py       threads: moves in step with the spindle
     extruder.py   what the extruder of a 3-D printer does

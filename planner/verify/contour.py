@@ -18,6 +18,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
+from planner.verify.excess import Excess, Kind
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, line_of
 from planner.verify.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
@@ -140,6 +141,27 @@ class Apart:
             if len(missed) > FAULTS_OF_A_KIND:
                 said.append(f"vertex: {len(missed)} vertices missed in all")
         return said
+
+    def excesses(self) -> list[Excess]:
+        """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose distance is known. Of what the
+        chords between samples add a slower motion has less; what is between the samples is the path's own error."""
+        found = []
+        for k, look in enumerate(self.looks):
+            ratio, distance, budget, time, _, _ = look.seen.match.worst.tolist()
+            still = 1.0 if k else 0.0
+            if distance > budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+                found.append(_excess(Kind.CONTOUR, time, ratio * self.widened, still))
+            near, times = self.near(look), look.seen.match.passed["near_time"]
+            for i in np.flatnonzero(np.nan_to_num(near) > self._allowed):
+                by = float(near[i] / self.pieces.joint["budget"][i])
+                own = float(self.near(self.looks[-1])[i] / self.pieces.joint["budget"][i])
+                still = own if len(self.looks) > 1 and np.isfinite(own) else 0.0
+                found.append(_excess(Kind.VERTEX, float(times[i]), by, still))
+        return found
+
+
+def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
+    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=2, still=still)
 
 
 def apart(looks: list[Look], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Look]]) -> Apart:

@@ -36,6 +36,7 @@ it. It is no bound: other shapes within eps may be faster, and dense programs ne
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -47,6 +48,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify.corners import CornerCheck
+from planner.verify.excess import Excess, Kind
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
 from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
 from planner.verify.matching import NEAR_MISS
@@ -138,21 +140,48 @@ def check_corners(
     )
 
 
-def faults(check: CornerCheck, axes: tuple[str, ...]) -> list[str]:
-    """Corners that are passed too fast or whose budget is overdrawn, in sentences."""
+def too_fast_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[str]:
+    """Corners that are passed too fast, in sentences."""
+    return _faults(check, check.too_fast & check.judged, check.speed_ratio, _too_fast, axes)
+
+
+def overdrawn_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[str]:
+    """Corners whose budget is overdrawn, in sentences."""
+    return _faults(check, check.overdrawn, check.budget_ratio, _overdrawn, axes)
+
+
+def excesses(check: CornerCheck) -> list[Excess]:
+    """Both, as data. A slower motion has less of a chord error, and misses the vertex by as much."""
+    found = []
+    for k in np.flatnonzero(check.too_fast & check.judged).tolist():
+        found.append(_excess(check, k, Kind.CORNER_SPEED, float(check.speed_ratio[k]), 1))
+    for k in np.flatnonzero(check.overdrawn).tolist():
+        still = float(check.miss[k] / check.budget[k])
+        found.append(_excess(check, k, Kind.CORNER_BUDGET, float(check.budget_ratio[k]), 2, still))
+    return found
+
+
+def _excess(check: CornerCheck, k: int, kind: Kind, ratio: float, power: int, still: float = 0.0) -> Excess:
+    time = float(check.time[k])
+    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=power, still=still)
+
+
+def _faults(
+    check: CornerCheck,
+    broken: Array,
+    values: FloatArray,
+    sentence: Callable[[CornerCheck, int], str],
+    axes: tuple[str, ...],
+) -> list[str]:
+    worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
     said = []
-    for broken, values, sentence in (
-        (check.too_fast & check.judged, check.speed_ratio, _too_fast),
-        (check.overdrawn, check.budget_ratio, _overdrawn),
-    ):
-        worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
-        for k in worst[:FAULTS_OF_A_KIND]:
-            where = " ".join(f"{name}{x:.6g}" for name, x in zip(axes, check.position[k], strict=True))
-            said.append(
-                f"{sentence(check, k)}, at the end of line {check.line[k]}, {where}, t = {check.time[k]:.6g} s"
-            )
-        if len(worst) > FAULTS_OF_A_KIND:
-            said.append(f"{sentence(check, worst[0]).partition(':')[0]}: {len(worst)} corners in all")
+    for k in worst[:FAULTS_OF_A_KIND]:
+        where = " ".join(f"{name}{x:.6g}" for name, x in zip(axes, check.position[k], strict=True))
+        said.append(
+            f"{sentence(check, k)}, at the end of line {check.line[k]}, {where}, t = {check.time[k]:.6g} s"
+        )
+    if len(worst) > FAULTS_OF_A_KIND:
+        said.append(f"{sentence(check, worst[0]).partition(':')[0]}: {len(worst)} corners in all")
     return said
 
 

@@ -25,6 +25,7 @@ on its file have the same numbers here.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, findings
 from planner.verify.between import Signal
+from planner.verify.excess import Kind
 from planner.verify.findings import Look
 from planner.verify.follow import follow
 from planner.verify.pieces import ProgramPieces
@@ -121,4 +123,9 @@ def after_filters(
         contour_error_mm=apart.contour_error(),
         vertex_error_mm=apart.vertex_error(),
         faults=tuple(faults),
+        excesses=tuple(
+            # of what the filters took in until then
+            replace(each, kind=Kind.FILTERS, begin=each.begin - sum(lengths), still=0.0)
+            for each in apart.excesses()
+        ),
     )

@@ -11,6 +11,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import in_degrees
 from planner.verify import limits as rows
+from planner.verify.excess import Excess, of_check
 from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verify.stream import Limits, Observed
@@ -53,6 +54,19 @@ def measured(looks: list[Look], group: int) -> FloatArray:
     """Largest ratio per axis (A,) of a group of rows, over all readings."""
     axes = looks[0].seen.at.shape[1]
     return np.array([look.seen.worst[group * axes : (group + 1) * axes, 0] for look in looks]).max(axis=0)
+
+
+def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]) -> list[Excess]:
+    """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are of, at the worst place."""
+    found = [
+        each
+        for look in looks
+        for seen in (look.seen.over, look.seen.own.over)
+        for each in seen.excesses(not_limited)
+    ]
+    shown = {each.name for each in found}
+    broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
+    return found + [of_check(check.name, check.time, check.ratio) for check in broken]
 
 
 # ---- limits and columns ----------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
 from planner.verify.exact import exact_faults
+from planner.verify.excess import Kind
 from planner.verify.extruder import extruder_seen
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
@@ -84,28 +85,16 @@ def verify(
         seen = max(contour_error or 0.0, vertex_error or 0.0)
         sparse = samples.density(trajectory, machine, limits, float(toolpath.tolerance.min()), seen)
         coarse, notes = sparse[0] + coarse, sparse[1] + notes
-    faults = coarse + reader.delivered.period_faults()
-    faults += reader.comparison.faults(limits, looks) if reader.comparison is not None else []
-    faults += [check.sentence(toolpath.axes) for check in checks.values() if check.broken]
-    faults += findings.column_faults(looks, limits, toolpath, pieces)
-    faults += end_faults + samples.rest_faults(reader.delivered, looks, limits)
-    faults += [contour_check.sentence(toolpath.axes)] if contour_check.broken else []
-    faults += vertex_faults
-    faults += order_faults
-    faults += findings.stop_faults(looks, toolpath, pieces)
-    faults += exact_faults(trajectory, looks, toolpath, limits)
+    of_samples = coarse + reader.delivered.period_faults()
+    of_samples += reader.comparison.faults(limits, looks) if reader.comparison is not None else []
+    of_samples += findings.column_faults(looks, limits, toolpath, pieces)
+    of_samples += samples.rest_faults(reader.delivered, looks, limits)
     threads = thread_checks(trajectory, looks, toolpath, pieces, machine)
-    faults += thread_faults(threads)
     extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
     if toolpath.extrusion is not None:
         checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
-    faults += [
-        check.sentence(toolpath.axes) for name, check in checks.items() if name[-2:] == ".e" and check.broken
-    ]
-    faults += extruder.faults
     notes += extruder.notes
     after = after_filters(trajectory, toolpath, machine, pieces)
-    faults += after.faults if after is not None else ()
     linear_error, angle_error = _both_errors(apart, toolpath)
     corners = error_allocation.check_corners(
         trajectory,
@@ -117,11 +106,31 @@ def verify(
         limits=limits,
         judged="acceleration" not in not_limited,
     )
-    faults += error_allocation.faults(corners, toolpath.axes)
+    said: list[tuple[Kind, Sequence[str]]] = [
+        (Kind.SAMPLES, of_samples),
+        (Kind.LIMIT, [check.sentence(toolpath.axes) for check in checks.values() if check.broken]),
+        (Kind.ORDER, end_faults),
+        (Kind.CONTOUR, [contour_check.sentence(toolpath.axes)] if contour_check.broken else []),
+        (Kind.VERTEX, vertex_faults),
+        (Kind.ORDER, order_faults),
+        (Kind.STOP, findings.stop_faults(looks, toolpath, pieces)),
+        (Kind.EXACT, exact_faults(trajectory, looks, toolpath, limits)),
+        (Kind.THREAD, thread_faults(threads)),
+        (Kind.EXTRUDER, extruder.faults),
+        (Kind.FILTERS, after.faults if after is not None else ()),
+        (Kind.CORNER_SPEED, error_allocation.too_fast_faults(corners, toolpath.axes)),
+        (Kind.CORNER_BUDGET, error_allocation.overdrawn_faults(corners, toolpath.axes)),
+    ]
+    faults = tuple(sentence for _, sentences in said for sentence in sentences)
+    excesses = findings.excesses(looks, checks, not_limited)
+    excesses += apart.excesses() + error_allocation.excesses(corners)
+    excesses += () if after is None else after.excesses
     if progress is not None:
         progress(1.0)
     return Verdict(
         passed=not faults,
+        kinds=tuple(kind for kind, sentences in said for _ in sentences),
+        excesses=tuple(sorted(excesses, key=lambda each: each.begin)),
         limits=checks,
         contour=contour_check,
         corners=corners,
@@ -137,7 +146,7 @@ def verify(
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
         lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
         threads=threads,
-        faults=tuple(faults),
+        faults=faults,
         ringing=ringing_of(trajectory, machine),
         notes=tuple(notes),
         after_filters=after,

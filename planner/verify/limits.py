@@ -52,6 +52,7 @@ VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERAT
 GROUPS = 6
 FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
+OVER = 5  # velocity, acceleration and jerk of any axis, feed, normal acceleration
 
 
 class SampleColumns(NamedTuple):
@@ -82,15 +83,18 @@ class Allowed(NamedTuple):
 
 
 class Worst(NamedTuple):
-    """The worst so far of R = GROUPS A + ROWS_ALONE rows.
+    """The worst so far of R = GROUPS A + ROWS_ALONE rows, and where limits are exceeded.
 
     row    : (R, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`. The gaps are those of the module's text over h, h^2 and h, with the
              limits in place of A, J.
     sample : (R,) its index
+    over   : (n, OVER) by what ratio the columns of each sample exceed velocity, acceleration, jerk, feed and normal acceleration; 0
+             where they keep them
     """
 
     row: FloatArray
     sample: Array
+    over: FloatArray
 
 
 def normal_limit(machine: Machine) -> float:
@@ -301,3 +305,8 @@ def _keep(worst: Worst, row: int, value: float, limit: float, k: int, seen: int)
     if value > rows[row, 0] * limit:  # false where the limit is inf
         rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = value / limit, value, limit, seen
         worst.sample[row] = k
+    if seen == COLUMN and value > (1.0 + RATIO_ROUNDING) * limit:
+        axes = (len(rows) - ROWS_ALONE) // GROUPS
+        column = row // axes if row < GROUPS * axes else 3 + row - GROUPS * axes
+        if column < 3 or (row >= GROUPS * axes and column < OVER):
+            worst.over[k, column] = max(worst.over[k, column], value / limit)

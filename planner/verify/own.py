@@ -21,6 +21,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.series import Series
+from planner.verify.excess import Spans, above
 from planner.verify.limits import COLUMN, DIFFERENCE, FEED_AT_REST, ROUNDING_ULPS
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class OwnSeen:
         self.piece = np.zeros(count, dtype=np.int64)
         self.bounded = np.zeros(count, dtype=bool)  # True where a bound was finite anywhere
         self.least = np.full(count, np.inf)  # the least bound
+        self.over = Spans()
 
     def take(self, block: SampleBlock, limits: Limits) -> None:
         """Look at a block of samples."""
@@ -95,6 +97,8 @@ class OwnSeen:
         ratio = value / bound
         ratio[: block.skip] = 0.0
         k = int(ratio.argmax())
+        if how == COLUMN and (over := above(ratio)).any():
+            self.over.add(row % len(QUANTITIES), block.t, over)
         if ratio[k] > self.worst[row, 0]:
             self.worst[row] = ratio[k], value[k], bound[k], how
             self.time[row], self.at[row], self.piece[row] = block.t[k], block.position[k], block.piece[k]

@@ -15,7 +15,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
 from planner.verify.axes_apart import both_apart
-from planner.verify.limits import GROUPS, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
+from planner.verify.excess import Spans
+from planner.verify.limits import GROUPS, OVER, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
 from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
 from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import ProgramPieces
@@ -60,6 +61,7 @@ class Observed:
     piece: Array
     match: Match
     own: OwnSeen = field(default_factory=lambda: OwnSeen((), ()))
+    over: Spans = field(default_factory=Spans)
     apart: FloatArray = field(default_factory=lambda: np.zeros(2))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))  # (A,) first and last position
@@ -150,7 +152,9 @@ def _block(
         digits=np.append(limits.rounding, limits.time_rounding),
     )
     work = np.zeros((4, position.shape[1], 4))
-    travelled = scan(data, skip, allowed, feed_max, travelled, Worst(worst, sample), work)
+    over = np.zeros((len(t), OVER))
+    travelled = scan(data, skip, allowed, feed_max, travelled, Worst(worst, sample, over), work)
+    seen.over.take(t, over)
     new = np.flatnonzero(sample >= 0)
     seen.worst[new] = worst[new]
     seen.time[new] = t[sample[new]]

@@ -7,6 +7,7 @@ from typing import Any
 
 from planner.base.arrays import FloatArray, freeze
 from planner.verify.corners import CornerCheck
+from planner.verify.excess import Excess, Kind
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verify.ringing import Ringing
 
@@ -95,6 +96,7 @@ class AfterFilters:
     contour_error_mm: float | None
     vertex_error_mm: float | None
     faults: tuple[str, ...]
+    excesses: tuple[Excess, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -120,6 +122,8 @@ class Verdict:
     lost_lines       : their NC lines
     threads          : moves in step with the spindle, in the order of the program, each with how far it is out of step
     faults           : one sentence for each failure: what, by how much, when, where, NC line
+    kinds            : what each of the faults is about
+    excesses         : spans of time in which limits or the tolerance are exceeded, as far as their times are known
     after_filters    : errors of the motion behind the filters of the machine; None for a machine without filters
     ringing          : what each vibration mode of the machine does; reported, not judged
     notes            : what could not be judged exactly, and why
@@ -138,6 +142,8 @@ class Verdict:
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
     faults: tuple[str, ...]
+    kinds: tuple[Kind, ...] = ()
+    excesses: tuple[Excess, ...] = ()
     linear_error_mm: float | None = None
     angle_error_deg: float | None = None
     after_filters: AfterFilters | None = None

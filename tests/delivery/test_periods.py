@@ -9,6 +9,7 @@ import pytest
 from quick import slow_but
 
 from benchmarks import problems
+from planner.delivery import mending, periods
 from planner.delivery.periods import ABOVE, USED, missed, with_less_tolerance
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
@@ -181,8 +182,10 @@ def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged
 def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
     monkeypatch.setattr(job_method, "PERIOD_ROUNDS", 0)
+    monkeypatch.setattr(mending, "ROUNDS", 0)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order").verdict.passed
-    monkeypatch.setattr(jobs, "settled", lambda motion, *given: motion)
+    nothing = periods.Standing(np.empty(0), np.empty(0))
+    monkeypatch.setattr(periods, "standing", lambda *given: nothing)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="stop").verdict.passed
 
 

@@ -19,7 +19,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
 from planner.methods.registry import plan
 from planner.motion.time_law import law_of_solution
-from planner.motion.timing import Motion, sample_motion
+from planner.motion.timing import Motion
 from planner.nc.reader import parse_program
 from planner.optimal import tighten
 from planner.optimal.on_path import OnPath
@@ -30,13 +30,10 @@ from planner.optimal.tighten import (
     WORTH,
     excess,
     slowed,
-    slower,
     tightened,
     within_limits,
-    without_seen_excess,
 )
 from planner.path.samples import RESOLUTION, sample_path
-from planner.verify import verify
 
 MACHINE = problems.machine()
 COARSE = 4.0  # times the usual resolution: a grid on which motions exceed their limits visibly
@@ -99,22 +96,6 @@ def test_tightening_costs_less_than_slowing_down(coarse):
     assert kept.end - motion.end < 0.5 * (plain.end - motion.end)
     assert best.problem is not planned.problem
     assert best.solution.solved
-
-
-def test_a_small_excess_of_the_verdict_is_made_good_and_a_large_one_left_to_be_seen(coarse):
-    _, motion, toolpath, _ = coarse
-    kept = slowed(motion, toolpath, MACHINE)
-
-    def verdict_of(motion):
-        return verify(sample_motion(motion, MACHINE.dt), toolpath, MACHINE)
-
-    runs = len(kept.samples.piece) - 1
-    near_limit = slower(kept, np.full(runs, 1.0 - 1.6e-3))
-    seen = verdict_of(near_limit)
-    assert not seen.passed
-    assert verdict_of(without_seen_excess(near_limit, seen, 0)).passed
-    assert without_seen_excess(near_limit, verdict_of(slower(kept, np.full(runs, 0.9))), 0) is None
-    assert without_seen_excess(kept, verdict_of(kept), 0) is None
 
 
 def test_peaks_between_the_places_looked_at_are_seen():

@@ -1,0 +1,134 @@
+"""What a verdict finds is mended where it is found: the motion is run slower there, and as it was everywhere else.
+
+A limit that is exceeded, a feed, a corner passed too fast, and an error of the chords between samples or of filters all get less where
+the motion is slower (verify/excess.py says by what power), so that each says by how much it has to be. What does not get less, a path
+that leaves the tolerance by itself, is not mended here; nor is a motion that takes more than `MOST_SLOWER` times as long anywhere,
+which is a mistake to be seen.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.delivery.periods import Standing
+from planner.motion.shaping import ShapedMotion
+from planner.motion.slowed import FAR, Place, Slowed, reach, without_stands
+from planner.motion.timing import MotionInTime
+from planner.verify import Verdict
+from planner.verify.excess import OF_CHORDS, Kind
+
+# So often a motion is mended and judged again, at other times each time: an excess may be larger between the places looked at before.
+ROUNDS = 6
+MOST_SLOWER = 2.0  # [-]
+# What is slowed down is slowed down by this much more [-], and ten times that each time again.
+MORE = 1e-5
+# Of an error of which it is not known how much the path itself has the share is taken to be none at first; it is slowed down by so
+# many times that in each further round [-].
+AGAIN = 2.0
+# A place reaches so many periods to both sides: that far what is judged is made of [-].
+PERIODS = 3.0
+# Two places are one where that costs less: each costs twice its reach to either side.
+JOINED = 4.0
+# A motion that is not faster [mm/s], nor accelerated more [mm/s2], rests: less is rounding of long sums.
+STANDS = 1e-6, 1e-3
+PART = 32  # ends of pieces that are looked at for a rest at first
+MENDED = OF_CHORDS | {Kind.LIMIT, Kind.FILTERS, Kind.CORNER_SPEED, Kind.EXACT}
+
+
+def mended(
+    motion: MotionInTime, stands: Standing, verdict: Verdict, dt: float, again: int
+) -> MotionInTime | None:
+    """The motion run slower where its verdict finds something; None where that does not mend it.
+
+    stands : of the motion that was judged, which stood longer in places (delivery/periods.py)
+    again  : rounds before this one
+    """
+    slower = np.array([each.slower for each in verdict.excesses])
+    if not len(slower) or not set(verdict.kinds) <= MENDED or slower.max() > MOST_SLOWER:
+        return None
+    more = MORE * 10.0**again
+    unknown = np.array([each.kind in (Kind.CONTOUR, Kind.FILTERS) for each in verdict.excesses])
+    by = slower * (1.0 + more) - 1.0
+    by = np.where(unknown, by * AGAIN**again, by)
+    edges = np.array([[each.begin, each.end] for each in verdict.excesses])
+    edges = without_stands(np.stack(stands, axis=1), edges.ravel())[0].reshape(-1, 2)
+    w, pad = _reach(verdict), PERIODS * dt
+    jerk_limited = any(name.startswith("jerk") and check.limited for name, check in verdict.limits.items())
+    if isinstance(motion, ShapedMotion):  # what its copies are of
+        edges[:, 0] -= motion.shaper.length
+        return dataclasses.replace(motion, motion=_slowed(motion.motion, edges, by, w, pad, jerk_limited))
+    return _slowed(motion, edges, by, w, pad, jerk_limited)
+
+
+def _slowed(
+    motion: MotionInTime, edges: FloatArray, by: FloatArray, w: float, pad: float, jerk_limited: bool
+) -> Slowed:
+    """The motion slower by `by` (n,) [-] between `edges` (n, 2) [s] and `pad` [s] around them, as far as the rests there; one place for
+    those that cost less together."""
+    slowed = motion if isinstance(motion, Slowed) else Slowed(motion=motion, places=())
+    edges = slowed.was_at_any(np.clip(edges, 0.0, motion.end))
+    order = np.argsort(edges[:, 0], kind="stable")
+    begin, end, by = edges[order, 0], np.maximum.accumulate(edges[order, 1]), by[order]
+    places: list[Place] = []
+    for a, b, d in zip(begin.tolist(), end.tolist(), by.tolist(), strict=True):
+        last = places[-1] if places else Place(0.0, 0.0, 0.0, w, -1.0, -1.0)
+        inside = last.low <= a and b <= last.high
+        low, high = last[-2:] if inside else _rests(slowed.motion, a, b, FAR * w, jerk_limited)
+        place = Place(max(a - pad, low), min(b + pad, high), d, w, low, high)
+        if inside and place.begin <= last.end + JOINED * w:
+            place = place._replace(begin=last.begin, by=max(d, last.by))
+            places.pop()
+        places.append(place)
+    now = slowed.slowest(places)
+    return slowed.with_places(each._replace(by=each.by * p) for each, p in zip(places, now, strict=True))
+
+
+def _rests(
+    motion: MotionInTime, begin: float, end: float, within: float, jerk_limited: bool
+) -> tuple[float, float]:
+    """The last rest of the motion up to `begin` and the first from `end` on, as far as `within` [s]; its own ends beyond that."""
+    edges = np.append(motion.t, motion.end)
+    k, n = np.searchsorted(edges, begin, side="right"), np.searchsorted(edges, end)
+    low, high = np.searchsorted(edges, begin - within), np.searchsorted(edges, end + within, side="right")
+
+    def rests(times: FloatArray) -> FloatArray:
+        """Those of times, in any order, at which nothing moves."""
+        if not len(times):
+            return times
+        single, which = np.unique(times, return_inverse=True)
+        seen = motion.at(single, 1.0)
+        still = seen.feed <= STANDS[0]
+        if jerk_limited:  # nor begins to with a jump of the acceleration
+            still &= np.abs(seen.acceleration).max(axis=1) <= STANDS[1]
+        return times[still[which]]
+
+    def first(times: FloatArray, none: float) -> float:
+        """The first of them, looked for in larger and larger parts."""
+        part = PART
+        while len(times):
+            found = rests(times[:part])
+            if len(found):
+                return float(found[0])
+            times, part = times[part:], 4 * part
+        return none
+
+    return first(edges[low:k][::-1], 0.0), first(edges[n:high], np.inf)
+
+
+def _reach(verdict: Verdict) -> float:
+    """How far before and behind a place a motion has to be slower [s], by what its verdict saw (motion/slowed.py)."""
+    groups = {name.partition(".")[2] for name, check in verdict.limits.items() if check.limited} - {""}
+    found = [0.0]
+    for name in groups:
+        checks = [
+            verdict.limits.get(f"{quantity}.{name}") for quantity in ("velocity", "acceleration", "jerk")
+        ]
+        v = 0.0 if checks[0] is None or checks[0].ratio <= 0.0 else checks[0].value
+        A, J = (check.limit if check is not None and check.limited else np.inf for check in checks[1:])
+        if not np.isfinite(A):
+            A = checks[1].value if np.isfinite(J) and checks[1] is not None else np.inf
+        found.append(reach(v, A, J))
+    return max(found)

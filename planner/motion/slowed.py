@@ -80,9 +80,10 @@ class _Pace(NamedTuple):
 
 
 def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, Array]:
-    """Times (n,) [s] of a motion with stands (m, 2), in the time of the motion without them, and whether it stands then.
+    """Times of a motion with stands, in the time of the motion without them (n,) [s], and whether it stands then (n,).
 
-    stands : when it rests, in the time without them, and for how much longer [s]; ascending
+    times  : (n,) [s]
+    stands : (m, 2) when it rests, in the time without them, and for how much longer [s]; ascending
     """
     stood = np.append(0.0, np.cumsum(stands[:, 1]))
     k = np.searchsorted(stands[:, 0] + stood[:-1], times, side="right")

@@ -85,7 +85,11 @@ class Spans:
             self.add(column, t, over[:, column])
 
     def add(self, column: int, t: FloatArray, over: FloatArray) -> None:
-        """The same of one quantity, with ratios (n,), some of which are above 0."""
+        """The same of one quantity.
+
+        t    : (n,) [s]
+        over : (n,) the ratios, of which some are above 0 [-]
+        """
         at = np.flatnonzero(over)
         first = np.flatnonzero(np.diff(at, prepend=-APART - 1) > APART)
         last = np.append(first[1:], len(at)) - 1
@@ -105,7 +109,7 @@ class Spans:
 
 
 def above(ratio: FloatArray) -> FloatArray:
-    """(n,) the ratios that are above 1 by more than rounding, 0 elsewhere."""
+    """(n,) of a `ratio` (n,) [-] what is above 1 by more than rounding, 0 elsewhere."""
     return np.where(ratio > 1.0 + RATIO_ROUNDING, ratio, 0.0)
 
 

@@ -3,8 +3,8 @@
     python -m benchmarks.random_programs [--count N] [--seed S] [--kinds cycles offsets ...]
 
 The programs and the comparison are those of tests/nc/test_random_agreement.py, which reads some hundreds; those of kind "language"
-compute (tests/nc/language/language_programs.py). It needs rs274 and the module gcode (Debian package linuxcnc-uspace) and
-../shared/peers. Writes results/random-programs.json and .md.
+compute (tests/nc/language/language_programs.py). It needs rs274 and the module gcode (Debian package linuxcnc-uspace). Writes
+results/random-programs.json and .md.
 """
 
 from __future__ import annotations

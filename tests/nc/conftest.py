@@ -1,1 +1,1 @@
-"""Makes what the tests of NC programs share importable: `test_agreement` holds the oracle."""
+"""Makes what the tests of NC programs share importable: `oracle`, `test_agreement`."""

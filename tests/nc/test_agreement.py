@@ -1,7 +1,7 @@
 """The reader and LinuxCNC's own interpreter read the same motion out of a program.
 
-The oracle (`canon_oracle.py`, in a process of its own) works in inches, so its millimetres carry a few roundings of 2e-16 relative;
-incremental programs add them up block by block. Lengths are compared to 1e-9 mm absolute plus 1e-12 relative, feeds to 1e-12. The
+The oracle (`oracle.py`) works in inches, so its millimetres carry a few roundings of 2e-16 relative; incremental programs add them up
+block by block. Lengths are compared to 1e-9 mm absolute plus 1e-12 relative, feeds to 1e-12. The
 centre of an arc with R near half a turn magnifies a rounding by its square root: 1e-6 mm there.
 
 Moves that go nowhere are left out on both sides: LinuxCNC also issues one for a lone G1 and before G28.
@@ -9,67 +9,29 @@ Moves that go nowhere are left out on both sides: LinuxCNC also issues one for a
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from random_splines import random_splines, with_splines_whole
+from oracle import SHARED, Canon, ask_oracle, asked, needs_oracle
+from random_splines import with_splines_whole
 
 from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH
 from planner.machine import Machine
 from planner.nc.program import Kind, Program
-from planner.nc.reader import interpret, parse_program, read_program
+from planner.nc.reader import interpret, read_program
 from planner.nc.reading import Reading
 
-HERE = Path(__file__).parent
-SHARED = HERE.parents[1].parent / "shared"
 NOT_NC = (".csv", ".plt", ".hpgl")  # plotter files: tests/nc/hpgl
 PROGRAMS = sorted(p for p in (SHARED / "nc").glob("*") if p.suffix not in NOT_NC) if SHARED.is_dir() else []
-PYTHON = "/usr/bin/python3"
 NOWHERE = 1e-9  # [mm]
 END_OF_FILE = "File ended with no percent sign"  # LinuxCNC wants M2, M30 or %; a file that just ends has moved all the same
 
 # Programs that cut threads: the oracle does not say at which feed.
 THREADS = ("LinuxCNC__linuxcnc__lathe-g76.ngc",)
-
-ORACLE_MISSING = None
-if shutil.which("rs274") is None:
-    ORACLE_MISSING = "rs274 (Debian package linuxcnc-uspace) is not installed"
-elif not (SHARED / "peers" / "lcnc_canon.py").is_file():
-    ORACLE_MISSING = f"{SHARED / 'peers' / 'lcnc_canon.py'} is not there"
-elif subprocess.run([PYTHON, "-c", "import gcode, numpy"], capture_output=True, check=False).returncode:
-    ORACLE_MISSING = f"{PYTHON} has no module gcode (Debian package linuxcnc-uspace) or no numpy"
-needs_oracle = pytest.mark.skipif(ORACLE_MISSING is not None, reason=str(ORACLE_MISSING))
-
-
-@dataclass(frozen=True)
-class Canon:
-    """Moves as LinuxCNC issues them (columns: see canon_oracle.py), and its error or an empty text."""
-
-    move: Array
-    error: str
-
-
-def ask_oracle(jobs: list[dict], folder: Path) -> list[Canon]:
-    todo, out = folder / "jobs.json", folder / "out.npz"
-    todo.write_text(json.dumps(jobs))
-    done = subprocess.run(
-        [PYTHON, str(HERE / "canon_oracle.py"), str(SHARED / "peers"), str(todo), str(out)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, f"the oracle failed with {done.returncode}: {done.stderr[-2000:]}"
-    with np.load(out) as data:
-        return [Canon(data[f"{k}.move"], str(data[f"{k}.error"])) for k in range(len(jobs))]
 
 
 def moving(kind: Array, end: Array, keep: Array) -> Array:
@@ -246,39 +208,6 @@ def random_program(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
-@pytest.mark.slow
-@needs_oracle
-def test_random_splines_agree(tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
-    texts = [random_splines(rng) for _ in range(60)]
-    for k, text in enumerate(texts):
-        (tmp_path / f"{k}.ngc").write_text(text)
-    jobs = [{"path": str(tmp_path / f"{k}.ngc")} for k in range(len(texts))]
-    for text, canon in zip(texts, ask_oracle(jobs, tmp_path), strict=True):
-        assert not canon.error, f"{canon.error}\n{text}"
-        try:
-            assert_same_motion(parse_program(text), canon)
-        except (AssertionError, InputError) as fault:
-            raise AssertionError(f"{text}\n{fault}") from fault
-
-
-@pytest.mark.slow
-@needs_oracle
-def test_random_programs_agree(tmp_path: Path) -> None:
-    rng = np.random.default_rng(2024)
-    texts = [random_program(rng) for _ in range(400)]
-    jobs = []
-    for k, text in enumerate(texts):
-        (tmp_path / f"{k}.ngc").write_text(text)
-        jobs.append({"path": str(tmp_path / f"{k}.ngc"), **offsets_in_inches()})
-    for text, canon in zip(texts, ask_oracle(jobs, tmp_path), strict=True):
-        assert not canon.error, f"{canon.error}\n{text}"
-        try:
-            assert_same_motion(parse_program(text, MACHINE), canon, centre=1e-6)
-        except (AssertionError, InputError) as fault:
-            raise AssertionError(f"{text}\n{fault}") from fault
-
-
 # Lines on which both must agree whether they are read at all. (True: read.)
 VERDICTS = {
     "G1 X1": False, "F0 G1 X1": False, "F-1": False, "X1": False, "G0 X1\nG80\nX2": False, "G80 X1": False,
@@ -313,16 +242,13 @@ def _reads(text: str) -> bool:
     return all("assumed without --strict" in fault.message for fault in faults)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(("text", "read"), VERDICTS.items())
+def test_lines_are_read_or_refused(text: str, read: bool) -> None:
+    assert _reads(text + "\nM2\n") == read
+
+
 @needs_oracle
-def test_both_refuse_the_same_lines(tmp_path: Path) -> None:
-    jobs = []
-    for k, text in enumerate(VERDICTS):
-        (tmp_path / f"{k}.ngc").write_text(text + "\nM2\n")
-        jobs.append({"path": str(tmp_path / f"{k}.ngc")})
-    wrong = []
-    for (text, expected), canon in zip(VERDICTS.items(), ask_oracle(jobs, tmp_path), strict=True):
-        here = _reads(text + "\nM2\n")
-        if not here == expected == (not canon.error):
-            wrong.append((text, expected, here, canon.error))
-    assert not wrong
+def test_linuxcnc_reads_or_refuses_the_same_lines(tmp_path: Path) -> None:
+    answers = asked([text + "\nM2\n" for text in VERDICTS], {}, tmp_path)
+    given = zip(VERDICTS.items(), answers, strict=True)
+    assert not [(text, canon.error) for (text, read), canon in given if (not canon.error) != read]

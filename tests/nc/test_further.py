@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-from pathlib import Path
-
 import numpy as np
 import pytest
+from oracle import Canon, recorded
 from random_nc import number, pick
-from test_agreement import HERE, PYTHON, SHARED, needs_oracle
 
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
@@ -19,7 +15,6 @@ from planner.nc.reader import parse_program
 
 FURTHER = "abcuvw"
 ALL = "xyz" + FURTHER
-COUNT = 60
 
 
 def machine_of(letters: str = ALL, **axis_of: dict) -> Machine:
@@ -67,42 +62,6 @@ def random_text(rng: np.random.Generator) -> str:
 
 
 NO_XYZ = str.maketrans({"X": "A", "Y": "B", "Z": "C"})
-_ORACLE = """
-import json, os, sys, tempfile
-sys.path.insert(0, sys.argv[1])
-import gcode, lcnc_canon
-
-class Canon(lcnc_canon.Canon):
-    def get_tool(self, index):
-        return (index, *(0.0,) * 12, 0)
-    def _add(self, kind, p9, **kw):
-        machine = self._machine(p9)
-        end = [v if 3 <= k < 6 else v * lcnc_canon.MM for k, v in enumerate(machine)]
-        self.out.append(dict(kind=kind, end=end, feed=self.feed, line=self.line))
-
-found = []
-for path in json.load(open(sys.argv[2])):
-    with tempfile.TemporaryDirectory() as scratch:
-        open(os.path.join(scratch, "p.var"), "w").close()
-        canon = Canon(os.path.join(scratch, "p.var"))
-        status, line = gcode.parse(path, canon, "G21", "G21 G90 G17 G94 G40 G49 G54")
-    error = f"{line}: {gcode.strerror(status)}" if status > gcode.MIN_ERROR else ""
-    moves = [(m["line"], m["kind"], m["end"], m["feed"]) for m in canon.out if "end" in m]
-    found.append([error, moves])
-json.dump(found, open(sys.argv[3], "w"))
-"""
-
-
-def ask(texts: list[str], folder: Path) -> list:
-    paths = []
-    for k, text in enumerate(texts):
-        paths.append(str(folder / f"{k}.ngc"))
-        Path(paths[-1]).write_text(text)
-    (folder / "jobs.json").write_text(json.dumps(paths))
-    (folder / "ask.py").write_text(_ORACLE)
-    asked = [folder / "ask.py", SHARED / "peers", folder / "jobs.json", folder / "out.json"]
-    subprocess.run([PYTHON, *map(str, asked)], check=True, capture_output=True, timeout=300)
-    return json.loads((folder / "out.json").read_text())
 
 
 def in_nine(program: Program) -> np.ndarray:
@@ -113,54 +72,45 @@ def in_nine(program: Program) -> np.ndarray:
     return ends
 
 
-def assert_same(program: Program, moves: list) -> None:
+def assert_same(program: Program, canon: Canon) -> None:
     ends = in_nine(program)
     mine = [k for k in range(len(program)) if program.kind[k] in MOVES and moved(ends, k)]
-    theirs = []
-    place = np.zeros(len(ALL))
-    for move in moves:
-        if np.abs(np.array(move[2]) - place).max() > 1e-9:
-            theirs.append(move)
-        place = np.array(move[2])
-    assert [int(program.line[k]) for k in mine] == [move[0] for move in theirs]
-    np.testing.assert_allclose(ends[mine], [move[2] for move in theirs], rtol=1e-12, atol=1e-9)
-    for k, move in zip(mine, theirs, strict=True):
+    there = np.hstack([canon.move[:, 2:5], canon.further])
+    theirs = [k for k in range(len(there)) if moved(there, k)]
+    np.testing.assert_array_equal(program.line[mine], canon.move[theirs, 1])
+    np.testing.assert_allclose(ends[mine], there[theirs], rtol=1e-12, atol=1e-9)
+    for k, move in zip(mine, canon.move[theirs], strict=True):
         if program.kind[k] == Kind.RAPID:
-            assert move[1] == "rapid"
+            assert move[0] == Kind.RAPID
             continue
         change = np.abs(ends[k] - (ends[k - 1] if k else 0.0))
         turns = change[[0, 1, 2, 6, 7, 8]].max() == 0.0
         feed = program.feed[k] * 60.0 / RAD_PER_DEG if turns else program.feed[k] * 60.0
-        assert feed == pytest.approx(move[3], rel=1e-9), program.line[k]
+        assert feed == pytest.approx(move[5], rel=1e-9), program.line[k]
 
 
 def moved(ends: np.ndarray, k: int) -> bool:
     return bool(np.abs(ends[k] - (ends[k - 1] if k else 0.0)).max() > 1e-9)
 
 
-@pytest.mark.slow
-@needs_oracle
-def test_random_programs_in_nine_axes_agree(tmp_path: Path) -> None:
-    assert HERE.exists()
-    rng = np.random.default_rng(19)
-    texts = [random_text(rng) for _ in range(COUNT)]
+def test_programs_in_nine_axes_agree_with_the_recorded_answers() -> None:
     machine, read = machine_of(), 0
-    for text, (error, moves) in zip(texts, ask(texts, tmp_path), strict=True):
+    for text, canon in recorded()["nine axes"]:
         try:
             program = parse_program(text, machine)
         except InputError as fault:
             refused = str(fault)
         else:
             refused = ""
-        assert bool(error) == bool(refused), f"{text}\nthe reader: {refused}; LinuxCNC: {error}"
-        if error:
+        assert bool(canon.error) == bool(refused), f"{text}\nthe reader: {refused}; LinuxCNC: {canon.error}"
+        if canon.error:
             continue
         try:
-            assert_same(program, moves)
+            assert_same(program, canon)
         except AssertionError as fault:
             raise AssertionError(f"{text}\n{fault}") from fault
         read += 1
-    assert read > COUNT / 2
+    assert read > len(recorded()["nine axes"]) / 2
 
 
 def test_f_is_the_speed_of_what_moves() -> None:

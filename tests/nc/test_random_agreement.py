@@ -12,19 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracle import Canon, asked, needs_oracle, recorded
 from random_nc import KINDS as OF_ONE_KIND
 from random_splines import random_splines
 from random_together import together
-from test_agreement import (
-    MACHINE,
-    Canon,
-    ask_oracle,
-    assert_same_motion,
-    needs_oracle,
-    offsets_in_inches,
-    random_program,
-)
+from test_agreement import MACHINE, assert_same_motion, offsets_in_inches, random_program
 
+from benchmarks import linuxcnc_answers
 from planner.base.errors import InputError
 from planner.nc.reader import parse_program
 
@@ -74,22 +68,42 @@ def compare(kind: str, count: int, seed: int, folder: Path) -> Tally:
     """Read `count` random programs of a kind on both sides."""
     rng = np.random.default_rng(seed)
     texts = [KINDS[kind](rng) for _ in range(count)]
-    jobs = []
-    for k, text in enumerate(texts):
-        (folder / f"{k}.ngc").write_text(text)
-        jobs.append({"path": str(folder / f"{k}.ngc"), **offsets_in_inches()})
     tally = Tally()
-    for text, canon in zip(texts, ask_oracle(jobs, folder), strict=True):
+    for text, canon in zip(texts, asked(texts, offsets_in_inches(), folder), strict=True):
         tally.add(kind, text, canon)
     return tally
+
+
+def assert_agreed(tally: Tally, count: int) -> None:
+    assert not tally.wrong, tally.wrong[0]
+    assert tally.read > count / 2
+    assert tally.gouges <= 1 + GOUGES * count
+    assert tally.early <= 1 + EARLY * count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_programs_agree_with_the_recorded_answers(kind: str) -> None:
+    tally = Tally()
+    for text, canon in recorded()[kind]:
+        tally.add(kind, text, canon)
+    assert_agreed(tally, len(recorded()[kind]))
 
 
 @pytest.mark.slow
 @needs_oracle
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_programs_of_a_kind_agree(kind: str, tmp_path: Path) -> None:
-    tally = compare(kind, COUNT, 2026, tmp_path)
-    assert not tally.wrong, tally.wrong[0]
-    assert tally.read > COUNT / 2
-    assert tally.gouges <= GOUGES * COUNT
-    assert tally.early <= EARLY * COUNT
+    assert_agreed(compare(kind, COUNT, 2026, tmp_path), COUNT)
+
+
+@needs_oracle
+def test_the_recorded_answers_are_current(tmp_path: Path) -> None:
+    """They are LinuxCNC's to these programs (python -m benchmarks.linuxcnc_answers makes them)."""
+    programs = linuxcnc_answers.programs()
+    assert list(programs) == list(recorded())
+    for kind, (texts, setup) in programs.items():
+        assert texts == [text for text, _ in recorded()[kind]], f"the generator of kind {kind} has changed"
+        for (text, kept), canon in zip(recorded()[kind], asked(texts, setup, tmp_path), strict=True):
+            assert kept.error == canon.error, text
+            np.testing.assert_allclose(kept.move, canon.move, rtol=1e-11, atol=1e-11, err_msg=text)
+            np.testing.assert_allclose(kept.further, canon.further, rtol=1e-11, atol=1e-11, err_msg=text)

@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from test_agreement import (
-    MACHINE,
-    PROGRAMS,
-    SHARED,
-    ask_oracle,
-    assert_same_motion,
-    needs_oracle,
-    offsets_in_inches,
-    random_program,
-)
+from oracle import SHARED, ask_oracle, needs_oracle
+from test_agreement import MACHINE, PROGRAMS, assert_same_motion, offsets_in_inches, random_program
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from language_programs import same
-from test_agreement import MACHINE, ask_oracle, assert_same_motion, needs_oracle, offsets_in_inches
+from oracle import ask_oracle, needs_oracle
+from test_agreement import MACHINE, assert_same_motion, offsets_in_inches
 
 from planner.base.errors import InputError
 from planner.machine import DialectData, Machine

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from language_programs import Generator, same
-from test_agreement import ask_oracle, assert_same_motion, needs_oracle
+from oracle import Canon, ask_oracle, needs_oracle, recorded
+from test_agreement import assert_same_motion
 
 from planner.nc.language.flat import flat_program
 from planner.nc.reader import interpret, parse_program, read_program
@@ -59,6 +60,8 @@ EXAMPLES = [
     "#1=3\nM98 P100 L2\nG1 X#1\nM2\nO100\n#1=[#1+5]\nG1 Y#1\nM99",
 ]  # fmt: skip
 
+HEAD = "G21 G90 F100\nG1 X0\n"
+
 # Lines on which both agree whether they are read. (True: read.)
 VERDICTS = {
     "G1 X[1/0]": False, "G1 X[SQRT[-1]]": False, "G1 X[ASIN[1.1]]": False, "G1 X[LN[0]]": False, "G1 X[[-2]**0.5]": False,
@@ -72,7 +75,7 @@ VERDICTS = {
 }  # fmt: skip
 
 
-def written(texts: list[str], folder: Path, head: str = "G21 G90 F100\nG1 X0\n") -> list[dict]:
+def written(texts: list[str], folder: Path, head: str = HEAD) -> list[dict]:
     jobs = []
     for k, text in enumerate(texts):
         (folder / f"{k}.ngc").write_text(f"{head}{text}\nM2\n")
@@ -93,25 +96,25 @@ def test_examples_agree(tmp_path: Path) -> None:
             raise AssertionError(f"{text}\n{fault}") from fault
 
 
+@pytest.mark.parametrize(("text", "read"), VERDICTS.items())
+def test_lines_are_read_or_refused(text: str, read: bool) -> None:
+    _, faults = interpret(
+        f"{HEAD}{text}\nM2\n".encode(), None, Reading(dialect="linuxcnc"), source="line.ngc"
+    )
+    assert (not faults) == read
+
+
 @needs_oracle
-def test_both_refuse_the_same_lines(tmp_path: Path) -> None:
-    jobs = written(list(VERDICTS), tmp_path)
-    wrong = []
-    for (text, expected), job, canon in zip(VERDICTS.items(), jobs, ask_oracle(jobs, tmp_path), strict=True):
-        _, faults = interpret(
-            Path(job["path"]).read_bytes(), None, Reading(dialect="linuxcnc"), source=job["path"]
-        )
-        if (not faults) != expected or (not canon.error) != expected:
-            wrong.append((text, expected, [str(f) for f in faults], canon.error))
-    assert not wrong
+def test_linuxcnc_reads_or_refuses_the_same_lines(tmp_path: Path) -> None:
+    answers = ask_oracle(written(list(VERDICTS), tmp_path), tmp_path)
+    given = zip(VERDICTS.items(), answers, strict=True)
+    assert not [(text, canon.error) for (text, read), canon in given if (not canon.error) != read]
 
 
-def agree(count: int, seed: int, folder: Path) -> int:
-    """Compare random programs with LinuxCNC; returns the number of blocks."""
-    rng = np.random.default_rng(seed)
-    texts = [Generator(rng).text() for _ in range(count)]
+def agreeing_blocks(texts: list[str], answers: list[Canon]) -> int:
+    """Compare random programs with what LinuxCNC made of them; returns the number of blocks."""
     blocks = 0
-    for text, canon in zip(texts, ask_oracle(written(texts, folder, head=""), folder), strict=True):
+    for text, canon in zip(texts, answers, strict=True):
         assert not canon.error, f"{canon.error}\n{text}"
         program = parse_program(text)
         try:
@@ -122,15 +125,16 @@ def agree(count: int, seed: int, folder: Path) -> int:
     return blocks
 
 
-@needs_oracle
-def test_some_random_programs_agree(tmp_path: Path) -> None:
-    assert agree(25, 1, tmp_path) > 150
+def test_programs_that_compute_agree_with_the_recorded_answers() -> None:
+    assert agreeing_blocks(*map(list, zip(*recorded()["language"], strict=True))) > 150
 
 
 @pytest.mark.slow
 @needs_oracle
 def test_random_programs_agree(tmp_path: Path) -> None:
-    assert agree(250, 2, tmp_path) > 1500
+    rng = np.random.default_rng(2)
+    texts = [Generator(rng).text() for _ in range(250)]
+    assert agreeing_blocks(texts, ask_oracle(written(texts, tmp_path, head=""), tmp_path)) > 1500
 
 
 # --- against programs written out -----------------------------------------------------------------------------------------------

@@ -169,3 +169,21 @@ def test_a_switch_to_the_tool_centre_point_is_not_passed_over() -> None:
         "tool centre point" in note
         for note in parse_program(text.replace(" A10", ""), machine_of("xyz")).notes
     )
+
+
+def test_a_wrapped_axis_that_is_there_stays() -> None:
+    """LinuxCNC turns back by a turn only from a place beyond it (interp_find.cc, unwrap_rotary): A-30 at A30 moves nothing."""
+    machine = machine_of("xyza", a={"wrapped": True})
+    program = parse_program("G21 G0 A30\nA-30 X1\nA30 X2\nA-29 X3\nA-30 X4\nA30 X5\n", machine)
+    np.testing.assert_allclose(program.end[:, 3] / RAD_PER_DEG, [30.0, 30.0, 30.0, 29.0, -330.0, -330.0])
+
+
+@pytest.mark.parametrize(
+    ("words", "length"), [("U10", 10.0), ("V3 W-4", 5.0), ("U10 A90", 10.0), ("X3 Y4 U100", 5.0)]
+)
+def test_inverse_time_of_further_linear_axes(words: str, length: float) -> None:
+    """F2 is half a minute for the length that F goes by: x, y, z, else u, v, w."""
+    program = parse_program(f"G21 G93\nG1 {words} F2\n", machine_of())
+    assert program.feed[0] == pytest.approx(length / 30.0)
+    inch = parse_program(f"G20 G93\nG1 {words} F2\n", machine_of())
+    assert inch.feed[0] == pytest.approx(25.4 * length / 30.0)

@@ -196,3 +196,12 @@ def test_other_languages_without_kinematics(text: str, said: str) -> None:
 def test_directions_of_the_tool_are_refused_with_what_to_do(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(text)
+
+
+def test_a_new_tool_length_while_it_is_on_moves_no_joint() -> None:
+    """The joints stand; the tip of the new tool is where they put it, in y and z that the next block does not name."""
+    program = read("G21\nG0 X1 Y2 Z3 A30 C10\nG43.4 H1\nG43.4 H2\nG1 X4 F600\nG49\nG0 A0 C0\n")
+    chain = kinematics_of(MACHINE).with_tool(50.0)
+    there = chain.point({"x": 1.0, "y": 2.0, "z": 3.0, "a": np.deg2rad(30), "c": np.deg2rad(10)})
+    first = int(np.flatnonzero(program.kind == Kind.LINE)[0])
+    assert np.allclose(program.end[first, :3], [4.0, there["y"], there["z"]])

@@ -247,3 +247,21 @@ def test_a_taper_keeps_the_lead_along_z() -> None:
 def test_refused_threads(wrong: dict, said: str) -> None:
     with pytest.raises(ThreadFault, match=said):
         list(thread_passes(LatheThread(**{**vars(M20), **wrong})))
+
+
+@pytest.mark.parametrize("taper", [-0.9375, 0.0, 3.0])
+def test_a_chamfer_is_as_long_along_z_as_it_says(taper: float) -> None:
+    """The cut is left 2 mm before its end in z and at 45 degrees, on tapered threads too, and on the line of the thread till then."""
+    found = list(thread_passes(LatheThread(**{**vars(M20), "taper": taper, "chamfer": 2.0})))
+    cuts = [k for k, one in enumerate(found) if one.pitch > 0.0]
+    for begin, leave, out in zip(
+        (found[k - 1] for k in cuts[::2]), *((found[k] for k in cuts[n::2]) for n in (0, 1)), strict=True
+    ):
+        assert leave.end.real - M20.end.real == pytest.approx(2.0)
+        away = out.end - leave.end
+        assert away == pytest.approx(complex(-2.0, 2.0))
+        cut = leave.end - begin.end
+        end = (
+            begin.end + cut * (M20.end.real - begin.end.real) / cut.real
+        )  # where the thread would end without it
+        assert begin.end.imag - end.imag == pytest.approx(taper)

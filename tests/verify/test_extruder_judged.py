@@ -86,3 +86,18 @@ def test_files_carry_it_and_say_where_it_is_missing(plan: Plan, tmp_path: Path) 
     verdict = verify(without, plan.toolpath, plan.machine, not_limited=("jerk",))
     assert verdict.passed
     assert any("no column e" in note for note in verdict.notes)
+
+
+def test_a_move_alone_is_judged_at_all_of_its_acceleration_and_jerk() -> None:
+    """At rest of the axes 2 mm of filament at 30 mm/s are seven phases of jerk j = 1e5: at most sqrt(v j), and j itself."""
+    about = load_machine("router").model_dump(exclude_none=True)
+    about["axes"]["e"] = LIMITS
+    machine = machine_from_dict(about)
+    text = "G21\nM83\nG1 X10 F600 E0.01\nG1 E-2 F1800\nG1 E2\nG1 X20 E0.01 F600\n"
+    made = planner.plan(planner.read_program(text=text, machine=machine), machine, method="stop")
+    assert made.verdict is not None
+    seen = made.verdict.limits
+    assert seen["acceleration.e"].value == pytest.approx(
+        np.sqrt(30.0 * 1e5), rel=0.03
+    )  # a mean of two periods
+    assert seen["jerk.e"].value == pytest.approx(1e5, rel=1e-3)

@@ -147,6 +147,18 @@ def test_a_feed_per_turn_at_a_constant_surface_speed() -> None:
     assert arc.feed[arc.kind == Kind.ARC] == pytest.approx(0.2 * 100e3 / (2 * np.pi * 20) / 60)
 
 
+@pytest.mark.parametrize("unit", ["G20", "G21"])
+def test_a_surface_speed_is_in_feet_or_metres(unit: str) -> None:
+    """At a diameter of 2 inches 300 feet a minute are 300 * 12 / (2 pi) turns; of 2 mm 3 metres are 3000 / (2 pi)."""
+    speed = 300 if unit == "G20" else 3
+    text = f"{unit} G96 S{speed}\nG50 S9000\nG0 G99 F0.01 M3 U0\nG0 X2 Z0\nG1 Z-4\nM30"
+    turns, inch = (300 * 12 / (2 * math.pi), 25.4) if unit == "G20" else (3000 / (2 * math.pi), 1.0)
+    program = read(text)
+    assert program.feed[program.kind == Kind.LINE] == pytest.approx(0.01 * inch * turns / 60, rel=1e-12)
+    own = read(f"{unit} G7 G18 G95 G96 D9000 S{speed} M3\nG0 X2 Z0\nG1 Z-4 F0.01\nM2")
+    assert own.feed[own.kind == Kind.LINE] == pytest.approx(0.01 * inch * turns / 60, rel=1e-12)
+
+
 END_INSIDE = "G71 P10 Q20 D1.\nN10 G0 X20\nM30\nN20 G1 Z-5\nM30"
 REFUSED = {
     # all found by benchmarks/fuzz.py: on a machine with further axes they were a bug, and a program that ended there was lost

@@ -70,6 +70,14 @@ def test_a_bored_hole_is_left_off_its_wall() -> None:
         read(f"202 B {HOLE} Q206=100 Q214=7")
 
 
+@pytest.mark.parametrize(("direction", "away"), [(1, (-1, 0)), (2, (0, -1)), (3, (1, 0)), (4, (0, 1))])
+def test_the_direction_of_disengaging(direction: int, away: tuple[int, int]) -> None:
+    """Q214: 1 negative x, 2 negative y, 3 positive x, 4 positive y (TNC 640, cycle 202): the other way is into the wall."""
+    found = read(f"202 B {HOLE} Q206=100 Q208=250 Q214={direction}")
+    off = found.end[5] - [10, 20, -19]
+    np.testing.assert_allclose(off, [0.2 * away[0], 0.2 * away[1], 0.0], atol=1e-12)
+
+
 def test_a_bore_is_milled_to_its_diameter_on_a_helix() -> None:
     found = read(f"208 M {HOLE} Q206=200 Q334=6 Q335=17 Q351=1")
     assert len(found.arc_sweep) == 5  # four turns of 5 mm, and once round

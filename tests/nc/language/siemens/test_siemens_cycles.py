@@ -48,6 +48,22 @@ def test_cycles_go_to_their_depth_and_back(cycle: str, modal: bool) -> None:
     assert found.kind[-1] == Kind.RAPID  # G0 is in force again
 
 
+@pytest.mark.parametrize(
+    ("cycle", "hand"),
+    [
+        ("CYCLE84(20,0,2,-10,,0.5,3,8,,0,300)", [3, 4, 3]), ("CYCLE84(20,0,2,-10,,0.5,3,-8,,0,300)", [4, 3, 4]),
+        ("CYCLE84(20,0,2,-10,,0.5,3,,-1.25,0,300)", [4, 3, 4]), ("CYCLE840(20,0,2,,10,0.5,4,3,0,-8)", [4, 3, 4]),
+        ("CYCLE840(20,0,2,,10,0.5,4,3,0,,1.25)", [3, 4, 3]),
+    ],
+)  # fmt: skip
+def test_a_negative_size_or_lead_is_a_left_hand_thread(cycle: str, hand: list[int]) -> None:
+    """M4 into the hole and M3 out of it; the feed is that of the lead, whatever its sign."""
+    found = read(cycle)
+    turns = [int(event.text[1:]) for event in found.events if event.text in ("M3", "M4")]
+    assert turns[1:] == hand  # behind the M3 of the head
+    assert (found.feed[found.kind == Kind.LINE] > 0).all()
+
+
 def test_a_cycle_keeps_the_modes_of_the_program() -> None:
     found = read("G1 X11 F500\nG91\nCYCLE81(5,0,2,-3)\nX4\nG90\nCYCLE89(5,0,2,-3)\nX4")
     assert found.end[-1].tolist() == [4, 20, 5]

@@ -18,8 +18,8 @@ import numpy as np
 
 TESTS = Path(__file__).resolve().parent.parent / "tests" / "nc"
 SEED = 41
-COUNT = {"splines": 12, "together": 20}  # LinuxCNC writes a spline as hundreds of lines
-OTHERS = 32  # of the other kinds
+COUNT = {"splines": 10, "together": 24, "language": 32}  # LinuxCNC writes a spline as hundreds of lines
+OTHERS = 80  # of the other kinds
 
 
 def programs() -> dict[str, tuple[list[str], dict[str, Any]]]:

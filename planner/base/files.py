@@ -1,4 +1,5 @@
-"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer never."""
+"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer never. And names of files in
+texts that are written."""
 
 from __future__ import annotations
 
@@ -12,6 +13,18 @@ from planner.base.errors import InputError
 STREAMS = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")  # where a shell's pipes and process substitutions are
 
 STDIN = "-"  # as a file name: the standard input
+
+
+def readable(text: str) -> str:
+    """A text that can be written as UTF-8. Bytes of a file name that Python could not decode, as in names from other systems, become
+    the characters that they are in UTF-8, or such as \\xfc."""
+    if text.isascii():
+        return text
+    try:
+        data = text.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError:  # half of a pair of UTF-16, which JSON may hold
+        data = text.encode("utf-8", "backslashreplace")
+    return data.decode("utf-8", "backslashreplace")
 
 
 def require_ending(path: str | Path) -> None:

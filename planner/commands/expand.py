@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from planner.base.errors import InputError
+from planner.base.files import readable
 from planner.commands.options import DEFAULT_MACHINE, ForceOption, Job, MachineOption, takes_reading
 from planner.commands.terminal import guarded, say
 from planner.nc.reading import Reading
@@ -37,7 +38,7 @@ def expand_command(
         raise InputError("the file exists; give another name or --force", source=str(output))
     data = load(job)
     found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=source_name(job))
-    text = data if found is None else found[0].encode()
+    text = data if found is None else readable(found[0]).encode()
     if output is None:
         typer.echo(text, nl=False)
         return

@@ -50,6 +50,8 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
     """Turn the exceptions of a command into a message and an exit code."""
 
+    judging = command.__name__ == "verify_command"
+
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
@@ -61,7 +63,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             say(f"not solved: {fault}", err=True)
             raise typer.Exit(NOT_SOLVED) from None
         except MemoryError as fault:
-            say(f"not solved: {memory_used_up(fault)}", err=True)
+            say(f"not solved: {memory_used_up(fault, judging)}", err=True)
             raise typer.Exit(NOT_SOLVED) from None
         except KeyboardInterrupt:
             say("interrupted", err=True)
@@ -75,7 +77,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             from planner.commands.memory import is_of_memory
 
             if is_of_memory(fault):
-                say(f"not solved: {memory_used_up(MemoryError())}", err=True)
+                say(f"not solved: {memory_used_up(MemoryError(), judging)}", err=True)
                 raise typer.Exit(NOT_SOLVED) from None
             import traceback
 
@@ -90,9 +92,11 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def memory_used_up(fault: MemoryError) -> str:
-    """The message for a job that needs more memory than there is, and what to do about it."""
+def memory_used_up(fault: MemoryError, judging: bool = False) -> str:
+    """The message for a job that needs more memory than there is, and what to do about it; `judging` a file that was planned."""
     said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
+    if judging:
+        return f"{said}; verify a part of the motion at a time"
     return f"{said}; split the program, or use --geometry spline or a faster --method (kinematic, stop)"
 
 

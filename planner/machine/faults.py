@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import ValidationError
 
+FAULTS_SAID = 20  # the others are counted
+SHOWN = 60  # characters of a name or a value
 # What is needed where pydantic finds a fault of a type; {gt} and so on are its context.
 _NEEDED = {
     "greater_than": "must be above {gt:g}",
@@ -34,9 +36,13 @@ def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -
 
     keys : of the record, under "", and of each of its tables, under its name
     """
-    said = []
-    for error in fault.errors():
-        place = [str(part) for part in error["loc"]]
+    said: list[str] = []
+    found = fault.errors()
+    for error in found:
+        if len(said) == FAULTS_SAID:
+            said.append(f"and {len(found) - FAULTS_SAID:,} more")
+            break
+        place = [part if len(part) <= SHOWN else f"{part[:SHOWN]}..." for part in map(str, error["loc"])]
         key = ".".join(place)
         if error["type"] == "missing":
             said.append(f"{key}: missing")
@@ -49,5 +55,11 @@ def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -
             said.append(f"{key}: {text}" if key else text)
         else:
             needed = _NEEDED.get(error["type"], error["msg"]).format(**error.get("ctx", {}))
-            said.append(f"{key}: {needed}, found {error['input']!r}")
+            said.append(f"{key}: {needed}, found {shown(error['input'])}")
     return "; ".join(said)
+
+
+def shown(value: object) -> str:
+    """A value as it is named, at most `SHOWN` characters of it."""
+    text = repr(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."

@@ -19,6 +19,10 @@ _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
 
+SIZE_MAX = 1_000_000  # bytes of a machine file: ten thousand tools
+# A key of more parts than there are tables in tables.
+_DEEP = re.compile(r"^[^=\n#]*(?:\.[^=\n#.]*){50}", re.MULTILINE)
+
 
 def load_machine(path: str | Path) -> Machine:
     """Read a machine file, or a built-in machine if the path is a name without a suffix.
@@ -33,17 +37,21 @@ def load_machine(path: str | Path) -> Machine:
         text, source = builtin_text(str(path)), str(path)
     else:
         text, source = _read(Path(path)), str(path)
+    deep = "not a machine file: its values are nested too deep"
+    if _DEEP.search(text):  # Python's reader takes the square of the depth
+        raise InputError(deep, source=source)
     try:
         data = tomllib.loads(text)
     except RecursionError:
-        raise InputError("not a machine file: its values are nested too deep", source=source) from None
-    except ValueError as fault:  # a TOMLDecodeError, or a number of more digits than Python reads
+        raise InputError(deep, source=source) from None
+    except ValueError as fault:
         settings = (
             "; a machine file is made of a control's settings by: planner machine import"
             if _SETTINGS.search(text)
             else ""
         )
-        raise InputError(f"not valid TOML: {fault}{settings}", source=source) from fault
+        said = fault if isinstance(fault, tomllib.TOMLDecodeError) else "a number has more than 4,300 digits"
+        raise InputError(f"not valid TOML: {said}{settings}", source=source) from fault
     return machine_from_dict(data, source=source)
 
 
@@ -73,7 +81,12 @@ def builtin_text(name: str) -> str:
 def _read(path: Path) -> str:
     try:
         require_ending(path)
-        return path.read_text(encoding="utf-8-sig")  # editors of Windows put a mark in front
+        with path.open("rb") as file:
+            data = file.read(SIZE_MAX + 1)
+        if len(data) > SIZE_MAX:
+            raise InputError(f"not a machine file: it has more than {SIZE_MAX:,} bytes", source=str(path))
+        text = data.decode("utf-8-sig")  # editors of Windows put a mark in front
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except FileNotFoundError as fault:
         names = ", ".join(builtin_machines())
         there = [str(file) for file in path.parent.glob("*.toml")] if path.parent.is_dir() else []

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.base.errors import InputError
+from planner.base.files import readable
 from planner.base.units import MICROMETRE
 from planner.constraints import normal_limit
 from planner.machine import Machine
@@ -153,7 +154,7 @@ def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None
     """Write the comparison as JSON or CSV, the whole file or nothing. Raises InputError if it cannot be written."""
     text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
     with replacing_file(path) as new:
-        new.write_text(text, encoding="utf-8")
+        new.write_text(readable(text), encoding="utf-8")
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:

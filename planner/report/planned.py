@@ -14,6 +14,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.base.files import readable
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
@@ -136,8 +137,8 @@ def source_text(plan: Plan) -> bytes | None:
 def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
     """The program as an NC program that reads back as the same path. Raises LeftOut if it does not."""
     planned = plan.program
-    text = program_text(
-        planned, np.minimum(_finite(feeds), planned.feed), float(plan.toolpath.tolerance.min())
+    text = readable(
+        program_text(planned, np.minimum(_finite(feeds), planned.feed), float(plan.toolpath.tolerance.min()))
     ).encode()
     _read_back(text, plan, "as an NC program")
     return text
@@ -150,7 +151,7 @@ def _expanded(data: bytes, plan: Plan, feeds: FloatArray, often: FloatArray | No
     source = plan.program.source
     found = flat_program(data, plan.machine, plan.program.reading, source=source)
     assert found is not None
-    flat = found[0].encode()
+    flat = readable(found[0]).encode()
     text = retimed(flat, _read_back(flat, plan, "expanded"), feeds, often)
     _read_back(text, plan, "expanded and with F words")
     return text

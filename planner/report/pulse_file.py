@@ -40,7 +40,8 @@ def _is_pulse_file(path: Path) -> bool:
     if path.suffix == ".csv":
         return starts_with(path, ",".join(COLUMNS))
     try:
-        return tuple(parquet.read_schema(path).names) == COLUMNS
+        with path.open("rb") as file:
+            return tuple(parquet.read_schema(file).names) == COLUMNS
     except (OSError, ValueError):
         return False
 
@@ -79,11 +80,12 @@ def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[
             csv.write_csv(table, file, csv.WriteOptions(include_header=False, quoting_style="none"))
         return
     text = json.dumps(about | {"steps": {train.axis: train.steps for train in trains}}, allow_nan=False)
-    parquet.write_table(
-        table.replace_schema_metadata({"planner": text}),
-        path,
-        compression="zstd",
-        compression_level=1,
-        use_dictionary=["axis", "direction", "line"],
-        use_byte_stream_split=["t"],
-    )
+    with path.open("wb") as file:
+        parquet.write_table(
+            table.replace_schema_metadata({"planner": text}),
+            file,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=["axis", "direction", "line"],
+            use_byte_stream_split=["t"],
+        )

@@ -20,7 +20,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -139,6 +139,12 @@ def _table(columns: dict[str, Array]) -> Any:
 
 
 def _write_parquet(path: Path, groups: Iterator[dict[str, Array]], text: str) -> None:
+    # pyarrow takes no name that is not UTF-8, but an open file.
+    with path.open("wb") as file:
+        _write_groups(file, groups, text)
+
+
+def _write_groups(file: BinaryIO, groups: Iterator[dict[str, Array]], text: str) -> None:
     from pyarrow import parquet
 
     writer = None
@@ -149,7 +155,7 @@ def _write_parquet(path: Path, groups: Iterator[dict[str, Array]], text: str) ->
             # then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take longer and save nothing;
             # dictionaries make it larger.
             writer = parquet.ParquetWriter(
-                path,
+                file,
                 table.schema,
                 compression="zstd",
                 compression_level=1,

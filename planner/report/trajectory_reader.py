@@ -27,6 +27,7 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.digits import on_grid, rounding
+from planner.report.trajectory_room import npz_shapes, require_room
 from planner.verify.given import DERIVATIVES, Given
 
 Format = Literal["parquet", "csv", "npz"]
@@ -99,6 +100,10 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
         raise InputError("trajectory file not found", source=str(path)) from fault
     except RecursionError:
         raise InputError("cannot be read: its metadata are nested too deep", source=str(path)) from None
+    except MemoryError as fault:
+        raise InputError(
+            "does not fit into the memory: verify a part of the motion at a time", source=str(path)
+        ) from fault
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
         raise InputError(f"cannot be read: {fault}", source=str(path)) from fault
     found = trajectory_of_columns(given, str(path))
@@ -113,7 +118,7 @@ def trajectory_of_columns(given: Mapping[str, Any], source: str) -> TrajectoryFi
     columns: dict[str, Array] = {}
     for name, column in _one_by_one(given).items():
         word = name.strip().lower()
-        if word in KNOWN:
+        if _known(name):
             columns[word] = _numbers(source, name, column)
     trajectory, digits, notes = _assemble(source, columns, tuple(given))
     return TrajectoryFile(trajectory=trajectory, given=digits, metadata={}, notes=notes)
@@ -124,7 +129,7 @@ def _one_by_one(given: Mapping[str, Any]) -> dict[str, Any]:
     columns: dict[str, Any] = {}
     for name, column in given.items():
         letters = name.strip().lower()
-        if np.ndim(column) == 2 and np.shape(column)[1] == len(letters) > 1 and set(letters) <= {*ALL_AXES}:
+        if _of_axes(name) and np.ndim(column) == 2 and np.shape(column)[1] == len(letters):
             columns |= {letter: column[:, k] for k, letter in enumerate(letters)}
         else:
             columns[name] = column
@@ -134,15 +139,22 @@ def _one_by_one(given: Mapping[str, Any]) -> dict[str, Any]:
 def _read_parquet(path: Path) -> tuple[dict[str, Any], str]:
     from pyarrow import parquet
 
-    table = parquet.read_table(path)
-    text = (table.schema.metadata or {}).get(b"planner", b"").decode()
-    return {name: table[name].to_numpy() for name in table.column_names}, text
+    with open(path, "rb") as stream:  # pyarrow takes no name that is not UTF-8
+        file = parquet.ParquetFile(stream)
+        about = file.metadata
+        names = file.schema_arrow.names
+        require_room(path, {name: (about.num_rows,) for name in names if _known(name)})
+        text = (file.schema_arrow.metadata or {}).get(b"planner", b"").decode()
+        wanted = [name for name in names if _known(name)]
+        table = file.read(wanted)  # others are named, and not read
+    return {name: table[name].to_numpy() if name in wanted else () for name in names}, text
 
 
 def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
     from pyarrow import csv
 
-    table = csv.read_csv(path)
+    with open(path, "rb") as stream:
+        table = csv.read_csv(stream)
     beside = path.with_suffix(CSV_METADATA)
     text = beside.read_text(encoding="utf-8") if beside.exists() else ""
     return {name: table[name].to_numpy() for name in table.column_names}, text
@@ -151,19 +163,31 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
 def _read_npz(path: Path) -> tuple[dict[str, Any], str]:
     with open(path, "rb") as stream:  # numpy leaves a file open that is damaged
         try:
-            file = np.load(stream, allow_pickle=False)
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise ValueError("a single array (.npy), not a .npz file")
-            with file:
-                return {name: file[name] for name in file.files if name != "metadata"}, (
-                    str(file["metadata"]) if "metadata" in file.files else ""
-                )
+            shapes = npz_shapes(stream)
+            wanted = {name: shape for name, shape in shapes.items() if _known(name) or _of_axes(name)}
+            require_room(path, wanted)
+            stream.seek(0)
+            with np.load(stream, allow_pickle=False) as file:
+                text = str(file["metadata"]) if "metadata" in file.files else ""
+                return {
+                    name: file[name] if name in wanted else () for name in file.files if name != "metadata"
+                }, text
         # numpy reads a header as Python's words
         except (SyntaxError, RecursionError, tokenize.TokenError) as fault:
             raise ValueError("the header of an array is damaged") from fault
         # an archive that is damaged, encrypted, or packed in another way
         except (RuntimeError, zlib.error) as fault:
             raise ValueError(f"the archive: {fault}") from fault
+
+
+def _of_axes(name: str) -> bool:
+    """Whether an array may be named by its axes."""
+    letters = name.strip().lower()
+    return 1 < len(letters) == len(set(letters)) and set(letters) <= {*ALL_AXES}
+
+
+def _known(name: str) -> bool:
+    return name.strip().lower() in KNOWN
 
 
 def _numbers(source: str, name: str, column: Any) -> Array:

@@ -83,7 +83,13 @@ def test_a_machine_file_that_is_no_text(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("a = " + "[" * 100_000, "nested too deep"),
-        ("dt = " + "1" * 5000, "not valid TOML"),
+        ("dt = " + "1" * 5000, "a number has more than 4,300 digits"),
+        ("[" + "a." * 200_000 + "a]\n", "nested too deep"),  # Python's reader takes minutes for it
+        ("a." * 60 + "a = 1\n", "nested too deep"),
+        ("# " + "a." * 600_000, "more than 1,000,000 bytes"),
+        ("".join(f"[t{k}]\na = 1\n" for k in range(20_000)), "and 19,984 more"),
+        (TEMPLATE.read_text() + f"{'k' * 5000} = 1\n", "kkk...: unknown key"),
+        (TEMPLATE.read_text() + f"[axes.y]\nvelocity = '{'x' * 5000}'\n", "not valid TOML"),
         (TEMPLATE.read_text() + "[tools]\n" + "1" * 5000 + " = 1\n", "not a tool number"),
     ],
 )

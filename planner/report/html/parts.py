@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import hashlib
 import html
 import json
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.base.errors import InputError
+from planner.base.files import readable
 
 LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
 
@@ -33,16 +35,31 @@ def page_of(
     Raises InputError if plotly is not installed.
     """
     kinds = {column_name: column.dtype.str.lstrip("<|") for column_name, column in columns.items()}
+    plotly, script = plotly_script(), template("shared.js") + template("view.js") + template(f"{name}.js")
     parts = {
+        "POLICY": policy(plotly, script),
         "TITLE": html.escape(Path(source).name),
         "KIND": kind,
         "STYLE": template("report.css"),
-        "BODY": filled(template(f"{name}.html"), {**places, "PLOTLY": plotly_script()}),
+        "BODY": filled(template(f"{name}.html"), {**places, "PLOTLY": plotly}),
         "ABOUT": json_text({**about, "columns": kinds}),
         "COLUMNS": columns_text(columns),
-        "SCRIPT": template("shared.js") + template("view.js") + template(f"{name}.js"),
+        "SCRIPT": script,
     }
-    return filled(template("frame.html"), parts)
+    return readable(filled(template("frame.html"), parts))
+
+
+def policy(*scripts: str) -> str:
+    """What a browser lets a page do: run these scripts, known by their SHA-256, and nothing else; show pictures that it has in it or
+    draws itself; load nothing. Styles are free: plotly writes them into the page, and they run nothing."""
+    known = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+        for script in scripts
+    )
+    return (
+        f"default-src 'none'; script-src {known}; style-src 'unsafe-inline'; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
 
 
 def filled(page: str, parts: Mapping[str, str]) -> str:

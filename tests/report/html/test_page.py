@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import re
 from collections.abc import Iterator
@@ -208,6 +210,31 @@ def test_page_renders_in_a_browser(browser: Any, plan: Plan) -> None:
     assert first == "1" + JOB.splitlines()[0]
     traces = "return document.getElementById('path').data.map((one) => one.x.length)"
     assert browser.execute_script(traces)[1] > 100
+
+
+def test_a_page_names_the_scripts_that_it_may_run(page: str) -> None:
+    """Each by the SHA-256 of its text, and those that the program brought with it are not among them."""
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page[:600])
+    assert policy
+    assert policy[1].startswith("default-src 'none'; script-src 'sha256-")
+    named = set(re.findall(r"'sha256-([^']*)'", policy[1]))
+    texts = re.findall(r'<script(?: type="text/plain" id="plotly")?>(.*?)</script>', page, re.DOTALL)
+    sums = {base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts}
+    assert len(texts) == 2
+    assert named == sums
+    assert not re.search(r"\son\w+=", page.partition("<body>")[2].partition('id="plotly"')[0])
+
+
+@pytest.mark.slow
+def test_a_browser_runs_nothing_else(page: str, tmp_path: Path) -> None:
+    """A second line of defence: were something of a program taken for HTML, it would still not run."""
+    file = tmp_path / "attacked.html"
+    attack = "<script>document.title = 'ran'</script><img src=x onerror=\"document.title = 'ran'\">"
+    file.write_text(page.replace("<header>", f"{attack}<header>"), encoding="utf-8")
+    for browser in opened(file):
+        assert browser.title == "job <b>.ngc · planned"
+        said = [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+        assert sum("Content Security Policy" in one for one in said) >= 2, said
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from planner.nc.events import plain
 from planner.nc.faults import Said
 from planner.nc.lexer import Words
 from planner.nc.reading import IGNORE, Reading
-from planner.nc.settings import EXTRUDER_ZERO, TOOL_POINT_M
+from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, TOOL_POINT_M
 
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
@@ -40,7 +40,7 @@ class Assumed:
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
     moved     : letters of axes that are not planned and were refused, because they move
-    printer   : the program is one for a 3-D printer: it has M82 or M83
+    printer   : the program is one for a 3-D printer: it has M82, M83 or another code that only those have
     follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
     at_tip    : the machine has kinematics: the switch of the tool centre point is read (tool_point.py)
     """
@@ -78,6 +78,7 @@ class Assumed:
         turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
         if turning and word.upper().lstrip("M0") in ("128", "428"):
             what = TOOL_POINT_M
+        self.printer |= what is PRINTER_M
         found = self._counted.setdefault(what, _Counted(0, word, line))
         found.times += times
 

@@ -16,7 +16,8 @@ from planner.nc.state import State
 from planner.nc.store import Store
 
 # By ten times the G code.
-_PATH_CONTROLS = {610: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
+_EXACT_PATH = 610
+_PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
 # Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
 # make room for themselves.
 ROWS_AT_ONCE = 4
@@ -93,8 +94,21 @@ def assume_seconds(state: State, block: Block, seconds: float, found: Findings) 
         found.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
-def path_control(state: State, block: Block, found: Findings) -> None:
-    """G61, G61.1 and G64 with its tolerance. Raises WordFault."""
+def path_control(state: State, block: Block, assumed: Assumed, found: Findings) -> None:
+    """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
+    word = block.at["path control"]
+    if block.g["path control"] == _EXACT_PATH and assumed.printer:
+        raise WordFault(
+            word, "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
+        )
+    if (
+        block.g["path control"] == _EXACT_PATH
+        and "S" in block.value
+        and not block.m
+        and "motion" not in block.g
+    ):
+        text = "G61 with S is exact path and the spindle's speed; in Marlin it goes back to a saved position"
+        found.assume(text, block.line, word)
     state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
     if "P" in block.value and block.g["path control"] == 640:
         tolerance = block.value["P"]

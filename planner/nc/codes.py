@@ -119,16 +119,18 @@ M_REFUSED: dict[int, Refusal] = {
 
 
 def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
-    """The refusal of a code that no table names; one that is not refused by `strict` alone may move."""
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move.
+
+    That it can be left out (--ignore) is not said: of a code that may move it would be the plan of another path.
+    """
     if letter == "M" and not strict:
         what = "an M code that this reader does not know, and that may move with its words or by itself, is"
-        return Refusal(what, f"write G0 or G1, or give --ignore M{number(code)} if nothing moves", True)
+        return Refusal(what, "write what it moves as G0 or G1", True)
     if letter == "M":
         if 1000 <= code <= 1990:
             return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
         return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    what, remedy = "a G code that RS274NGC does not know is", "write it with the codes of RS274NGC"
-    return Refusal(what, f"{remedy}, or give --ignore G{number(code)} if nothing moves", True)
+    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
 
 
 # Letters that no supported code uses.
@@ -164,7 +166,7 @@ CHARACTERS: dict[str, str] = {
     "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
     "[": "expressions are not supported; write the number out",
     "<": "named parameters are not supported; write the number out",
-    "$": "this command to the control is not supported: it may move ($J does); write G0 or G1, or give --ignore $ if nothing moves",
+    "$": "this command to the control is not supported: it may move ($J does); write what it moves as G0 or G1",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     "@": "polar coordinates are not supported; write x and y",

@@ -300,7 +300,7 @@ class Interpreter:
         if "work offset" in g:
             offsets.take_system(state, block, self.found)
         if "path control" in g:
-            auxiliary.path_control(state, block, self.found)
+            auxiliary.path_control(state, block, self.assumed, self.found)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:

@@ -119,7 +119,7 @@ def test_a_job_is_not_overwritten(planned: Callable[..., None], tmp_path: Path) 
 
 @pytest.mark.parametrize("method", ["optimal", "stop", "fir"])
 @pytest.mark.parametrize(
-    "move", ["F0.0001\nG1 X10", "F3000\nG2 X10 Y0 R900000000", "F3000\nG1 X10\nG4 P1000000"]
+    "move", ["F0.0001\nG1 X10", "F3000\nG2 X10 Y0 R-900000000", "F3000\nG1 X10\nG4 P1000000"]
 )
 def test_motions_that_take_for_ever_are_refused_at_once(tmp_path: Path, method: str, move: str) -> None:
     (tmp_path / "job.ngc").write_text(f"G21 G90 G17\n{move}\nM2\n")

@@ -115,6 +115,7 @@ REFUSED = [
     ("(nothing)\n\n; here", 1, 1, ["empty"]),
     ("G0 X1\nG\0", 2, 2, ["NUL", "binary"]),
     ("G0 X1".encode("utf-16"), 1, 4, ["NUL", "UTF-16"]),
+    ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
 ]
 
 
@@ -137,7 +138,6 @@ STRICTLY = [
     ("G15", 1, 1, ["G15", "does not know"]),
     ("G50 S1600", 1, 1, ["G50"]),
     ("G28 G0 X1", 1, 1, ["G28", "G28 and G0", "two lines"]),
-    ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
 ]
 
 
@@ -215,3 +215,38 @@ def test_a_text_that_fits_nowhere_is_tried_in_one_way(data: bytes) -> None:
     with contextlib.suppress(InputError):
         parse_program(data, source="drawing.plt" if data[:1] == b";" else "program.nc")
     assert time.process_time() - began < 2.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G21\nG60 S1",
+        "G21\nG16 X9 Y30",
+        "G21\nG51.1 X0",
+        "G21\nG68.2 X0 Y0 Z0 I9 J0 K0",
+        "G21\nM428 X5",
+        "$J=X9",
+        "G21\nG34 Z9 K1",
+    ],
+)
+@pytest.mark.parametrize("strict", [False, True])
+def test_what_may_move_is_never_left_out_by_a_proposal(text: str, strict: bool) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_program(text, reading=Reading(strict=strict))
+    assert "--ignore" not in str(caught.value)
+
+
+@pytest.mark.parametrize("head", ["M83", "M82", "M104 S200", "M106 S255"])
+@pytest.mark.parametrize("back", ["G61 S0", "G61", "G61 X Y", "G61 S1 F900"])
+def test_going_back_to_a_saved_position_is_refused(head: str, back: str) -> None:
+    """Marlin's G61; in RS274NGC it is exact path."""
+    text = f"G21\n{head}\nG1 X10 F600\nX20 Y5\n{back}\nX30\n"
+    with pytest.raises(InputError, match=r":5:\d: "):
+        parse_program(text, reading=Reading(extruder="ignore"))
+
+
+def test_s_beside_g61_is_said_first() -> None:
+    (said,) = parse_program("G21 F600\nG1 X10\nG61 S0\nX30").assumptions
+    assert said.startswith("line 3: G61 with S")
+    for plain in ("G61", "G61 S600 M3", "G61 G1 X4 S9", "S9\nG61"):
+        assert not parse_program(f"G21 F600\nG1 X10\n{plain}\nX30").assumptions

@@ -75,6 +75,7 @@ def verify_command(
     from planner.geometry.build import toolpath_from_program
     from planner.job.at_tip import Judged, judged
     from planner.nc.reader import read_program
+    from planner.nc.set_limits import limited
     from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
@@ -94,6 +95,7 @@ def verify_command(
     taken = says.tolerance if machine is None and tolerance is None else None
     as_planned = reading == AS_USUAL
     program = read_program(job, limits, says.reading if as_planned else reading)
+    limits = limited(limits, program.limits)
     toolpath = toolpath_from_program(program, limits, tolerance if taken is None else taken)
     if not len(toolpath):
         raise InputError("the program moves nothing: there is nothing to judge", source=str(job))

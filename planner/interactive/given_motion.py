@@ -14,6 +14,7 @@ from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.methods.registry import DEFAULT_MACHINE
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.nc.set_limits import limited
 from planner.report.trajectory_reader import trajectory_of_columns
 from planner.verify import Verdict
 from planner.verify.axes import fit_axes
@@ -70,6 +71,7 @@ def verify(
     )
     if not isinstance(program, Program):
         program = read_program(program, machine)
+    machine = limited(machine, program.limits)
     toolpath = toolpath_from_program(program, machine, tolerance)
     trajectory, given, _ = fit_axes(read.trajectory, read.given, toolpath)
     how = Judged(program=program, toolpath=toolpath, machine=machine, given=given, not_limited=not_limited)

@@ -19,6 +19,7 @@ from planner.kinematics.setpoints import joint_setpoints
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
+from planner.nc.set_limits import limited
 from planner.verify.given import Given
 from planner.verify.joints import verify_joints
 from planner.verify.judge import WHOLE, verify
@@ -92,6 +93,7 @@ def planned(
 
     joints : whether `plan_on` keeps limits of joints; otherwise it is given those of the axes for the tip's coordinates
     """
+    machine = limited(machine, program.limits)
     chain = chain_of(program, machine)
     if chain is None:
         return plan_on(program, machine)

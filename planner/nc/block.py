@@ -8,6 +8,7 @@ interpreter's business.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ from planner.nc.settings import (
     TEXTS,
     TOOL_POINT_OFF,
     TOOL_POINT_ON,
+    Setting,
     setting,
 )
 
@@ -37,6 +39,7 @@ _TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT
 
 Report = Callable[[int, str], None]
 
+_BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
 NAME_SHOWN = 20  # characters of a name in a note
 PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is done with them")
 PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
@@ -62,6 +65,7 @@ class Block:
     events  : letter and number of words that move nothing and are kept, in their order
     homing  : axes that go to their home position
     stops   : one of `events` is a full stop
+    settings : commands that set a factor or a limit
     own     : letters of the words that codes of the line use
     tool_point : number of the M code that switches the tool centre point, or None
     """
@@ -78,6 +82,7 @@ class Block:
     events: list[tuple[str, float]] = field(default_factory=list)
     homing: str = ""
     stops: bool = False
+    settings: list[Setting] = field(default_factory=list)
     own: frozenset[str] = frozenset()
     tool_point: int | None = None
 
@@ -105,6 +110,8 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
         if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
+            if block.settings:
+                block.settings[-1].values.update(_bare_words(words, word))
             break
         if code == FAULT:
             if homed(words, word, block, assumed) or command(words, word, block, report, assumed):
@@ -137,7 +144,8 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
             else:
                 block.partial |= _add_code(block, letter, value, word, report, assumed)
         elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
-            continue
+            if letter in owned and block.settings:
+                block.settings[-1].values[letter.lower()] = value
         elif assumed.treatment[code] == REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
@@ -193,11 +201,20 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed
         return ""
     if found is None or assumed.strict:
         return None
-    assumed.count(found.what, words.text(word), block.line)
-    assumed.printer |= letter == "M" and code // 10 in EXTRUDER_MODES
+    if found.what is None:
+        block.settings.append(Setting(name, {}, word))
+    else:
+        assumed.count(found.what, words.text(word), block.line)
+    assumed.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
     return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
+
+
+def _bare_words(words: Words, word: int) -> dict[str, float]:
+    """The letters of a line from one without a number on, NaN where they have none."""
+    text = words.data[int(words.at[word]) :].partition(b"\n")[0].partition(b";")[0].decode("latin-1").lower()
+    return {letter: float(number) if number else math.nan for letter, number in _BARE_WORD.findall(text)}
 
 
 def _letters(words: Words, first: int, last: int) -> str:

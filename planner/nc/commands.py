@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from planner.nc.codes import Assumption
 from planner.nc.lexer import Words
+from planner.nc.settings import GRBL, VELOCITY_LIMIT, Setting
 
 if TYPE_CHECKING:
     from planner.nc.assumed import Assumed
@@ -26,6 +27,14 @@ _IGNORED = Assumption("command to the control", "commands to the control", "left
 _HARMLESS = re.compile(
     r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
 )
+_OTHER_SETTING = Assumption(
+    "setting of grbl",
+    "settings of grbl",
+    "assumed not to change the motion",
+    changes=True,
+)
+_SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
+_VALUE = re.compile(r"(\w+)=([-+]?\d+\.?\d*)")
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
 _LONGEST = 80  # characters of bare axis letters that are looked at
 # Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in 3^n ways.
@@ -33,9 +42,11 @@ _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNOR
 
 
 def command(words: Words, word: int, block: Block, report: Report, assumed: Assumed) -> bool:
-    """Execute a `$` command at the start of a line into `block`; False for what is none, or is refused."""
-    if words.text(word) != "$" or block.g or block.m or block.value or assumed.strict:
+    """Execute a `$` command at the start of a line into `block`, or Klipper's limit; False for what is none, or is refused."""
+    if block.g or block.m or block.value or assumed.strict:
         return False
+    if words.text(word) != "$":
+        return _velocity_limit(words, word, block)
     text = "$" + words.rest(word).split(";")[0].split("(")[0].strip()
     if assumed.ignores("$") or assumed.ignores(text.upper()[:2]):
         assumed.count(_IGNORED, text, block.line)
@@ -43,10 +54,28 @@ def command(words: Words, word: int, block: Block, report: Report, assumed: Assu
     if homing := _HOMING.fullmatch(text):
         block.homing = homing.group(1).upper() or "XYZ"
         return True
+    if (setting := _SETTING.fullmatch(text)) and setting[1] in GRBL:
+        block.settings.append(Setting(setting[1], {"": float(setting[2])}, word))
+        return True
+    if setting:
+        assumed.count(_OTHER_SETTING, text, block.line)
+        return True
     if _HARMLESS.fullmatch(text):
         assumed.count(COMMAND, text, block.line)
         return True
     return False
+
+
+def _velocity_limit(words: Words, word: int, block: Block) -> bool:
+    text = (chr(words.data[int(words.at[word])]) + words.rest(word)).partition(";")[0].upper()
+    name, _, rest = text.partition(" ")
+    values = _VALUE.findall(rest)
+    if name.strip() != VELOCITY_LIMIT or " ".join(f"{key}={value}" for key, value in values) != " ".join(
+        rest.split()
+    ):
+        return False
+    block.settings.append(Setting(VELOCITY_LIMIT, {key.lower(): float(value) for key, value in values}, word))
+    return True
 
 
 def homed(words: Words, word: int, block: Block, assumed: Assumed) -> bool:

@@ -67,7 +67,11 @@ _MODELS = (
     ),
     (
         "a file of a control's settings",
-        re.compile(rb"^(?:\[(?:EMC\w*|TRAJ|printer)\]|\$1[12]\d=)", re.MULTILINE),
+        # settings of grbl stand in programs too: a line with a G code makes it one
+        re.compile(
+            rb"^\[(?:EMC\w*|TRAJ|printer)\]|\A(?!(?:.*+\n)*?[ \t]*+(?:N\d++[ \t]*+)?G\d)(?:.*+\n)*?\$1[12]\d=",
+            re.MULTILINE,
+        ),
         "make a machine file of it (planner machine import) and give that as -m FILE",
     ),
 )

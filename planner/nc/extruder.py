@@ -12,6 +12,7 @@ the program has one block at most where E stands beside G0 to G3.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -24,6 +25,7 @@ from planner.nc.events import EventTable
 from planner.nc.lexer import Words
 from planner.nc.program import MOVES, Kind, Program
 
+_FLOW, _WHOLE_FLOW = 221.0, 100.0  # M221 S100
 _E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")
 # G codes in tenths beside which E is the extruder's: straight moves, arcs, planes, units, distance and feed modes.
 _WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 910, 911, 940])
@@ -37,16 +39,31 @@ class _Fed(NamedTuple):
     feed: FloatArray
 
 
-def with_extruder(program: Program, words: Words, rows: int) -> Program:
+def with_extruder(
+    program: Program, words: Words, rows: int, factors: Sequence[tuple[int, float]] = ()
+) -> Program:
     """The program with what the extruder feeds on each block, and full stops where it moves alone.
 
-    words : of the program; of these the first `rows` rows
+    words   : of the program; of these the first `rows` rows
+    factors : by which F counts from a line on (M220)
 
-    Raises InputError for an E word beside more than one move or beside another G code, and for one alone before the first F word.
+    Raises InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside another G code, and for one
+    alone before the first F word.
     """
     fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES))
     if not fed.amount.any():
         return program
+    of_line, factor = zip((0, 1.0), *factors, strict=True)
+    fed.feed[:] *= np.array(factor)[np.searchsorted(of_line, words.line[:rows], side="right") - 1]
+    flow = np.flatnonzero(
+        (words.letter[: words.first[rows]] == _M) & (words.value[: words.first[rows]] == _FLOW)
+    )
+    for row in {words.row(word) for word in flow.tolist()}:
+        given = words.value[words.first[row] : words.first[row + 1]][
+            words.letter[words.first[row] : words.first[row + 1]] == ord("S")
+        ]
+        if (given != _WHOLE_FLOW).any():
+            _refuse(program, words.line[row : row + 1], "a flow that is not 100 % (M221)")
     given = np.flatnonzero(fed.amount)
     line = words.line[given]
     unknown = np.flatnonzero(np.isnan(fed.amount[given]))

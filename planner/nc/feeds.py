@@ -46,7 +46,7 @@ def set_feed(state: State, block: Block, found: Findings) -> None:
         return
     state.feed_unit = state.unit
     if mode == "per minute":
-        state.feed = feed * state.unit / SECONDS_PER_MINUTE
+        state.feed = feed * state.unit / SECONDS_PER_MINUTE * state.feed_factor
     else:
         state.feed_per_turn = feed * state.unit
     code = block.g.get("units")
@@ -62,7 +62,7 @@ def take_default(state: State, default: float | None, block: Block, found: Findi
     """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
     if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
-    state.feed, state.feed_unit = default, state.unit
+    state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
     found.assume(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 

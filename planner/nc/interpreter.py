@@ -12,6 +12,7 @@ recorded and reading goes on with the next line, so that `info` can show them al
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -31,6 +32,7 @@ from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.set_limits import LimitsInForce
 from planner.nc.state import REFUSED_MOTION, Setup, State, set_units
 from planner.nc.store import Store
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
@@ -79,6 +81,7 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []
         self._dwells = DwellWords()
+        self._limits = LimitsInForce()
         self.ended = False
         self.two_axes = False
         self.by_word = 0
@@ -110,7 +113,9 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
         self._end_compensation()
+        limits = self._limits.throughout(self.store, self.setup.machine, self.found)
         read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
+        read = dataclasses.replace(read, limits=limits)
         return read if self.found.faults else at_the_tip(read, self.tool_point, self.setup.machine)
 
     def go_on_with(self, state: State, store: Store) -> None:
@@ -175,6 +180,11 @@ class Interpreter:
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.note(f"the program ends; what follows from line {after} on is not read", end)
+
+    @property
+    def feed_factors(self) -> list[tuple[int, float]]:
+        """Factors of F that the program sets, and their lines."""
+        return self._limits.factors
 
     @property
     def rows_read(self) -> int:
@@ -250,6 +260,7 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
+        self._limits.take(block.settings, self.state, self.store, block.line, self.found)
         feeds.set_feed(self.state, block, self.found)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.store, block, self.found)

@@ -43,6 +43,7 @@ class _Fixed(NamedTuple):
 
     absolute: bool
     unit: float
+    feed_factor: float
     path_control: int
     tolerance: float
     offset: FloatArray
@@ -82,6 +83,7 @@ def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assum
     fixed = _Fixed(
         state.absolute,
         state.unit,
+        state.feed_factor,
         int(state.path_control),
         state.tolerance,
         state.offset,
@@ -125,7 +127,9 @@ def _run(
 ):  # pragma: no cover - compiled
     """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
     letter, value, line, first, frame = rows
-    absolute, unit, path_control, tolerance, offset, column, rotary, further_offset, wrapped = fixed
+    absolute, unit, feed_factor, path_control, tolerance, offset, column, rotary, further_offset, wrapped = (
+        fixed
+    )
     treatment, parked = others
     row, blocks, events, refusals, motion, feed, feed_unit = begin
     given, turned = np.empty(3), np.empty(len(place))
@@ -166,7 +170,7 @@ def _run(
                 break
         code = motion if code < 0 else code
         if new_feed > 0:
-            new_feed *= unit / SECONDS_PER_MINUTE
+            new_feed *= unit / SECONDS_PER_MINUTE * feed_factor
         else:
             new_feed = feed
         if not is_plain or (moves and (code < 0 or code > 1 or (code == 1 and new_feed == 0.0))):

@@ -105,6 +105,15 @@ class ToolPoint:
     rapids_off: int = 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class SetLimit:
+    """A limit that the program sets (nc/set_limits.py): "velocity" [mm/s] or "acceleration" [mm/s2] of an axis, or "feed" [mm/s]."""
+
+    quantity: str
+    axis: str
+    value: float
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
@@ -165,6 +174,7 @@ class Program:
     expansion    : what was expanded; None where nothing was
     extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
                    kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
+    limits       : that the program sets and that hold throughout, where they are lower than the machine's
     reading      : the settings it was read with
     tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
@@ -194,6 +204,7 @@ class Program:
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
     extruded: FloatArray = field(default_factory=lambda: np.zeros(0))
+    limits: tuple[SetLimit, ...] = ()
     reading: Reading = AS_USUAL
     tool_point: ToolPoint | None = None
     pen: bool = False

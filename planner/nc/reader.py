@@ -155,7 +155,7 @@ def execute(
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.assumed.follows and not len(faults):
-        program = with_extruder(program, words, interpreter.rows_read)
+        program = with_extruder(program, words, interpreter.rows_read, interpreter.feed_factors)
     return interpreter, program, faults
 
 

@@ -21,6 +21,13 @@ AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
 EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 
+# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with what they limit.
+SETS_LIMITS = frozenset((201, 203, 204, 220))
+VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
+GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate("xyz")} | {
+    f"$12{k}": ("acceleration", axis) for k, axis in enumerate("xyz")
+}
+CORNERS = "no limit of this plan, which goes around corners within the tolerance and the machine's acceleration and jerk"
 UNKNOWN_M = Assumption(
     "M code that this reader does not know",
     "M codes that this reader does not know",
@@ -39,7 +46,25 @@ _TOOL_LENGTH_POINT = 434  # G43.4, read where the machine has kinematics
 PRINTER_M = Assumption(
     "code of a 3-D printer that moves nothing",
     "codes of a 3-D printer that move nothing",
-    "temperatures, fans, limits, messages; they take no time in this plan",
+    "temperatures, fans, messages; they take no time in this plan",
+)
+WAIT_M = Assumption(
+    "wait for a temperature",
+    "waits for a temperature",
+    "full stops; how long they last no plan knows",
+    changes=True,
+)
+CORNER_M = Assumption(
+    "speed of corners (M205, M566)",
+    "speeds of corners (M205, M566)",
+    CORNERS,
+    changes=True,
+)
+SCALE_M = Assumption(
+    "code of a 3-D printer that shifts or scales its axes",
+    "codes of a 3-D printer that shift or scale its axes",
+    "not followed: positions are those of the program",
+    changes=True,
 )
 SPINDLE_LIMIT = Assumption(
     "largest spindle speed", "largest spindle speeds", "they change nothing in the path"
@@ -67,6 +92,10 @@ PARKS = Assumption(
 # By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
 EXTRUDER_MODES = frozenset((82, 83))
 _PARKING = frozenset((125, 600, 701, 702))
+_WAITING = frozenset((109, 116, 190, 191))
+_MOVES_FINISHED = 400  # waits until the axes stand
+_CORNERS = frozenset((205, 566))
+_SCALES = frozenset((92, 206, 218, 556, 579, 665, 666))
 # fmt: off
 _OF_AXES = frozenset((
     17, 18, 84, 92, 201, 202, 203, 204, 205, 206, 207, 208, 218, 301, 304, 350, 425, 557, 558, 566, 569,
@@ -92,10 +121,23 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 
 @dataclass(frozen=True, slots=True)
-class CodeSetting:
-    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own, whether it is a full stop."""
+class Setting:
+    """A command that sets something: its name ("M204", "$110", `VELOCITY_LIMIT`), its values by letter or key, in small letters, and
+    the word that it stands at."""
 
-    what: Assumption
+    name: str
+    values: dict[str, float]
+    word: int
+
+
+@dataclass(frozen=True, slots=True)
+class CodeSetting:
+    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own, whether it is a full stop.
+
+    Nothing is said of one that is read (set_limits.py).
+    """
+
+    what: Assumption | None
     own: str
     stops: bool = False
 
@@ -138,14 +180,23 @@ def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
         return None
     if number in _PARKING:
         return CodeSetting(PARKS, EVERYTHING, stops=True)
-    what = PRINTER_M if number in _OF_PRINTERS else UNKNOWN_M
+    what: Assumption | None = _said_of(number)
+    if number in SETS_LIMITS:
+        return None if before else CodeSetting(None, EVERYTHING)
+    stops = number in _WAITING or number == _MOVES_FINISHED
     if before:
-        return CodeSetting(what, "PQ")
-    if number in _OF_AXES:
-        return CodeSetting(what, EVERYTHING)
+        return CodeSetting(what, "PQ", stops)
+    if number in _OF_AXES or stops:
+        return CodeSetting(what, EVERYTHING, stops)
     if 100 <= number <= 199:
         return CodeSetting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
     return None if set("XYZ").intersection(behind) else CodeSetting(what, EVERYTHING)
+
+
+def _said_of(number: int) -> Assumption:
+    """What is said of an M code that moves nothing."""
+    of = {WAIT_M: _WAITING, CORNER_M: _CORNERS, SCALE_M: _SCALES, PRINTER_M: _OF_PRINTERS}
+    return next((what for what, numbers in of.items() if number in numbers), UNKNOWN_M)
 
 
 def may_be_ignored(name: str) -> bool:

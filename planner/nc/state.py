@@ -93,6 +93,7 @@ class State:
     unit         : mm per programmed length unit
     diameters    : X words are diameters (G7)
     feed         : [mm/s], 0 where none has been given
+    feed_factor  : by which F counts (M220), in `feed` already
     feed_per_turn : F of G95 [mm]
     feed_unit    : mm per programmed length unit when the feed was given
     tolerance    : P of G64 [mm], NaN where none
@@ -124,6 +125,7 @@ class State:
     absolute_centre: bool = False
     diameters: bool = False
     feed: float = 0.0
+    feed_factor: float = 1.0
     feed_mode: FeedMode = "per minute"
     feed_per_turn: float = 0.0
     feed_unit: float = 1.0

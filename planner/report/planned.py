@@ -60,6 +60,8 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     source, data = plan.program.source, source_text(plan)
     if data is None:
         raise LeftOut(f"the program is points, which have no F words, or {source} is no longer there")
+    if any(event.text == "M220" for event in plan.program.events if event.text[0] == "M"):
+        raise LeftOut("its F words count by a factor that the program sets (M220)")
     if not _reads_as(data, plan, feeds=True):
         raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)

@@ -1,0 +1,164 @@
+"""Speed factors and limits that programs of printers and of grbl set, and the machine that they leave.
+
+    M220 S50            F of what follows counts half; B keeps the factor, R brings it back (Marlin); Klipper and RepRapFirmware too
+    M201 X Y Z E        accelerations of axes [units/s2]
+    M203 X Y Z E        speeds of axes: in units/s in Marlin, in units/min in RepRapFirmware, whose numbers go beyond `PER_MINUTE`
+    M204 S, P, T        acceleration along the path [units/s2], of printing and travelling moves; R of the extruder alone
+    SET_VELOCITY_LIMIT  VELOCITY and ACCEL of Klipper, along the path
+    $110= to $122=      speeds [mm/min] and accelerations of grbl's axes
+
+A factor is one of F and holds block by block. Limits are those of a machine, which is one for the whole motion: of all that were in
+force on a move the lowest holds throughout, which keeps each of them, and is said first where they change on the way. A limit along the
+path is one of every axis: on a diagonal the axes' own let the path have up to sqrt(3) of it. Limits above the machine's change nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.moves import WordFault
+from planner.nc.program import MOVES, SetLimit
+from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
+    from planner.nc.faults import Findings
+    from planner.nc.state import State
+    from planner.nc.store import Store
+
+SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", "M201", "M204"
+# From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x and y are above 17 mm/s.
+PER_MINUTE = 1000.0
+_AXES = "xyze"
+EVERY_AXIS = "xyz"
+FEED = "feed"  # what VELOCITY bounds beside the axes
+
+
+class LimitsInForce:
+    """The limits in force, and of those that were so on a move the lowest.
+
+    factors : by which F counts from a line on, as M220 sets them
+    """
+
+    def __init__(self) -> None:
+        self.factors: list[tuple[int, float]] = []
+        self._now: dict[tuple[str, str], float] = {}
+        self._seen: list[dict[tuple[str, str], float]] = []  # on moves
+        self._blocks = 0  # that were looked at
+        self._line = 0  # of the first that is set
+        self._kept = 1.0  # factor that M220 B keeps
+
+    def take(
+        self, settings: Sequence[Setting], state: State, store: Store, line: int, found: Findings
+    ) -> None:
+        """Execute the commands of a line. Raises WordFault for a value that is not positive."""
+        for setting in settings:
+            self._look(store)
+            given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
+            for key, value in given.items():
+                if not value > 0.0:
+                    raise WordFault(
+                        setting.word, f"{setting.name} {key.upper()} must be positive, found {value:g}"
+                    )
+            if setting.name == SPEED_FACTOR:
+                self._take_factor(setting.values, state, line)
+                continue
+            self._line = self._line or line
+            self._take_limits(setting.name, given, state.unit, line, found)
+
+    def throughout(self, store: Store, machine: Machine | None, found: Findings) -> tuple[SetLimit, ...]:
+        """The limits that hold throughout, and what is to be said of them."""
+        self._look(store)
+        if not self._line:
+            return ()
+        lowest = {
+            key: min(seen[key] for seen in self._seen if key in seen)
+            for key in {k for seen in self._seen for k in seen}
+        }
+        limits = tuple(SetLimit(quantity=q, axis=a, value=v) for (q, a), v in sorted(lowest.items()))
+        if len(self._seen) > 1:
+            text = "the program changes its limits of speed or acceleration on the way: the lowest of each holds throughout"
+            found.assume(text, self._line)
+        elif limits:
+            found.note(
+                "limits that the program sets hold where they are lower than the machine's", self._line
+            )
+        if machine is not None and limited(machine, limits, above=True) is not machine:
+            found.assume("the program sets limits above those of the machine file, which hold", self._line)
+        return limits
+
+    def _look(self, store: Store) -> None:
+        """Keep the limits in force if there was a move under them."""
+        kinds = store.block.kind[self._blocks : store.blocks]
+        self._blocks = store.blocks
+        if np.isin(kinds, MOVES).any() and self._now not in self._seen:
+            self._seen.append(dict(self._now))
+
+    def _take_limits(
+        self, name: str, given: Mapping[str, float], unit: float, line: int, found: Findings
+    ) -> None:
+        if name == SPEEDS:
+            per_minute = max(given.values(), default=0.0) >= PER_MINUTE
+            said = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
+            found.assume(f"speeds of {SPEEDS} are read per {said}", line)
+            self._set("velocity", given, unit / (SECONDS_PER_MINUTE if per_minute else 1.0))
+        elif name == ACCELERATIONS:
+            self._set("acceleration", given, unit)
+        elif name == ALONG_PATH:
+            of_path = [given[key] for key in "spt" if key in given]
+            if of_path:
+                self._set("acceleration", dict.fromkeys(EVERY_AXIS, min(of_path)), unit)
+            if "r" in given:
+                self._set("acceleration", {"e": given["r"]}, unit)
+        elif name == VELOCITY_LIMIT:
+            self._take_velocity_limit(given, line, found)
+        else:
+            quantity, axis = GRBL[name]
+            self._set(
+                quantity, {axis: given[""]}, 1.0 / SECONDS_PER_MINUTE if quantity == "velocity" else 1.0
+            )
+
+    def _take_factor(self, given: Mapping[str, float], state: State, line: int) -> None:
+        if "b" in given:
+            self._kept = state.feed_factor
+        factor = self._kept if "r" in given else state.feed_factor
+        factor = given["s"] / 100.0 if "s" in given else factor
+        state.feed *= factor / state.feed_factor
+        state.feed_factor = factor
+        self.factors.append((line, factor))
+
+    def _take_velocity_limit(self, given: Mapping[str, float], line: int, found: Findings) -> None:
+        if "accel" in given:
+            self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]), 1.0)
+        if "velocity" in given:
+            self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]), 1.0)
+            self._set(FEED, {"": given["velocity"]}, 1.0)
+        rest = sorted(given.keys() - {"accel", "velocity"})
+        if rest:
+            found.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
+
+    def _set(self, quantity: str, values: Mapping[str, float], factor: float) -> None:
+        for axis, value in values.items():
+            if axis in _AXES or quantity == FEED:
+                self._now[quantity, axis] = value * factor
+
+
+def limited(machine: Machine, limits: Sequence[SetLimit], *, above: bool = False) -> Machine:
+    """The machine, with the limits of a program where they are lower; with `above` those that are higher."""
+    axes, feed_max = dict(machine.axes), machine.feed_max
+    of_two = max if above else min
+    for limit in limits:
+        if limit.quantity == FEED:
+            feed_max = limit.value if feed_max is None else of_two(feed_max, limit.value)
+        elif limit.axis in axes:
+            axis = axes[limit.axis]
+            value = of_two(getattr(axis, limit.quantity), limit.value)
+            axes[limit.axis] = axis.model_copy(update={limit.quantity: value})
+    if axes == dict(machine.axes) and (feed_max == machine.feed_max or above):
+        return machine
+    return machine.model_copy(update={"axes": axes, "feed_max": feed_max})

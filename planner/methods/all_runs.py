@@ -15,27 +15,33 @@ from planner.tube.parts import FoundRun
 from planner.tube.run import TubeRun
 
 LONG = SIZES.searched_shared
+# Runs that are not found are planned each by itself; with more than this share of the steps on them the job is, as a whole [-].
+FAILED_MOST = 0.5
 
 
 def searched_runs(
     runs: list[TubeRun], start: Start, dial: Search, report: Callable[[float], None], *, divide: bool
 ) -> list[FoundRun] | None:
-    """What is found on each run; None where a run is not found as a whole and `divide` is not asked for.
+    """What is found on each run; None where more than `FAILED_MOST` of the steps are on runs that are not found as a whole, unless
+    `divide` is asked for.
 
     divide : divide windows that fail, and keep the guess where nothing faster is found (tube/own.py)
     """
     size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
     found: list[FoundRun | None] = [None for _ in runs]
-    stopped = threading.Event()  # at a run that is not whole
+    stopped = threading.Event()
 
     def done() -> int:
         return sum(steps for steps, of_run in zip(size, found, strict=True) if of_run is not None)
 
+    def lost() -> int:
+        return sum(steps for steps, run in zip(size, found, strict=True) if run is not None and not run.whole)
+
     def one(k: int, tell: Callable[[float], None]) -> None:
         if stopped.is_set():
             return
-        found[k] = of_run = search(k, runs[k], [start], solver_of(dial, tell, divide=divide))
-        if not (divide or of_run.whole):
+        found[k] = search(k, runs[k], [start], solver_of(dial, tell, divide=divide))
+        if not divide and lost() > FAILED_MOST * sum(size):
             stopped.set()
 
     def share(before: int, of_run: int, part: float) -> None:

@@ -2,14 +2,20 @@
 
 A motion on the first splines keeps its limits at the points of a coarse grid. That is no plan, but where the search leaves no step of
 it nothing else is asked of it: it is not made slower where it exceeds a limit between grid points, not sampled at the interpolation
-period, not judged, and not compared with other corners, which are slower than what is found (docs/joint.md). Where anything of it
-would have to stay, or what is found does not pass its verdict, there is no plan from here.
+period, and not judged. A run of which anything would have to stay, or that does not pass the verdict, is planned by itself in another
+way; all others are taken. Where that is more than half of the job, or there are too many such runs, there is no plan from here.
 """
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
+from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Toolpath
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.methods.all_runs import searched_runs
@@ -17,15 +23,19 @@ from planner.methods.free import Start, said, tabled
 from planner.optimal.loop import Settings
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.tube.parts import parts_of
-from planner.tube.run import tube_runs_of
+from planner.tube.parts import FoundRun, parts_of
+from planner.tube.run import TubeRun, tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
+from planner.verify import Verdict
+
+# So many runs are planned by themselves at most, and so often once more those that the verdict finds something on.
+ALONE_MOST, VERDICTS = 100, 3
 
 
 class AtOnce(NamedTuple):
     """What the search finds from the first motion.
 
-    plan  : None where it does not find all of it, and where the motion has more steps than the effort is for
+    plan  : None where it does not find enough of it, and where the motion has more steps than the effort is for
     steps : of the motion
     """
 
@@ -33,11 +43,14 @@ class AtOnce(NamedTuple):
     steps: int
 
 
-def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
+def searched_at_once(
+    job: Job, settings: Settings, planned: OnPath, otherwise: Callable[[Job], Plan]
+) -> AtOnce:
     """What the search finds from the first motion.
 
-    job     : a searchable one (free.py)
-    planned : on the first splines (optimal/loop.py, `first_motion`)
+    job       : a searchable one (free.py)
+    planned   : on the first splines (optimal/loop.py, `first_motion`)
+    otherwise : plans a job of one run, which the search does not find
     """
     dial = settings.effort.search
     with job.stage("search") as report:
@@ -52,19 +65,25 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
             return AtOnce(None, steps)
         dial = dial.of(steps)
         found = searched_runs(runs, start, dial, report, divide=False)
-        if found is None:
-            job.tell("search", steps=steps, of_runs=len(runs))
-            return AtOnce(None, steps)
-        parts: list[SplicedRun] = []
-        for k, one in enumerate(found):
-            parts += parts_of(job.toolpath, one, start.spliced(k))
-    made = job.deliver(Spliced(runs=tuple(parts)))
+    alone = _Alone(job, otherwise)
+    made = None
+    if found is not None and alone.planned(found, [k for k, one in enumerate(found) if not one.whole]):
+        for _ in range(VERDICTS):
+            motion = Spliced(runs=tuple(part for parts in alone.parts(found, start) for part in parts))
+            made = job.deliver(motion)
+            if made[1].passed or not alone.planned(found, alone.broken(found, start, made[1])):
+                break
+    if found is None or made is None:
+        job.tell("search", steps=steps, of_runs=len(runs))
+        return AtOnce(None, steps)
     trajectory, verdict = made
-    job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, steps=steps)
+    kept = sorted(alone.plans)
+    facts = {"steps": steps, "alone": len(kept)}
+    job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, **facts)
     if not verdict.passed or trajectory.cycle_time > job.line_stop_time:
         return AtOnce(None, steps)
     job.note(*path_notes(job.toolpath, planned))
-    status, sentence = said(job, start, found, [], "", "a path first, then its feed")
+    status, sentence = said(job, start, found, kept, "", "a path first, then its feed")
     plan = job.plan(
         made,
         method=settings.method,
@@ -73,6 +92,76 @@ def searched_at_once(job: Job, settings: Settings, planned: OnPath) -> AtOnce:
         status=status,
         sentence=sentence,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
-        tables=tabled(job, None, trajectory, found, []),
+        tables=tabled(job, None, trajectory, found, kept, {k: plan.grid for k, plan in alone.plans.items()}),
     )
     return AtOnce(plan, steps)
+
+
+class _Alone:
+    """Runs of a job that are planned each by itself.
+
+    plans : by the number of the run
+    """
+
+    def __init__(self, job: Job, otherwise: Callable[[Job], Plan]):
+        self.job, self._otherwise = job, otherwise
+        self.plans: dict[int, Plan] = {}
+
+    def planned(self, found: list[FoundRun], which: list[int]) -> bool:
+        """Plan some of the runs, and put that into `found`; False where there are too many, or none that is not planned yet, or one
+        does not pass."""
+        new = [k for k in which if k not in self.plans]
+        if len(which) > len(new) or len(self.plans) + len(new) > ALONE_MOST:
+            return False
+        for k in new:
+            why = (
+                found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
+            )
+            part = _job_of(self.job, found[k].run)
+            plan = self._otherwise(part)
+            if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
+                return False
+            self.job.note(*part.noted)
+            self.plans[k], found[k] = plan, FoundRun(found[k].run, Status.ACCEPTABLE, why)
+        return True
+
+    def parts(self, found: list[FoundRun], start: Start) -> list[list[SplicedRun]]:
+        """The parts of the motion along each run."""
+        return [self._parts(k, one, start) for k, one in enumerate(found)]
+
+    def _parts(self, k: int, one: FoundRun, start: Start) -> list[SplicedRun]:
+        if k not in self.plans:
+            return parts_of(self.job.toolpath, one, start.spliced(k))
+        trajectory = self.plans[k].trajectory
+        assert trajectory is not None
+        motion = self.job.motion_of[trajectory]
+        return [SplicedRun(motion=motion, begin=0.0, end=motion.end)]
+
+    def broken(self, found: list[FoundRun], start: Start, verdict: Verdict) -> list[int]:
+        """The runs on which a verdict finds something at a known time."""
+        lasting = [sum(part.lasting for part in parts) for parts in self.parts(found, start)]
+        at = np.array([[each.begin, each.end] for each in verdict.excesses]).reshape(-1, 2)
+        first, last = np.searchsorted(np.cumsum(lasting), at).T.clip(0, len(found) - 1)
+        return sorted(
+            {k for a, b in zip(first.tolist(), last.tolist(), strict=True) for k in range(a, b + 1)}
+        )
+
+
+def _job_of(job: Job, run: TubeRun) -> Job:
+    """The job of one run, from the standstill before it."""
+
+    def part(toolpath: Toolpath) -> Toolpath:
+        first, last = int(run.first[0]), int(run.first[-1])
+        kept = np.zeros(len(toolpath), bool)
+        kept[first:last] = True
+        of_run, whole = toolpath.part(kept), last == len(toolpath)
+        columns = {}
+        for name in ("joint", "theta", "tolerance", "dwell"):
+            columns[name] = getattr(toolpath, name)[first : last + 1].copy()
+        if not whole:  # what stands there belongs to the next run
+            columns["dwell"][-1] = 0.0
+        return dataclasses.replace(of_run, **columns)
+
+    machine, judged_by = job.real
+    judged = None if job.judged is None else (machine, part(judged_by))
+    return dataclasses.replace(job, toolpath=part(job.toolpath), judged=judged, noted=[], most=np.inf)

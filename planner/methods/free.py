@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.job.records import NO_TABLES, Tables
+from planner.job.records import NO_TABLES, GridHistory, Tables
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import passing_times, standstills
@@ -210,7 +211,7 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[Guess, T
     for cut, own in solver.finer:
         finer = divided(run, guess.leg, found, cut)
         again = searched_again(run, found, finer, own)
-        if again is not None:
+        if again is not None and again.steps is not None and again.steps.h.sum() <= found.steps.h.sum():
             guess, found = finer.guess, again
     return guess, found
 
@@ -243,17 +244,25 @@ def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered,
 
 
 def tabled(
-    job: Job, start: Plan | None, trajectory: Trajectory, found: list[FoundRun], kept: list[int]
+    job: Job,
+    start: Plan | None,
+    trajectory: Trajectory,
+    found: list[FoundRun],
+    kept: list[int],
+    alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> Tables:
     """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
-    tells: not on the runs in `kept`, of which a note speaks, and not behind filters."""
+    tells: not on the runs in `kept`, of which a note speaks, and not behind filters.
+
+    alone : what held runs that are planned each by itself
+    """
     if job.real[0].fir is not None:
         return NO_TABLES
     with job.stage("report"):
         taken = [one for k, one in enumerate(found) if k not in kept]
         prices = found_prices(job.toolpath, job.machine, taken, trajectory.cycle_time)
         grid = found_history(
-            job.toolpath, job.motion_of[trajectory], found, kept, start.grid if start else None
+            job.toolpath, job.motion_of[trajectory], found, kept, start.grid if start else None, alone
         )
     moving = trajectory.cycle_time - float(job.toolpath.dwell.sum())
     unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving

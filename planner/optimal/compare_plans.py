@@ -1,30 +1,30 @@
-"""Plans that may be faster than the time-optimal motion on splines and Bezier corners, and bounds that tell when they are not.
+"""Plans that may be faster than the time-optimal motion on splines and Bezier corners.
 
 A smooth path is not always the fastest. If every corner is sharp and the legs are short, a stop at each corner needs no tolerance and
 no grid. Other corner shapes use the tolerance in another way. And if a plan fails its verdict at a long interpolation period, another
 plan may pass.
 
 stop         its time is known before it is planned, as the sum of closed forms over the blocks; lines that go straight on are one
+kinematic    in closed form too: it is planned, and delivered where it takes less time
 fir corners  their time without jerk limits on a coarse grid is a lower bound; if that is short enough, their time with jerk limits on a
              coarse grid is an upper bound, to the share `CHANCE`
-kinematic    uses the corners of its own shape with less freedom, so it is tried where these have a chance. Time-optimal motions on
-             these corners are not planned: of 300 random jobs they were the fastest on none, at 7 % of the computing time
-             (benchmarks/ablation.py at 413b5dc)
 
-Beyond `RIVAL_POINTS` grid points only full stops are compared, and `kinematic` if nothing passes.
+Beyond `RIVAL_POINTS` blocks `kinematic` is planned only if nothing passes, and beyond as many grid points fir corners are not.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from functools import cached_property
+
+import numpy as np
 
 from planner.base.sizes import SIZES
 from planner.corners.smooth import round_corners
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.job.trace import Tell
+from planner.methods.kinematic import KinematicMethod
 from planner.methods.stop import StopMethod
 from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
@@ -34,7 +34,7 @@ from planner.verify.excess import OF_CHORDS, Kind
 
 RIVAL_POINTS = SIZES.rivals_planned
 RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)
-SHAPES = "kinematic", "fir"  # "auto" has planned Bezier corners itself
+FIR = "fir"  # the shape that is compared: "auto" has planned Bezier corners itself
 # On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
 # on random jobs of benchmarks/random_lines.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
 COARSER, CHANCE = 25.0, 1.03
@@ -61,23 +61,31 @@ class Stopped:
         return self._job.line_stop_time < time and counted_time(self.plan) < time
 
 
-def chances(best: Plan, job: Job, order: Order) -> Iterator[str]:
-    """Corner shapes on which a motion may be faster than the plan."""
+def with_closed_forms(best: Plan, job: Job, stopped: Stopped) -> Plan:
+    """The plan, or full stops or method kinematic where that takes less time, or passes while the plan fails."""
+    if stopped.sooner_than(min(counted_time(best), job.most)):
+        best = better(best, stopped.plan, "full stops take less time", job.tell)
+    most = min(counted_time(best), job.most)
+    if len(job.toolpath) <= RIVAL_POINTS or most == np.inf:
+        rival = KinematicMethod().plan_job(dataclasses.replace(job.afresh(), most=most))
+        best = better(best, rival, "method kinematic takes less time", job.tell)
+    return best
+
+
+def fir_corners_may_be_faster(best: Plan, job: Job, order: Order) -> bool:
+    """Whether a motion on fir corners has a chance to take less time than the plan."""
     dwell, most = float(job.toolpath.dwell.sum()), min(counted_time(best), job.most)
-    for name in SHAPES:
-        with job.stage("geometry"):
-            shape = corner_shape(name, job.machine, job.toolpath)
-            path = round_corners(job.toolpath, job.machine, shape, blend_tangents=True)
-        with job.stage("solve"):
-            bounds = corner_bounds(path, job.machine, most=RIVAL_ESTIMATE)
-        job.tell(
-            "bound on corners", found=bounds.time.sum() + dwell, corner=name, points=int(bounds.points.sum())
+    with job.stage("geometry"):
+        path = round_corners(
+            job.toolpath, job.machine, corner_shape(FIR, job.machine, job.toolpath), blend_tangents=True
         )
-        if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= most:
-            continue
-        coarse = order.solve(path, job, COARSER * RESOLUTION).solution
-        if coarse.solved and coarse.cycle_time + dwell < CHANCE * most:
-            yield name
+    with job.stage("solve"):
+        bounds = corner_bounds(path, job.machine, most=RIVAL_ESTIMATE)
+    job.tell("bound on corners", found=bounds.time.sum() + dwell, corner=FIR, points=int(bounds.points.sum()))
+    if bounds.points.sum() > RIVAL_POINTS or bounds.time.sum() + dwell >= most:
+        return False
+    coarse = order.solve(path, job, COARSER * RESOLUTION).solution
+    return coarse.solved and coarse.cycle_time + dwell < CHANCE * most
 
 
 def counted_time(plan: Plan) -> float:

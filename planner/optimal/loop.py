@@ -30,8 +30,8 @@ What is tried more than once:
   tighter limits in places       excess above 1e-5 between points          2, long jobs 4    ranges        runs slower by the rest
   less feed in places            filters leave the tolerance               16                solve         waiting, slower runs
   slower in places               the verdict finds something               6                 verdict       the verdict stands
-  another plan                   "auto", a bound on its time is lower, or  4                 a plan        the fastest that passes
-                                   the plan fails its verdict
+  another plan                   "auto", it takes less time or the plan   3                 a plan        the fastest that passes
+                                   fails; fir corners by a bound
 
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
 certificate fails are tightened (smoothing/relax.py; in a round of reshaping smoothing/combined.py, twice at most). Around the loop, a
@@ -45,8 +45,6 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, NORMAL, QUICK, SPLINE
 from planner.base.sizes import SIZES
@@ -57,10 +55,18 @@ from planner.feedrate.solution import Status
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.job.records import Tables
-from planner.methods.kinematic import KinematicMethod
 from planner.optimal.behind_filters import within_filters
 from planner.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
-from planner.optimal.compare_plans import RIVAL_POINTS, SAME_MOTION, Stopped, better, chances, counted_time
+from planner.optimal.compare_plans import (
+    FIR,
+    RIVAL_POINTS,
+    SAME_MOTION,
+    Stopped,
+    better,
+    counted_time,
+    fir_corners_may_be_faster,
+    with_closed_forms,
+)
 from planner.optimal.effort import COARSE, EFFORTS, Effort, Grids
 from planner.optimal.geometry import corner_shape, lost_joints, splined_with_stops
 from planner.optimal.notes import no_spline_note, not_compared_note
@@ -98,24 +104,16 @@ class Settings:
 def fastest_plan(job: Job, settings: Settings) -> Plan:
     """The plan on a smooth path; with "auto" another plan if that takes less time or passes while the smooth one fails. The sentence of
     the plan says which."""
-    if settings.corner != AUTO or not settings.order.jerk_limited:
+    if settings.corner != AUTO:
         return plan_on_path(job, settings)
     stopped = Stopped(job)
-    smooth = best = plan_on_path(job, settings, stopped)
-    if stopped.sooner_than(min(counted_time(best), job.most)):
-        best = better(best, stopped.plan, "full stops take less time", job.tell)
-    if smooth.grid_points <= RIVAL_POINTS:
-        for name in chances(best, job, settings.order):
-            rival = dataclasses.replace(job.afresh(), most=min(counted_time(best), job.most))
-            if name == "kinematic":
-                kinematic = KinematicMethod().plan_job(rival)
-                best = better(best, kinematic, "method kinematic takes less time", job.tell)
-            else:
-                cornered = plan_on_path(rival, dataclasses.replace(settings, corner=name))
-                best = better(best, cornered, f"{name} corners take less time", job.tell)
-    if min(counted_time(best), job.most) == np.inf:
-        kinematic = KinematicMethod().plan_job(job.afresh())
-        best = better(best, kinematic, "method kinematic keeps all limits in less time", job.tell)
+    smooth = plan_on_path(job, settings, stopped)
+    best = with_closed_forms(smooth, job, stopped)
+    small = settings.order.jerk_limited and smooth.grid_points <= RIVAL_POINTS
+    if small and fir_corners_may_be_faster(best, job, settings.order):
+        rival = dataclasses.replace(job.afresh(), most=min(counted_time(best), job.most))
+        cornered = plan_on_path(rival, dataclasses.replace(settings, corner=FIR))
+        best = better(best, cornered, "fir corners take less time", job.tell)
     if best is smooth:
         return smooth
     best = dataclasses.replace(best, method=smooth.method, corner=smooth.corner, timings=job.stages.timings)

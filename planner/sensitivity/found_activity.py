@@ -6,7 +6,9 @@ the largest price there. Where the motion of the start stays, it is what held th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
@@ -55,12 +57,14 @@ def found_history(
     found: list[FoundRun],
     kept: list[int],
     start: GridHistory | None,
+    alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> GridHistory | None:
     """What holds a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
     in it does not tell.
 
     motion : as it is delivered
     start  : what held the start's motion
+    alone  : what held the motions of runs in `kept` that are planned by themselves, by their number
     """
     slowed = motion if isinstance(motion, Slowed) else Slowed(motion=motion, places=())
     motion = slowed.motion
@@ -69,7 +73,8 @@ def found_history(
     axes = toolpath.axes
     own = (*(kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes),)
     own = (*own, FEED.name, CHORD_ERROR.name, TOLERANCE)
-    others = () if start is None else tuple(name for name in start.active_names[:-2] if name not in own)
+    known = [each.active_names[:-2] for each in (start, *alone.values()) if each is not None]
+    others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)
     rows = _Rows(names, np.zeros(len(names)))
     parts = list(zip(motion.runs, motion.begin[:-1].tolist(), strict=True))
@@ -78,10 +83,10 @@ def found_history(
             part, begin = parts.pop(0)
             if not stays:
                 _of_steps(rows, toolpath, one, (lo, hi), (part, begin))
-            elif start is None:
+            elif (held := alone.get(k, start)) is None:
                 return None
             else:
-                _of_start(rows, start, part, begin)
+                _of_start(rows, held, part, begin)
             rows.stand(begin + part.end - part.begin, part.hold)
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
     t = slowed.run_at(t)

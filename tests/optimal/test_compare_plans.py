@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 from quick import slow_but
 
@@ -18,7 +17,9 @@ from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.lookahead.stop_moves import parts_of
+from planner.machine import load_machine
 from planner.methods.optimal import OptimalMethod
+from planner.methods.registry import plan
 from planner.methods.stop import StopMethod
 from planner.nc.reader import parse_program
 from planner.optimal import loop
@@ -69,20 +70,50 @@ def test_where_a_line_is_cut_into_blocks_does_not_matter_to_full_stops():
     assert parts_of(toolpath_from_program(parse_program(other_feed, machine), machine), True).still.sum() == 5
 
 
-def test_a_rival_is_planned_only_where_its_bounds_leave_a_chance(monkeypatch):
+def test_fir_corners_are_planned_only_where_their_bounds_leave_a_chance(monkeypatch):
     program, machine = job(3)
     plan = OptimalMethod(rounds=0).plan(program, machine)
     assert plan.status is Status.OPTIMAL
-
-    class Asked:
-        line_stop_time = 1.01 * plan.trajectory.cycle_time
-        most = np.inf
-
     settings = loop.Settings(method="optimal", corner="auto", order=ThirdOrder(JerkLimited()))
+    monkeypatch.setattr(loop, "Stopped", lambda job: None)
+    monkeypatch.setattr(loop, "with_closed_forms", lambda best, job, stopped: best)
     monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: plan)
-    monkeypatch.setattr(loop, "chances", lambda best, job, order: iter(()))
-    assert loop.fastest_plan(Asked(), settings) is plan
+    monkeypatch.setattr(loop, "fir_corners_may_be_faster", lambda best, job, order: False)
+    assert loop.fastest_plan(None, settings) is plan
     large = dataclasses.replace(plan, grid_points=loop.RIVAL_POINTS + 1)
     monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: large)
-    monkeypatch.setattr(loop, "chances", None)
-    assert loop.fastest_plan(Asked(), settings) is large
+    monkeypatch.setattr(loop, "fir_corners_may_be_faster", None)
+    assert loop.fastest_plan(None, settings) is large
+
+
+# Rows within a limit of the normal acceleration. `kinematic` stops at the two sharp turns, which no bound on its corners knows.
+ROWS = """G21 G90 G64 P0.02
+G1 X0 Z-0.05 F900
+X0.5 Z-0.07
+X1 Z-0.03
+X1.5 Z0.05
+X2 Z0.06
+Y0.9 Z0.02
+X1.5 Z0.03
+X1 Z-0.04
+X0.5 Z-0.06
+M2
+"""
+
+
+def of_rows(**settings):
+    machine = load_machine("mill").model_copy(update={"normal_acceleration": 90.0})
+    return plan(parse_program(ROWS, machine), machine, **settings)
+
+
+@pytest.mark.parametrize("settings", [{"effort": "quick"}, {}, {"method": "second-order"}])
+def test_closed_forms_are_never_faster(settings):
+    """They cost nothing beside the rest, so that no bound decides whether they are planned."""
+    least = min(of_rows(method=method).cycle_time for method in ("kinematic", "stop"))
+    made = of_rows(**settings)
+    assert made.verdict.passed
+    assert made.cycle_time <= least * (1.0 + ALLOWED)
+
+
+def test_normal_effort_is_never_slower_than_quick():
+    assert of_rows().cycle_time <= of_rows(effort="quick").cycle_time * (1.0 + 1e-9)

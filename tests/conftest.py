@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from planner.base.sizes import SIZES, USUAL
+
 ROOT = Path(__file__).resolve().parent.parent
 
 # No deadline: the first call of a kernel compiles it. The suite has the same examples every time, so that it is red for a change and
@@ -35,6 +37,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         weight[item.path] += SLOW if item.get_closest_marker("slow") else 1
     items.sort(key=lambda item: -weight[item.path])  # stable: the tests of a file stay together and in order
+
+
+@pytest.fixture(autouse=True)
+def _usual_sizes(request: pytest.FixtureRequest) -> None:
+    if request.node.get_closest_marker("usual_sizes") and SIZES != USUAL:
+        pytest.skip("with small sizes another answer is right")
 
 
 @pytest.fixture

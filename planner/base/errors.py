@@ -9,6 +9,8 @@ There are three kinds of failure:
 
 from __future__ import annotations
 
+import unicodedata
+
 
 class PlannerError(Exception):
     """Base of all exceptions that this package raises on purpose."""
@@ -21,6 +23,8 @@ class InputError(PlannerError, ValueError):
     source  : file name, or None for values passed from Python
     line    : 1-based line in that file, or None
     column  : 1-based column in that line, or None
+
+    The text has no control characters, which a terminal might obey, whatever words of a program it quotes.
     """
 
     def __init__(
@@ -28,8 +32,15 @@ class InputError(PlannerError, ValueError):
     ):
         self.message, self.source, self.line, self.column = message, source, line, column
         place = ":".join(str(part) for part in (source, line, column) if part is not None)
-        super().__init__(f"{place}: {message}" if place else message)
+        super().__init__(printable(f"{place}: {message}" if place else message))
 
 
 class NotSolvedError(PlannerError, RuntimeError):
     """There is no solution. The text is the sentence of the status, with its remedy."""
+
+
+def printable(text: str) -> str:
+    """The text with control characters other than line ends and tabs written as \\x1b and the like."""
+    if text.isprintable():
+        return text
+    return "".join(c if c in "\n\t" or unicodedata.category(c) != "Cc" else f"\\x{ord(c):02x}" for c in text)

@@ -7,7 +7,6 @@ import functools
 import io
 import os
 import sys
-import unicodedata
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from planner.base.errors import InputError, NotSolvedError
+from planner.base.errors import InputError, NotSolvedError, printable
 from planner.commands.exit_codes import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED, NOT_SOLVED
 
 if TYPE_CHECKING:
@@ -126,13 +125,6 @@ def _drop_output() -> None:
     """Without this the flush at exit would fail once more."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def printable(text: str) -> str:
-    """The text with control characters other than line ends and tabs written as \\x1b and the like."""
-    if text.isprintable():
-        return text
-    return "".join(c if c in "\n\t" or unicodedata.category(c) != "Cc" else f"\\x{ord(c):02x}" for c in text)
 
 
 def show(*tables: RenderableType) -> None:

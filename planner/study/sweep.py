@@ -72,8 +72,8 @@ def write_sweep(done: Sweep, directory: Path) -> list[str]:
     columns: dict[str, Any] = {one.name: [row[one.name] for row in done.rows] for one in done.varied}
     columns |= {name: pa.array([row.get(name) for row in done.rows], pa.string()) for name in TEXTS}
     columns |= {name: pa.array([row.get(name) for row in done.rows], pa.float64()) for name in NUMBERS}
-    with replacing_file(directory / TABLE) as new:
-        pq.write_table(pa.table(columns), new)
+    with replacing_file(directory / TABLE) as new, new.open("wb") as file:
+        pq.write_table(pa.table(columns), file)
     from planner.study.figure import sweep_figure
 
     with replacing_file(directory / FIGURE) as new:

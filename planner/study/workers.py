@@ -7,7 +7,10 @@ dies ends the sweep, and the points so far are kept.
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from typing import Any
 
 from planner.base.errors import InputError, NotSolvedError
@@ -50,30 +53,43 @@ def planned_on_cluster(
 ) -> Iterator[tuple[Point, dict[str, Any]]]:
     """Rows of points, as they are planned by the workers of the Dask cluster whose scheduler has this address.
 
-    Raises InputError if there is no scheduler, NotSolvedError if a point is given up because its workers died.
+    Raises InputError if there is no scheduler, NotSolvedError if it goes away, or if a point is given up because its workers died.
     """
     distributed = import_needed("distributed", "--cluster")
+    # how it tries to reach a scheduler that has gone, in pages; what came of it is said below
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=WAIT, set_as_default=False)
     except (OSError, ValueError) as fault:
         raise InputError(f"--cluster {address}: no scheduler answers there ({fault})") from None
-    with client:
-        if not client.scheduler_info()["workers"]:
-            raise InputError(
-                f"--cluster {address}: its scheduler has no workers; start some with: dask worker {address}"
-            )
-        client.run_on_scheduler(_allow_deaths, deaths=DEATHS)
-        # a task, and not scattered: what dies with a worker the scheduler then makes again
-        shared = client.submit(_same, job, pure=False)
-        tasks = [client.submit(_planned, shared, point, pure=False) for point in points]
-        try:
-            for done in distributed.as_completed(tasks, loop=client.loop):
-                yield done.result()
-                done.release()
-        except distributed.KilledWorker as fault:
-            raise NotSolvedError(
-                f"more than {DEATHS} workers died over one point; the points so far are kept ({fault})"
-            ) from None
+    try:
+        with client:
+            yield from _planned_by(client, distributed, address, job, points)
+    except distributed.KilledWorker as fault:
+        raise NotSolvedError(
+            f"more than {DEATHS} workers died over one point; the points so far are kept ({fault})"
+        ) from None
+    except (CancelledError, asyncio.CancelledError, distributed.comm.CommClosedError):
+        raise NotSolvedError(
+            f"--cluster {address}: the scheduler has gone, and with it what it was asked for; the points so far are kept: with a new "
+            "scheduler the same command goes on with them"
+        ) from None
+
+
+def _planned_by(
+    client: Any, distributed: Any, address: str, job: StudiedJob, points: Sequence[Point]
+) -> Iterator[tuple[Point, dict[str, Any]]]:
+    if not client.scheduler_info()["workers"]:
+        raise InputError(
+            f"--cluster {address}: its scheduler has no workers; start some with: dask worker {address}"
+        )
+    client.run_on_scheduler(_allow_deaths, deaths=DEATHS)
+    # a task, and not scattered: what dies with a worker the scheduler then makes again
+    shared = client.submit(_same, job, pure=False)
+    tasks = [client.submit(_planned, shared, point, pure=False) for point in points]
+    for done in distributed.as_completed(tasks, loop=client.loop):
+        yield done.result()
+        done.release()
 
 
 def _planned(job: StudiedJob, point: Point) -> tuple[Point, dict[str, Any]]:

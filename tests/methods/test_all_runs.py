@@ -28,6 +28,7 @@ def threads() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("threads")
+@pytest.mark.usual_sizes
 def test_many_short_runs_have_the_same_motion_on_any_number_of_threads() -> None:
     program = "G21 G90 G64 P0.05 F6000\n" + "".join(
         STROKE.format(*np.round(np.array([0.0, 3.0, 7.0, 11.0]) + 0.1 * k, 3)) for k in range(RUNS)

@@ -100,6 +100,7 @@ def test_isolated_corners_are_passed_at_the_closed_form_s_speed(dt, tolerance, n
     assert all(name.startswith("jerk.") for name in tight.limited_by)
 
 
+@pytest.mark.usual_sizes
 def test_a_search_of_several_windows_held_by_the_feed_ends_at_the_first_attempt():
     """Windows join where the first motion, kept on a coarse grid only, is a little faster than the feed."""
     turned = np.arange(800) * 0.7 / 20.0
@@ -140,6 +141,7 @@ def test_where_the_path_doubles_back_within_the_tolerance_it_is_not_slower_than_
     assert planner.plan(job, MACHINE, effort="quick").cycle_time > reshaped * (1 + 1e-2)
 
 
+@pytest.mark.usual_sizes
 def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_delivered(monkeypatch):
     """A zig-zag counts as large: it is searched in long steps only, and not at all with an interpolation period longer than them."""
     job = problems.zigzag(4)

@@ -10,6 +10,7 @@ import pytest
 import planner
 from benchmarks import problems
 from planner.base import threads
+from planner.base.sizes import USUAL
 from planner.motion import on_demand, timing
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.trajectory import COLUMNS, Trajectory
@@ -26,8 +27,9 @@ METHODS = ("optimal", "stop", "bezier", "fir", "kinematic")
 def both(request):
     """One job planned twice: with its samples kept, and without, in small chunks."""
     program, machine = problems.pentagon(), problems.machine()
-    kept = planner.plan(program, machine, method=request.param)
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timing, "SAMPLES_KEPT", USUAL.samples_kept)
+        kept = planner.plan(program, machine, method=request.param)
         patch.setattr(timing, "SAMPLES_KEPT", 50)
         patch.setattr(on_demand, "CHUNK", 77)
         yield kept, planner.plan(program, machine, method=request.param)

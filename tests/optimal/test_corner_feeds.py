@@ -70,6 +70,7 @@ def test_what_long_filters_hold_in_curves_is_said_to_be_theirs():
     assert "normal_acceleration" not in held
 
 
+@pytest.mark.usual_sizes
 def test_a_small_tolerance_somewhere_does_not_slow_curves_elsewhere():
     """By the closed form of the smallest tolerance the two half circles took 2.868 s."""
     machine = problems.machine(fir=Fir(time_constants=(0.06, 0.03)))

@@ -123,6 +123,7 @@ def test_auto_is_never_slower_than_single_corners(name):
     [problems.zigzag(), problems.star_spiral(60), problems.chord_circle(60)],
     ids=lambda own: own.source,
 )
+@pytest.mark.usual_sizes
 def test_bounds_are_less_than_what_corners_take(program, limited):
     """What `auto` does not even try could not have been faster: neither the closed form nor the coarse time is above the exact one."""
     rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
@@ -166,6 +167,7 @@ def test_corners_that_win_are_planned_by_themselves_on_both_grids_and_then_with_
     assert best.solution.cycle_time < slow.solution.cycle_time
 
 
+@pytest.mark.usual_sizes
 def test_a_part_of_a_path_is_the_same_path_there():
     """Pieces between full stops alone: the same corners, and the same time on each."""
     points = np.array([[k, 0.6 * (k % 2)] for k in range(8)])
@@ -219,6 +221,7 @@ def test_bands_are_the_same_in_parts_of_any_size(monkeypatch):
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
+@pytest.mark.usual_sizes
 def test_corners_that_no_grid_follows_are_no_rivals(monkeypatch):
     toolpath = toolpath_from_program(problems.star_spiral(60), MACHINE)
     stopping = toolpath.with_joints(np.array([20, 40]), Joint.STOP)

@@ -59,6 +59,7 @@ def test_the_envelope_keeps_every_peak() -> None:
     assert len(drawn) < 3 * profiles_figure.COLUMNS
 
 
+@pytest.mark.usual_sizes
 def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 500_000)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -195,8 +195,8 @@ def test_processes_of_this_machine_find_the_same(job: Path, tmp_path: Path) -> N
 
 
 @pytest.fixture
-def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
-    """A scheduler with two workers, as processes: its address and the workers."""
+def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]]]:
+    """A scheduler with two workers, as processes: its address, the workers and itself."""
     pytest.importorskip(
         "distributed", reason="distributed is not installed: pip install feedrate-planner[cluster]"
     )
@@ -223,7 +223,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
         for worker in workers:
             assert worker.stderr is not None
             assert any("Registered to" in line for line in worker.stderr)
-        yield address, workers
+        yield address, workers, scheduler
     finally:
         for process in started:
             process.kill()
@@ -233,9 +233,9 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 def test_a_cluster_goes_on_without_a_worker_that_is_killed(
-    cluster: tuple[str, list[subprocess.Popen[str]]], job: Path, tmp_path: Path
+    cluster: tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]], job: Path, tmp_path: Path
 ) -> None:
-    address, workers = cluster
+    address, workers, _ = cluster
     out, count = tmp_path / "out", 40
     arguments = ["sweep", str(job), "-o", str(out), "--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop"]
     command = [sys.executable, "-m", "planner", *arguments, "--cluster", address, "-q"]
@@ -262,6 +262,34 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed(
     own = planned_point(studied(), [Setting(name="axes.x.jerk", value=2e5)])
     assert own["cycle_time_s"] == pytest.approx(table["cycle_time_s"][-1], rel=1e-12)
     assert workers[1].poll() is None
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
+def test_a_scheduler_that_is_killed_ends_the_sweep_with_a_sentence(
+    cluster: tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]], job: Path, tmp_path: Path
+) -> None:
+    """What was planned stays, and the same command goes on with it."""
+    address, _, scheduler = cluster
+    out, count = tmp_path / "out", 60
+    command = [sys.executable, "-m", "planner", "sweep", str(job), "-o", str(out), "--method", "stop", "-q"]
+    command += ["--vary", f"x.jerk=1e5:2e5:{count}"]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        [*command, "--cluster", address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
+    ) as process:
+        while not (out / "points").exists() or not list((out / "points").glob("*.json")):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        scheduler.send_signal(signal.SIGKILL)
+        _, err = process.communicate(timeout=120)
+    there = len(list((out / "points").glob("*.json")))
+    assert 0 < there < count
+    assert process.returncode == 3, err
+    assert "the scheduler has gone" in err
+    assert "Traceback" not in err, err
+    done = subprocess.run([*command, "--threads", "1"], capture_output=True, text=True, env=env, check=True)
+    assert f"points   {count}, {there} of them planned before: {count} passed" in done.stdout
 
 
 @pytest.mark.slow

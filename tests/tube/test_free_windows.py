@@ -173,6 +173,7 @@ def test_ipopt_finds_nothing_more_where_it_ends(name):
     assert mine.steps.h.sum() < guess.h.sum() * (1 - 1e-3)
 
 
+@pytest.mark.usual_sizes
 def test_windows_find_what_the_whole_run_finds(monkeypatch):
     run, guess = begun("pentagon")
     whole = TubeOwn().solve(run, guess)
@@ -194,6 +195,7 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
         np.testing.assert_allclose(ends[:-1, column], state[1:, column], atol=tiny)
 
 
+@pytest.mark.usual_sizes
 def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
     run, guess = begun("pentagon")
     monkeypatch.setattr(own, "WINDOW", len(guess) // 3)

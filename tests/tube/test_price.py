@@ -110,6 +110,7 @@ CHANGES = {
 
 @pytest.mark.parametrize("name", ["corner", "arcs"])
 @pytest.mark.parametrize("what", CHANGES)
+@pytest.mark.usual_sizes
 def test_a_search_with_another_limit_confirms_the_price(name, what):
     """By 2 % more and 2 % less, whose difference is the slope, from the same start."""
     columns, price_of = CHANGES[what]

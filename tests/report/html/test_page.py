@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import re
+from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,7 @@ def page(plan: Plan) -> str:
     return report_page(plan, JOB.encode())
 
 
+@pytest.mark.usual_sizes
 def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:
     trajectory = plan.trajectory
     assert trajectory is not None
@@ -61,6 +62,7 @@ def test_columns_are_those_of_the_plan(page: str, plan: Plan) -> None:
     assert about["limits"][-1] == "none"
 
 
+@pytest.mark.usual_sizes
 def test_places_of_an_expanded_program_name_their_calls(tmp_path: Path) -> None:
     file = tmp_path / "calls.ngc"
     file.write_text(
@@ -165,6 +167,7 @@ def test_a_plan_without_a_solution_profile_has_a_report(job: Path) -> None:
     assert "column-t" in report_page(stop)
 
 
+@pytest.mark.usual_sizes
 def test_report_of_files_shows_the_same(tmp_path: Path, plan: Plan, page: str) -> None:
     write_plan(plan, tmp_path / "out", report=True)
     written = (tmp_path / "out" / "report.html").read_text("utf-8")
@@ -214,26 +217,23 @@ def test_page_renders_in_a_browser(browser: Any, plan: Plan) -> None:
 
 def test_a_page_names_the_scripts_that_it_may_run(page: str) -> None:
     """Each by the SHA-256 of its text, and those that the program brought with it are not among them."""
-    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page[:600])
-    assert policy
-    assert policy[1].startswith("default-src 'none'; script-src 'sha256-")
-    named = set(re.findall(r"'sha256-([^']*)'", policy[1]))
+    (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page[:600])
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    named = set(re.findall(r"'sha256-([^']*)'", policy))
     texts = re.findall(r'<script(?: type="text/plain" id="plotly")?>(.*?)</script>', page, re.DOTALL)
-    sums = {base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts}
-    assert len(texts) == 2
-    assert named == sums
+    sums = {b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts}
+    assert (len(texts), named) == (2, sums)
     assert not re.search(r"\son\w+=", page.partition("<body>")[2].partition('id="plotly"')[0])
 
 
 @pytest.mark.slow
 def test_a_browser_runs_nothing_else(page: str, tmp_path: Path) -> None:
-    """A second line of defence: were something of a program taken for HTML, it would still not run."""
-    file = tmp_path / "attacked.html"
+    file = tmp_path / "attacked.html"  # as if something of a program were taken for HTML
     attack = "<script>document.title = 'ran'</script><img src=x onerror=\"document.title = 'ran'\">"
     file.write_text(page.replace("<header>", f"{attack}<header>"), encoding="utf-8")
     for browser in opened(file):
         assert browser.title == "job <b>.ngc · planned"
-        said = [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+        said = [entry["message"] for entry in browser.get_log("browser")]
         assert sum("Content Security Policy" in one for one in said) >= 2, said
 
 

@@ -64,7 +64,10 @@ def _each(names: str, text: str) -> dict[str, str]:
 IGNORED = {
     **_each("LT UL", "lines are drawn solid"),
     **_each("PW WU PT PC NP CR LA AC FT TR MC SV CF", "ink only"),
-    **_each("FS AP EC QL NR BP PS MT RP", "how the device works or is fed"),
+    **_each("FS AP QL BP PS MT", "how the device works or is fed"),
+    "RP": "the drawing is plotted once",
+    "EC": "the paper is not cut",
+    "NR": "no wait for the next page",
     "AS": "the machine file has the accelerations",
     "IW": "nothing is clipped to a window",
     "CT": "arcs are true arcs, not chords",
@@ -72,6 +75,9 @@ IGNORED = {
     **_each("OA OC OD OE OF OG OH OI OK OL OO OP OS OT OW IM IV", "questions to a device"),
     **_each("CO WD BL MG", "comments and messages"),
 }
+
+# Of these: what would change the path or its time, some with numbers only, without which they are the default.
+CHANGING, WITH_NUMBERS = frozenset(("RP", "EC", "NR")), frozenset(("LT", "IW", "AS"))
 
 _OUTLINES = "convert it to lines and arcs in the drawing program ('export as outlines', 'as curves')"
 _PLAIN = "export the drawing as plain HPGL with PU and PD"

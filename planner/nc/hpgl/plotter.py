@@ -26,7 +26,15 @@ from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl.arcs import circle_through
 from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point
-from planner.nc.hpgl.instructions import ALLOWED, FORMS, IGNORED, PAGE_ENDS, REFUSED
+from planner.nc.hpgl.instructions import (
+    ALLOWED,
+    CHANGING,
+    FORMS,
+    IGNORED,
+    PAGE_ENDS,
+    REFUSED,
+    WITH_NUMBERS,
+)
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
 from planner.nc.program import Kind, Program
@@ -78,6 +86,7 @@ class _Run:
         self.reports: list[tuple[int, int, str]] = []
         self.notes: dict[str, None] = {}  # ordered, each once
         self.ignored: dict[str, list[int]] = {}
+        self.changing: dict[str, list[int]] = {}  # of these, what may change the path or its time
         self.position: Point = (0.0, 0.0)
         self.down = False
         self.drawn = False
@@ -119,9 +128,11 @@ class _Run:
             assumed.append(
                 f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows"
             )
-        for name, places in self.ignored.items():
-            line, times = self._place(places[0])[0], f"{len(places)} times, first " if len(places) > 1 else ""
-            notes.append(f"{name} ignored, {times}on line {line}: {IGNORED.get(name, 'the end of a page')}")
+        for ignored, said in ((self.changing, assumed), (self.ignored, notes)):
+            for name, places in ignored.items():
+                times = f"{len(places)} times, first " if len(places) > 1 else ""
+                why = IGNORED.get(name, "the end of a page")
+                said.append(f"{name} ignored, {times}on line {self._place(places[0])[0]}: {why}")
         if self.unknown:
             count, first = len(self.unknown), self.unknown[0]
             what = (
@@ -157,6 +168,11 @@ class _Run:
             return
         if form is None:
             if name in IGNORED or (name == "SM" and not it.text.strip(b"; \r\n")):
+                if name in CHANGING or (name in WITH_NUMBERS and numbers):
+                    if self.strict:
+                        raise _NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
+                    self.changing.setdefault(name, []).append(it.at)
+                    return
                 self.ignored.setdefault(name, []).append(it.at)
                 return
             raise _NotDrawn(REFUSED.get(name, f"there is no such instruction; allowed are {ALLOWED}"))

@@ -15,6 +15,7 @@ from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.said import ASSUMED
 from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import at_place, in_plane
 from planner.nc.program import Kind
@@ -140,6 +141,13 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 
 
+def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """Sentences of said.ASSUMED by their names. Raises ValueError where nothing may be assumed."""
+    for name in given:
+        making.assume(ASSUMED[name])
+    return []
+
+
 def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
@@ -202,6 +210,7 @@ MAKERS: dict[str, Maker] = {
     "siemens frame": frames.siemens,
     "heidenhain frame": frames.heidenhain,
     "out of plane": out_of_plane,
+    "assume": _assume,
     "keep": keep,
     "bring back": bring_back,
     **siemens_cycles.MAKERS,

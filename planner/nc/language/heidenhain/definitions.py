@@ -162,8 +162,10 @@ class Definitions(Flow):
             return contour.transformed(block, cycle, column)
         if cycle == 32:
             found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
-            if found is None:
+            if found is None and part != 1:
                 return []  # 32.2: filter and rotary axes
+            if found is None:  # the machine's tolerance again
+                return [Line(block.place, (word("G", at, Number(64.0)),))]
             tolerance, _ = value(block, column + found.end())
             return [Line(block.place, (word("G", at, Number(64.0)), word("P", at, tolerance)))]
         if cycle == 9:

@@ -105,7 +105,9 @@ class Moves:
                 (DIRECTION[0], minus(ends.get("X", X), X)),
                 (DIRECTION[1], minus(ends.get("Y", Y), Y)),
             ]
-        return [Line(block.place, tuple(words), tuple(assigned))] if ends else []
+        if not ends:
+            words = self.feed_words(block, given)
+        return [Line(block.place, tuple(words), tuple(assigned))] if words else []
 
     def by_plane(
         self, block: ConversationalBlock, rows: Callable[[int], list[Statement] | None]

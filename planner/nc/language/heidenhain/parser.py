@@ -19,8 +19,8 @@ import re
 from collections.abc import Callable
 
 from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.heidenhain.codes import REMEDY, Codes
 from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
-from planner.nc.language.heidenhain.definitions import Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.heidenhain.items import (
     PLANE,
@@ -53,7 +53,6 @@ from planner.nc.language.tree import (
     SourcePlace,
     Statement,
 )
-from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
@@ -61,14 +60,10 @@ _FUNCTION = re.compile(
     r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
     re.IGNORECASE,
 )
-# M codes that follow or leave the tilt of the tool; small steps and open corners of contours; feeds of plunging and per turn; M140
-# retracts the tool.
-_REFUSED = (89, 92, 97, 98, 103, 114, 115, 128, 129, 136, 140, 144)
 _MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
-_AT_END = (2, 30)  # M codes that end the program
 
 
-class HeidenhainParser(Definitions):
+class HeidenhainParser(Codes):
     """Statements of a conversational program. Faults of all its blocks are kept in `faults`."""
 
     def __init__(self, source: Source):
@@ -166,7 +161,7 @@ class HeidenhainParser(Definitions):
         if found is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
             raise block.fault(
-                f"{name or block.text[:20]} of the conversational language is not read{why}; {_REMEDY}"
+                f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
             )
         if name not in _MOVES:
             return read(self, block, found.end())
@@ -274,58 +269,12 @@ class HeidenhainParser(Definitions):
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
         return [Line(block.place, (), (*named, (PLANE, Number(float(normal)))))]
 
-    def _codes(
-        self, block: ConversationalBlock, given: Items, *, straight: bool = False
-    ) -> tuple[list[Statement], list[Statement], bool]:
-        """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates, as `straight` moves
-        may."""
-        before: list[Statement] = []
-        after: list[Statement] = []
-        machine = False
-        for code, column in given.codes:
-            row = Line(block.place, (word("M", block.byte(column), Number(float(code))),))
-            if code == 99:
-                after += self._call_cycle(block)
-            elif code == 91 and not straight:
-                raise block.fault("M91, machine coordinates, is read in L", column)
-            elif code == 91:
-                machine = True
-            elif code in (13, 14):
-                spindle = Number(3.0 if code == 13 else 4.0)
-                before.append(
-                    Line(
-                        block.place,
-                        (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
-                    )
-                )
-            elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
-                before += [row, looked_up(block)]
-            elif code in _REFUSED:
-                raise block.fault(f"M{code} is not read: it changes how the axes move; {_REMEDY}", column)
-            elif code in _AT_END and self.file:
-                after.append(Return(block.place))
-            elif code in (0, 1, 5, 9, *_AT_END):
-                after.append(row)
-            else:
-                before.append(row)
-        return before, after, machine
-
-    def _code(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        before, after, _ = self._codes(block, items(block, 0))
-        return [*before, *after]
-
-    def _stop(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        given = items(block, column)
-        before, after, _ = self._codes(block, given)
-        return [*before, Line(block.place, (word("M", block.place.at, ZERO),)), *after]
-
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 
     def _cycle_call(self, block: ConversationalBlock, column: int) -> list[Statement]:
         rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
         if rest is None:
-            given = items(block, column)
-            before, after, _ = self._codes(block, given)
+            before, after = self._codes_alone(block, column)
             return [*before, *self._call_cycle(block), *after]
         given = items(block, column + rest.end())
         before, after, _ = self._codes(block, given)
@@ -333,7 +282,6 @@ class HeidenhainParser(Definitions):
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
 
 
-_REMEDY = "let the CAM system write the moves out as L, C and CC"
 _WHY = {
     "LN": "moves with a normal of the surface or a direction of the tool need its compensation in space; angles A, B, C are read",
     **dict.fromkeys(

@@ -12,6 +12,7 @@ import re
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.said import assumed_row
 from planner.nc.language.siemens import codes, cycles, drilling
 from planner.nc.language.siemens.calls import Calls
 from planner.nc.language.siemens.commands import as_word
@@ -19,6 +20,7 @@ from planner.nc.language.siemens.text import TokenReader, operation, position
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
     ONE,
+    TWO,
     ZERO,
     Expression,
     Line,
@@ -41,6 +43,7 @@ class BlockWords(Calls):
 
     source: Source
     circular = False
+    centre_feed = False  # the program has CFTCP
 
     def _words(self, reader: TokenReader) -> None:
         """A row of words, commands that move nothing, and assignments."""
@@ -75,6 +78,11 @@ class BlockWords(Calls):
                 self._cycle(reader, name)
             elif name == "KONT" and self.compensates:
                 raise reader.fault("KONT, another approach to the contour, is not read; write NORM", token.at)
+            elif name == "STOPRE":  # the block before it ends in an exact stop, until the control has read on
+                stops = True
+            elif name in codes.SAID:
+                made.append(assumed_row(reader.place, codes.SAID[name]))
+                _skip(reader)
             elif name in codes.IDLE or (name in codes.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
                 _skip(reader)
             elif reader.peek() == "=" and (name in self.names or re.fullmatch(r"R\d+", name)):
@@ -176,7 +184,9 @@ class BlockWords(Calls):
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
             raise reader.fault(f"{name} is not read; {codes.REMEDY}", at - reader.start)
         given = Number(number) if number is not None else self._given(reader, letter, at)
-        # Offsets D belong to the control: lengths come from [tools]. A tool by its name has no number.
+        if letter == "D":
+            self.body.append(assumed_row(reader.place, "tool offset"))
+        # A tool by its name has no number.
         return [] if given is None or letter == "D" else [as_word(letter, at, given)]
 
     def _code(self, reader: TokenReader, code: int, at: int) -> list[Word]:
@@ -190,6 +200,13 @@ class BlockWords(Calls):
             raise reader.fault(
                 "G451, outer corners by their intersection, is not read; write G450", at - reader.start
             )
+        if code == 621:
+            self.body.append(assumed_row(reader.place, "corner feed"))
+        if code in (41, 42) and not self.centre_feed:
+            self.body.append(assumed_row(reader.place, "tool centre feed"))
+        if code == 500:
+            origin = [as_word("G", at, Number(10.0)), as_word("L", at, TWO), as_word("P", at, Number(9.0))]
+            self.body.append(Line(reader.place, (*origin, *(as_word(axis, at, ZERO) for axis in "XYZ")), ()))
         if code in _SIDES:
             return [as_word("G", at, Number(float(code)))]
         if code == 9:

@@ -37,7 +37,7 @@ class Calls(Commands):
         if (
             reader.tokens[reader.next].kind != "name"
             or not _CALLED.fullmatch(name)
-            or name in self.names | codes.IDLE | codes.IDLE_CALLS
+            or name in self.names | codes.IDLE | codes.IDLE_CALLS | codes.SAID.keys()
         ):
             return False
         behind = reader.peek(1)

@@ -61,8 +61,8 @@ CORNER_M = Assumption(
     changes=True,
 )
 SCALE_M = Assumption(
-    "code of a 3-D printer that shifts or scales its axes",
-    "codes of a 3-D printer that shift or scale its axes",
+    "code of a 3-D printer that shifts or scales its axes, or changes how they move",
+    "codes of a 3-D printer that shift or scale its axes, or change how they move",
     "not followed: positions are those of the program",
     changes=True,
 )
@@ -92,10 +92,12 @@ PARKS = Assumption(
 # By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
 EXTRUDER_MODES = frozenset((82, 83))
 _PARKING = frozenset((125, 600, 701, 702))
-_WAITING = frozenset((109, 116, 190, 191))
+_WAITING = frozenset((109, 116, 190, 191, 303))
 _MOVES_FINISHED = 400  # waits until the axes stand
 _CORNERS = frozenset((205, 566))
-_SCALES = frozenset((92, 206, 218, 556, 579, 665, 666))
+# Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that are loaded, shaping, and
+# which carriage follows.
+_SCALES = frozenset((92, 206, 218, 221, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666))
 # fmt: off
 _OF_AXES = frozenset((
     17, 18, 84, 92, 201, 202, 203, 204, 205, 206, 207, 208, 218, 301, 304, 350, 425, 557, 558, 566, 569,

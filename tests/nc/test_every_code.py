@@ -42,7 +42,8 @@ def outcome(text: str, without: Program, reading: Reading) -> str:
         return "refused" if fault.line is not None else f"refused without a line: {fault}"
     if set(program.assumptions) - set(without.assumptions):
         return "said"
-    return NOTHING if motion(program) == motion(without) else "moves"
+    same = motion(program) == motion(without) and program.limits == without.limits
+    return NOTHING if same else "moves"
 
 
 def doing_nothing(
@@ -110,6 +111,40 @@ G_TABLE = sorted(
 def test_g_codes() -> None:
     words = [f"G{codes.number(code)}" for code in G_TABLE]
     assert doing_nothing(words, FORMS, rs274, Reading()) == set(G_NOTHING)
+
+
+PRINTER = {
+    (17, 18, 84): "the motors' current",
+    (73, 105, 114, 115, 117, 118, 119, 155, 413, 486, 503, 862, 928): "progress, questions, messages, reports",
+    (82, 83): "E as a place or a step; the program has no extruder",
+    (104, 140, 141, 106, 107, 108, 110, 111): "temperatures that nothing waits for, fans, the line number, log level",
+    (120, 121, 126, 127, 142, 143, 144, 145, 149, 150, 163, 164): "endstops, valves, standby, units of temperatures, lights, mixes",
+    (201, 202, 204, 220): "without the values that limit something here (tests/nc/test_set_limits.py has them)",
+    (207, 208): "lengths of retractions, which G10 and G11 say",
+    (240, 250, 280, 300): "cameras, contrast, servos, sounds: nothing waits for them",
+    (301, 302, 304, 305): "control of temperatures",
+    (412, 500, 504): "the filament's sensor, settings that are kept",
+    (557, 558, 569, 574, 575, 584, 851): "probes, drivers, switches: what is measured or wired",
+    (572, 900): "the extruder leads the way; the way is as it is",
+    (906, 907, 913, 914): "currents of motors",
+}  # fmt: skip
+M_OF_RS274 = {
+    (3, 4, 5, 19): "spindle: feeds are per minute (G94)",
+    (7, 8, 9): "coolant",
+    (48, 49, 50, 51, 52, 53): "whether overrides count; nobody turns them in a plan",
+    (61,): "the number of the loaded tool, whose length no G43 asks for here",
+    (62, 63, 64, 65): "outputs",
+    (66,): "an input that nothing waits for; with a wait it is refused",
+    (70, 71): "keeps or forgets modes; M72 brings them back",
+}
+MORE = ("", "P1", "Q1", "S500", "X20 Y7 Z1", "P1 Q1", "S150 R5")
+
+
+@pytest.mark.slow
+def test_m_codes() -> None:
+    words = [f"M{n}" for n in range(1000)]
+    nothing = {f"M{n}" for numbers in (*PRINTER, *M_OF_RS274) for n in numbers}
+    assert doing_nothing(words, MORE, rs274, Reading()) == nothing
 
 
 def test_g_codes_of_no_table_are_refused() -> None:

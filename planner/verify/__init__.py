@@ -5,8 +5,10 @@ that it chooses itself; and nothing else of the package: no sampling of the path
 sharp each check is:
 
     times.py      where it looks between the samples
-    limits.py     velocity, acceleration, jerk per axis, feed, normal acceleration: on the columns and on differences of the
-                  delivered positions
+    limits.py     velocity, acceleration, jerk per axis, normal acceleration: on the columns and on differences of the delivered
+                  positions
+    switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
+    feed.py       the feed against the F word of that block, of every chord and every delivered speed
     own.py        limits of one's own that the machine came with, by their laws
     matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
     contour.py    how far motion and path are apart, also where a motion was lost

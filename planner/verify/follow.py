@@ -10,7 +10,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.verify import limits as rows
 from planner.verify.findings import Look
 from planner.verify.kernel import kernel
-from planner.verify.matching import SEARCH_MAX, SEARCHED, AtStop, Located, match_samples, new_match
+from planner.verify.matching import SEARCH_MAX, SEARCHED, AtStop, Located, match_samples, new_match, nowhere
 from planner.verify.pieces import ProgramPieces, reach_piece
 from planner.verify.stream import Observed
 
@@ -49,12 +49,12 @@ def follow(
         skip = len(carried_t)
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
-        place = Located(np.zeros(len(t), dtype=np.int64), np.zeros(len(t)))
+        place = nowhere(len(t))
         match_samples(pieces, seen.match, t, position, skip, False, anywhere, place)
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, place.piece, position, ratio)
-            each(t[skip:], ratio[skip:], Located(place.piece[skip:], place.feed_max[skip:]))
+            each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
         seen.samples += len(t) - skip
         seen.last, seen.t_last = position[-1].copy(), float(t[-1])
         carried_t, carried = t[-1:], position[-1:]

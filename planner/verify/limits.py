@@ -20,8 +20,8 @@ measured, so that a motion beyond a limit is not also called a liar.
 Without a limit on jerk acceleration may jump within every period, and the acceleration column cannot be refuted; nor can the
 jerk column, which may jump anyhow.
 
-Feed is |v| over all axes, rotary ones at the radius of the path, as its segments have it. Normal acceleration is |a - (a.t) t| with
-t = v/|v| over x, y and z; its share of the chord error over a period is
+The row of the feed, |v| over all axes with rotary ones at the radius of the path, is of feed.py. Normal acceleration is
+|a - (a.t) t| with t = v/|v| over x, y and z; its share of the chord error over a period is
 |normal acceleration| h^2 / 8. Where velocity or acceleration was not delivered it is taken from the second difference, a mean of
 a(t) over w = t2 - t0, across the chord's direction u. With normal acceleration <= N, |a| <= A and speed >= v the motion's direction
 turns by at most N w / v in that time, and u lies within its turn, so that of the mean
@@ -107,14 +107,12 @@ def scan(
     columns: SampleColumns,
     skip: int,
     allowed: Allowed,
-    feed_max: FloatArray,
     travelled: float,
     worst: Worst,
     work: FloatArray,
 ) -> float:
     """Write into `worst` what is worse in samples `skip` to the last; up to three samples before them serve the differences.
 
-    feed_max  : (n,) programmed feed at each sample [mm/s]
     travelled : path length run before [mm]
     work      : (4, A, 4) room for d0 .. d3 and their rounding, now and at the sample before
 
@@ -150,8 +148,7 @@ def scan(
             continue
         how = COLUMN if judged[0] and judged[1] else DIFFERENCE
         if how == COLUMN:
-            feed, normal = _feed_and_normal(velocity, acceleration, k, linear)
-            _keep(worst, alone + FEED, feed, feed_max[k], k, COLUMN)
+            normal = _normal(velocity, acceleration, k, linear)
             _keep(worst, alone + NORMAL, normal, normal_max, k, COLUMN)
         else:
             normal = 0.0
@@ -161,12 +158,6 @@ def scan(
                 )
                 _keep(worst, alone + NORMAL, normal - taken_off, normal_max, k, DIFFERENCE)
         if k > first:
-            most_feed = max(feed_max[k], feed_max[k - 1])
-            rounding_sq = 0.0
-            for axis in range(axes):
-                rounding_sq += error_before[axis, 1] ** 2
-            value = max(step / period - math.sqrt(rounding_sq), 0.0)
-            _keep(worst, alone + FEED, value, most_feed, k, DIFFERENCE)
             _keep(worst, alone + CHORD, normal * period * period / 8.0, 1.0, k, how)
     return travelled
 
@@ -242,23 +233,19 @@ def _of_columns(
 
 
 @kernel()
-def _feed_and_normal(
-    velocity: FloatArray, acceleration: FloatArray, k: int, linear: Array
-) -> tuple[float, float]:
-    feed_sq, linear_sq, along = 0.0, 0.0, 0.0
+def _normal(velocity: FloatArray, acceleration: FloatArray, k: int, linear: Array) -> float:
+    linear_sq, along = 0.0, 0.0
     for axis in range(len(linear)):
-        feed_sq += velocity[k, axis] ** 2
         if linear[axis]:
             linear_sq += velocity[k, axis] ** 2
             along += velocity[k, axis] * acceleration[k, axis]
-    feed = math.sqrt(feed_sq)
     if linear_sq <= FEED_AT_REST * FEED_AT_REST:
-        return feed, 0.0
+        return 0.0
     normal_sq = 0.0
     for axis in range(len(linear)):
         if linear[axis]:
             normal_sq += (acceleration[k, axis] - along * velocity[k, axis] / linear_sq) ** 2
-    return feed, math.sqrt(normal_sq)
+    return math.sqrt(normal_sq)
 
 
 @kernel()

@@ -107,10 +107,19 @@ class AtStop(NamedTuple):
 
 
 class Located(NamedTuple):
-    """Where each of n samples lies: its piece (n,), and the largest feed (n,) of those it can lie on [mm/s]."""
+    """Where each of n samples lies: its piece (n,), the largest feed (n,) of those it can lie on [mm/s], and the first and the last of
+    these pieces (n,), the last one -2 where the motion is lost."""
 
     piece: Array
     feed_max: FloatArray
+    first: Array
+    last: Array
+
+
+def nowhere(samples: int) -> Located:
+    """Of so many samples, to be written."""
+    piece, first, last = np.zeros((3, samples), dtype=np.int64)
+    return Located(piece, np.zeros(samples), first, last)
 
 
 @kernel()
@@ -153,6 +162,9 @@ def match_samples(
                     _watch_stop(pieces, match, i, period, parts, at_stop)
             for axis in range(axes):
                 before[axis] = point[axis]
+        place.first[k], place.last[k] = match.tally[FIRST], match.tally[LAST]
+        if match.tally[ASTRAY]:
+            place.last[k] = -2
 
 
 @kernel(inline=True)

@@ -57,7 +57,10 @@ class Reader:
         for chunk in samples:
             self._take(seen, chunk)
             progress(seen.seen.samples / len(self.trajectory))
+        seen.finish()
         looks = [Look(seen.seen, "")]
+        if between is not None:
+            between.finish()
         if between is not None and between.seen.samples:
             looks.append(Look(between.seen, "between the samples"))
         return looks

@@ -16,10 +16,12 @@ from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
 from planner.verify.axes_apart import both_apart
 from planner.verify.excess import Spans
-from planner.verify.limits import GROUPS, OVER, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
-from planner.verify.matching import AtStop, Located, Match, match_samples, new_match
+from planner.verify.feed import Feeds
+from planner.verify.limits import FEED, GROUPS, OVER, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
+from planner.verify.matching import AtStop, Match, match_samples, new_match, nowhere
 from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import ProgramPieces
+from planner.verify.switches import Bounds, Chords
 
 BLOCK_SAMPLES = SIZES.judged_at_once
 CARRIED = 3  # samples before a block that its third differences need
@@ -91,7 +93,16 @@ class Watch:
         )
         self._pieces, self._limits, self._middles = pieces, limits, middles
         self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
-        self._feed_max, self._travelled = np.empty(0), 0.0
+        self._travelled = 0.0
+        self._feeds = Feeds(
+            pieces,
+            Bounds(
+                velocity=limits.per_axis[0],
+                digits=np.append(limits.rounding, limits.time_rounding),
+                acceleration=float(np.linalg.norm(limits.acceleration_at_stop)),
+            ),
+            self.seen.over,
+        )
 
     def take(self, chunk: Trajectory) -> None:
         """The next samples."""
@@ -99,25 +110,35 @@ class Watch:
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
             data = SampleColumns(*(np.concatenate(pair) for pair in zip(self._carried, new, strict=True)))
-            feed_max = np.concatenate([self._feed_max, np.full(len(new[0]), np.inf)])
             self._travelled = _block(
-                self.seen, data, feed_max, self._pieces, self._limits, self._middles, self._travelled
+                self.seen, data, self._feeds, self._pieces, self._limits, self._middles, self._travelled
             )
             # copies: views would keep the whole block
             self._carried = [column[-CARRIED:].copy() for column in data]
-            self._feed_max = feed_max[-CARRIED:].copy()
+
+    def finish(self) -> None:
+        """No more samples: what had to wait for them."""
+        feeds, seen = self._feeds, self.seen
+        feeds.finish()
+        row = GROUPS * self._pieces.vertex.shape[1] + FEED
+        seen.worst[row], seen.time[row], seen.at[row], seen.piece[row] = (
+            feeds.row,
+            feeds.time,
+            feeds.at,
+            feeds.piece,
+        )
 
 
 def _block(
     seen: Observed,
     data: SampleColumns,
-    feed_max: FloatArray,
+    feeds: Feeds,
     pieces: ProgramPieces,
     limits: Limits,
     middles: bool,
     travelled: float,
 ) -> float:
-    """Take in one block, the carried samples first; writes feed_max, returns the path length run so far."""
+    """Take in one block, the carried samples first; returns the path length run so far."""
     t, position = data.t, data.position
     skip = min(seen.samples, CARRIED)
     if not skip:
@@ -126,9 +147,16 @@ def _block(
     seen.samples += len(t) - skip
     periods = np.diff(t[max(skip - 1, 0) :])
     seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
-    piece = np.zeros(len(t), dtype=np.int64)
+    place = nowhere(len(t))
+    piece = place.piece
     at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
-    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, Located(piece, feed_max))
+    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, place)
+    speed = np.full(len(t), np.nan)
+    if limits.judged[0]:
+        speed = np.sqrt(np.einsum("na,na->n", data.velocity, data.velocity))
+    feeds.take(
+        Chords(t, np.zeros(len(t)), np.zeros(len(t)), speed, piece, position), skip, place.first, place.last
+    )
     seen.apart = np.maximum(seen.apart, both_apart(pieces, piece[skip:], position[skip:], limits.axes))
     block = SampleBlock(
         t=t,
@@ -153,7 +181,7 @@ def _block(
     )
     work = np.zeros((4, position.shape[1], 4))
     over = np.zeros((len(t), OVER))
-    travelled = scan(data, skip, allowed, feed_max, travelled, Worst(worst, sample, over), work)
+    travelled = scan(data, skip, allowed, travelled, Worst(worst, sample, over), work)
     seen.over.take(t, over)
     new = np.flatnonzero(sample >= 0)
     seen.worst[new] = worst[new]

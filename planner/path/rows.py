@@ -14,7 +14,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
-from planner.corners.blend import shape_at
+from planner.corners.blend import corner_point, shape_at
+from planner.geometry.legs import leg_point
 from planner.path.calm import SWITCHING_WAY, interval_ends
 
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
@@ -100,6 +101,34 @@ def _corner_parameter(corners, k, z):
         w = 0.5 * (wa + wb)
         X, Y = shape_at(corners[k], w, w)
         if Y[0] - X[0] < z:
+            wa = w
+        else:
+            wb = w
+    return 0.5 * (wa + wb)
+
+
+@njit(cache=True, error_model="numpy")
+def _corner_passes(legs, corners, k, leg, x, z, changes):
+    """w of corner k where it passes the place x [mm] on a leg, z after the vertex: its matched point, or, where the feed changes there,
+    the nearest one to rounding, from which on the next feed holds."""
+    if not changes:
+        return _corner_parameter(corners, k, z) if z != 0.0 else 0.5
+    axes = len(legs[leg].start)
+    place, out, one, other = (
+        np.empty((4, axes)),
+        np.empty((4, axes)),
+        np.empty((4, axes)),
+        np.empty((4, axes)),
+    )
+    leg_point(legs, leg, x, place)
+    wa, wb = 0.0, 1.0
+    for _ in range(60):
+        w = 0.5 * (wa + wb)
+        corner_point(legs, corners, k, w, w, one, other, out)
+        away = 0.0
+        for a in range(axes):
+            away += (out[0, a] - place[0, a]) * out[1, a]
+        if away < 0.0:
             wa = w
         else:
             wb = w
@@ -243,21 +272,23 @@ def cut_path(table, joints, limits, longest):
             for i in range(joints.run_first[run], joints.run_first[run + 1]):
                 rows, n, seg = _cut_span(rows, n, spans[i], len(legs) + i, seg, joints.passed, pace, longest)
         elif joints.blended[k]:
-            vertex, breaks = start + length, joints.breaks[k]
+            vertex, breaks, wa = start + length, joints.breaks[k], 0.0
             for seg in range(first[leg], first[k]):
-                begin, end = place[seg] - start, place[seg + 1] - start if seg + 1 < first[k] else length
+                end = place[seg + 1] - start if seg + 1 < first[k] else length
                 if end > length - d_in:
-                    wa = _corner_parameter(corners, k, begin - length) if begin > length - d_in else 0.0
-                    wb = _corner_parameter(corners, k, end - length) if seg + 1 < first[k] else 0.5
+                    wb = _corner_passes(legs, corners, k, leg, end, end - length, feed[seg + 1] != feed[seg])
                     rows, n = _cut_corner(rows, n, corners, k, seg, (wa, wb), vertex, breaks)
+                    wa = max(wa, wb)
             for seg in range(first[k], first[k + 1]):
                 begin = place[seg] - place[first[k]]
                 end = place[seg + 1] - place[first[k]] if seg + 1 < first[k + 1] else legs[k].length
                 if begin >= d_out:
                     break
-                wa = _corner_parameter(corners, k, begin) if seg > first[k] else 0.5
-                wb = _corner_parameter(corners, k, end) if end < d_out else 1.0
+                wb = 1.0
+                if end < d_out:
+                    wb = _corner_passes(legs, corners, k, k, end, end, feed[seg + 1] != feed[seg])
                 rows, n = _cut_corner(rows, n, corners, k, seg, (wa, wb), vertex, breaks)
+                wa = max(wa, wb)
         if joints.is_stop[k]:
             rows = grown(rows, n + 1)
             before = rows[n - 1]

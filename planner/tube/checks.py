@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.tube.legs import LegFormulas, along_tangent, formula_point, nearest_point
+from planner.tube.run import TubeRun
 
 PLACES = 33  # where a step is looked at first [-]
 NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
+AWAY = 1e-12  # rounding of (p - V).v, in tolerances and largest speeds [-]
 # Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
 PIECES = 4
 
@@ -202,3 +204,22 @@ def worst_shares(keeps, leg, h, state, jerk, place):
             share, before = _of_line(keeps, r, c, before, end, ends, budgets, work)
         tube = max(tube, share)
     return limit, tube
+
+
+def switches_kept(run: TubeRun, leg: Array, state: FloatArray) -> bool:
+    """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end: where the feed falls the way
+    to the vertex comes nearer up to its node, where it rises the way from there on goes away.
+
+    leg (N,), state (N+1, 3, A)
+    """
+    begins = np.flatnonzero(np.diff(leg)) + 1  # the nodes at vertices
+    edges = np.concatenate([[0], begins, [len(leg)]])
+    for k, node in enumerate(begins):
+        way = run.switch[leg[node]]
+        if way == 0.0:
+            continue
+        part = slice(edges[k], node + 1) if way > 0 else slice(node, edges[k + 2] + 1)
+        away = ((state[part, 0] - run.vertex[leg[node]]) * state[part, 1]).sum(axis=1)
+        if (way * away > AWAY * run.vertex_budget[leg[node]] * np.linalg.norm(run.velocity)).any():
+            return False
+    return True

@@ -13,9 +13,11 @@ from planner.tube.rows import (
     FEED_ROWS,
     NORMAL_MID,
     NORMAL_NODE,
+    SWITCH,
     TUBE_NODE,
     VECTOR_OF_NODE,
     VECTORS,
+    second_of,
 )
 
 
@@ -81,11 +83,11 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
             G[m, k, k] += ratio[r] * lin.n[i, r, k] * lin.n[i, r, k]
             continue
         kind, flat = r - more, 0.0
-        c = kind - TUBE_NODE
-        if 1 <= c <= 2 and legs.radius[limits.leg[i]] > 0.0:
-            other = VECTOR_OF_NODE[c - 1]
+        c, second = kind - TUBE_NODE, second_of(kind)
+        if second >= 0 and (kind == SWITCH or legs.radius[limits.leg[i]] > 0.0):
+            other = VECTOR_OF_NODE[second]
             own = lin.alpha[i, m], lin.e[i, m], lin.n[i, r]
-            _add_row(W, axes, own, (lin.alpha[i, other], lin.e[i, other], lin.node[i, c - 1]), ratio[r])
+            _add_row(W, axes, own, (lin.alpha[i, other], lin.e[i, other], lin.node[i, second]), ratio[r])
         else:
             for k in range(axes):
                 for t in range(axes):

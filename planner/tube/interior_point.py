@@ -134,7 +134,7 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         np.zeros((N, VECTORS, axes)),
         np.zeros((N, 3, axes)),
     )
-    node = np.zeros((N, 2, axes))
+    node = np.zeros((N, 3, axes))
     lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)))
     factor = Factor(np.zeros((N, C, S)), np.zeros((N, C, C)), np.zeros((N + 1, S, S)))
     slacks = Slacks(np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many))

@@ -21,7 +21,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.tube.checks import Keeps, normal_shares, worst_shares
+from planner.tube.checks import Keeps, normal_shares, switches_kept, worst_shares
 from planner.tube.guess import Guess
 from planner.tube.interior_point import Tuning, solve_window
 from planner.tube.legs import LegFormulas
@@ -283,6 +283,8 @@ class _Search:
         if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
             across = normal_shares(self._keeps, leg, h, found, jerk)
             tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
+            return False
+        if not switches_kept(run, leg, found):
             return False
         if not self.settings.divide or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = place + run.offset[leg][:, None]

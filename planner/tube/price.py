@@ -10,7 +10,7 @@ they were, whence (Euler)
     sum of velocities and feed  +  2 sum of accelerations and of the normal one  +  3 sum of jerks   =   -T
 
 but for the pull on durations (nlp.py) and the rows in `OTHER`, which are no limits: bounds of durations, the order along the leg, the
-largest length of a step on an arc.
+largest length of a step on an arc, the place of a change of the feed.
 
 The tolerance acts through what eq. (20) leaves of it for the path (run.py): priced is the room of every leg and of every vertex.
 """
@@ -49,7 +49,9 @@ def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_MID],
             more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, 0.0, node),
             np.where(at_vertex, node, 0.0),
-            more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC]].sum(axis=1),
+            more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH]].sum(
+                axis=1
+            ),
         ]
     )
     return -window.second * price

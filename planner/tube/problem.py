@@ -130,6 +130,8 @@ def _limits(
         h=h,
         h_max=h * longer,
         h_min=h / LONGER,
+        switch=np.where(at_vertex, run.switch[leg], 0.0),
+        aside=NARROWED * narrow[0],
     )
 
 
@@ -145,6 +147,7 @@ def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray
     limited = np.isfinite(run.across_max[leg])
     more[~limited, rows.NORMAL_NODE] = more[~limited, rows.NORMAL_MID] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
+    more[:, rows.SWITCH] = at_vertex & (run.switch[leg] != 0.0)
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False
-    more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE]] = False
+    more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE, rows.SWITCH]] = False
     return on

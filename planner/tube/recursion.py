@@ -24,7 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.tube.curvature import model_of_rows
-from planner.tube.rows import TUBE_NODE, VECTOR_OF_NODE, VECTORS, vector_of
+from planner.tube.rows import VECTOR_OF_NODE, VECTORS, second_of, vector_of
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
@@ -182,8 +182,8 @@ def forces(limits, lin, q, pull, smooth, u, w):
                 continue
             for k in range(axes):
                 F[m, k] += q[i, r] * lin.n[i, r, k]
-            c = r - more - TUBE_NODE - 1
-            if 0 <= c <= 1:
+            c = second_of(r - more)
+            if c >= 0:
                 for k in range(axes):
                     F[VECTOR_OF_NODE[c], k] += q[i, r] * lin.node[i, c, k]
         for m in range(VECTORS):

@@ -17,6 +17,7 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
     p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic
     a(h/2) - u v(h/2), a - u v                 normal acceleration, u = v.a/v.v kept: the smallest |a - u v| is what it is about
     h (v + a h/2)                              largest length of a step on an arc
+    p, v             at a vertex               the feed of each leg as far as the motion is nearest to the vertex
     p + h v + h2 a/2 + h3 j/6                  the next node's position, for the tolerance on arcs
 
 The square of the feed has degree 4. With the Bezier ordinates w0, w1, w2 of the velocity its own are w0.w0, w0.w1, (2 w1.w1 + w0.w2)/3,
@@ -27,6 +28,10 @@ The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point o
 n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is convex. On an arc the inner control points
 belong to the tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second vector, p or
 the next node's, through `lin.node`.
+
+Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place that is nearest to V: with
+m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends on p and, through `lin.node`, on v; its own curvature
+is left out, as that of the kinematics is.
 """
 
 from __future__ import annotations
@@ -42,11 +47,15 @@ from planner.tube.legs import Foot, Slopes, nearest_point, off_tangent
 # Vectors y, in this order.
 P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
 VECTORS = 14
-VECTOR_OF_NODE = P, NEXT  # that the tangent of the first and of the second inner control point depends on
+VECTOR_OF_NODE = (
+    P,
+    NEXT,
+    V,
+)  # second vectors: of the first and of the second inner control point on arcs, and of `SWITCH`
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
-ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC = range(9, 14)
-MORE_ROWS = 14
+ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC, SWITCH = range(9, 15)
+MORE_ROWS = 15
 VECTOR_OF_BOX = (J, A, MID, V)
 
 
@@ -68,6 +77,8 @@ class StepLimits(NamedTuple):
     h: FloatArray  # (N,) duration that it is pulled to
     h_max: FloatArray  # (N,)
     h_min: FloatArray  # (N,)
+    switch: FloatArray  # (N,) at a vertex 1 where the feed falls, -1 where it rises; else 0
+    aside: float  # how far inside its bound the row of that has to be [-]
 
 
 class Linear(NamedTuple):
@@ -75,7 +86,7 @@ class Linear(NamedTuple):
 
     g: FloatArray  # (N, R)
     n: FloatArray  # (N, R, A) dg/dy
-    node: FloatArray  # (N, 2, A) on arcs dg/dy of both inner control points by the nodes of their tangents
+    node: FloatArray  # (N, 3, A) dg/dy by the second vectors of rows that have one
     alpha: FloatArray  # (N, 14, 4)
     e: FloatArray  # (N, 14, A)
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
@@ -155,6 +166,16 @@ def _ball(y, vector, limit, row, g, n):
 
 
 @njit(cache=True, error_model="numpy")
+def _put_switch(limits, i, y, vertex, lin):
+    """The row of the node at a vertex (A,) where the feed changes (module text)."""
+    row, by = 8 * y.shape[1] + SWITCH, limits.switch[i] / (limits.room_node[i] * limits.pace[i])
+    lin.g[i, row] = limits.aside
+    for k in range(y.shape[1]):
+        lin.n[i, row, k], lin.node[i, 2, k] = by * y[V, k], by * (y[P, k] - vertex[k])
+        lin.g[i, row] += lin.n[i, row, k] * (y[P, k] - vertex[k])
+
+
+@njit(cache=True, error_model="numpy")
 def put_rows(legs, limits, x, u, lin):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the search on arcs begins."""
     N, axes = len(u), u.shape[1] - 1
@@ -191,6 +212,7 @@ def put_rows(legs, limits, x, u, lin):
             if c == 0 and at_vertex:
                 for k in range(axes):
                     point[k] = legs.base[r, k] + legs.radius[r] * legs.e1[r, k]
+                _put_switch(limits, i, y, point, lin)
             lin.place[i, c], square = place, 0.0
             for k in range(axes):
                 off = y[vector, k] - point[k]
@@ -239,7 +261,15 @@ def vector_of(row, axes):
     more = row - 8 * axes
     if more <= H_MIN:
         return -1
-    return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, ACROSS_MID, LONG)[more - FEED_NODE]
+    return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, ACROSS_MID, LONG, P)[more - FEED_NODE]
+
+
+@njit(cache=True, error_model="numpy")
+def second_of(kind):
+    """Which second vector (`VECTOR_OF_NODE`) a row behind those of the axes depends on; -1 for none."""
+    if kind == SWITCH:
+        return 2
+    return kind - TUBE_NODE - 1 if TUBE_NODE < kind < ORDER_NODE else -1
 
 
 @njit(cache=True, error_model="numpy")
@@ -270,8 +300,8 @@ def slopes(limits, lin, dx, du, out):
             total = 0.0
             for k in range(axes):
                 total += lin.n[i, r, k] * dy[of[r], k]
-            c = r - more - TUBE_NODE - 1
-            if 0 <= c <= 1:
+            c = second_of(r - more)
+            if c >= 0:
                 for k in range(axes):
                     total += lin.node[i, c, k] * dy[VECTOR_OF_NODE[c], k]
             out[i, r] = total

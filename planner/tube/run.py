@@ -117,6 +117,12 @@ class TubeRun:
         return np.where(self.curvature > 0, 1.0 - ARC_FRACTION, 1.0) * self.budget
 
     @property
+    def switch(self) -> FloatArray:
+        """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no motion is so fast."""
+        feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
+        return -np.sign(np.diff(feed, prepend=feed[0]))
+
+    @property
     def offset(self) -> FloatArray:
         """(R+1,) place of the vertices along the run [mm]."""
         return np.append(0.0, np.cumsum(self.length))

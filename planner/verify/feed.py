@@ -98,8 +98,8 @@ def _judged(
     sample: Array,
     over: FloatArray,
 ) -> int:
-    """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and `over` (n,); vertices before `known` are
-    settled. -> the first one that is left"""
+    """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and `over` (n,); vertices before
+    `known` are settled. -> the first one that is left"""
     n = len(chords.t)
     for k in range(1, n):
         begin, end = chords.place[k - 1], chords.place[k]

@@ -94,6 +94,14 @@ def assume_seconds(state: State, block: Block, seconds: float, found: Findings) 
         found.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
+def assume_rapids(store: Store, assumed: Assumed, found: Findings) -> None:
+    """Say it if G0 of a printer, which runs it at F, is planned as a rapid."""
+    rapid = store.block.kind[: store.blocks] == Kind.RAPID
+    if assumed.printer and rapid.any():
+        text = "G0 is planned at the limits of the axes; 3-D printers run it at F"
+        found.assume(text, int(store.block.line[rapid.argmax()]))
+
+
 def path_control(state: State, block: Block, assumed: Assumed, found: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
     word = block.at["path control"]

@@ -113,6 +113,7 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
         self._end_compensation()
+        auxiliary.assume_rapids(self.store, self.assumed, self.found)
         limits = self._limits.throughout(self.store, self.setup.machine, self.found)
         read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         read = dataclasses.replace(read, limits=limits)
@@ -296,7 +297,7 @@ class Interpreter:
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
         if "plane" in g:
-            state.normal = {170: 2, 180: 1, 190: 0}[g["plane"]]
+            state.normal, state.plane_known = {170: 2, 180: 1, 190: 0}[g["plane"]], True
         if "units" in g:
             set_units(state, g["units"])
             self._assume_units()

@@ -155,6 +155,10 @@ class Mover:
                 "the move after G40 must be straight; write G0 or G1 to where this arc begins",
             )
         try:
+            if not state.plane_known:
+                state.plane_known = True
+                text = "no G17, G18 or G19 before the first arc: G17; a Fanuc control starts with what is set in it"
+                self.found.assume(text, block.line, block.motion_word())
             arc, normal = moves.arc(state, block, target)
             if is_hardly_turned(arc):
                 length = moves.arc_length(state.position, target, arc, normal)

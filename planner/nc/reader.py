@@ -143,6 +143,7 @@ def execute(
     interpreter.state.fanuc = (
         reading.dialect == FANUC or dialect in (FANUC, LATHE) or has_further_systems(words)
     )
+    interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
     interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
     integers = integers_of(machine)
     words = integers.applied(words)

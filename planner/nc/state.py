@@ -113,6 +113,7 @@ class State:
     strict       : nothing is assumed (`Reading.strict`)
     fanuc        : G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
     seconds_meant : the unit of dwells is known
+    plane_known  : G17, G18 or G19 was read, or the control starts with G17
     change_timed : how long a tool change takes is known
     in_thread    : the last block was cut in step with the spindle
     further      : axes beside x, y and z
@@ -154,6 +155,7 @@ class State:
     strict: bool = False
     fanuc: bool = False
     seconds_meant: bool = False
+    plane_known: bool = True
     further: Further = field(default_factory=Further)
 
     @property

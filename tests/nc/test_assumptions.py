@@ -17,6 +17,7 @@ from planner.cli import app
 from planner.machine import Machine
 from planner.nc.info import describe
 from planner.nc.reader import interpret, parse_program
+from planner.nc.reading import Reading
 from planner.report.export import info_summary
 
 BARE = machine()
@@ -109,3 +110,20 @@ def test_a_program_without_assumptions_is_called_supported(tmp_path: Path) -> No
     assert "every construct is supported" in result.stdout
     assert "assumed" not in result.stdout
     assert info_summary(describe(parse_program(job.read_bytes()), lines=3))["assumptions"] == []
+
+
+def test_a_printer_runs_its_rapids_at_f() -> None:
+    head = "G21\nM83\nG1 X5 F600\n"
+    (said,) = parse_program(head + "G0 X9\nG0 X12\n", BARE).assumptions
+    assert said.startswith("line 4: G0 is planned at the limits of the axes")
+    assert not parse_program(head + "G1 X9\n", BARE).assumptions
+    assert not parse_program("G21\nG1 X5 F600\nG0 X9\n", BARE).assumptions
+
+
+def test_the_plane_of_a_fanuc_mill_is_said_by_the_program() -> None:
+    fanuc = Reading(dialect="fanuc")
+    arcs = "G2 X4 Y0 I2 J0\nG2 X8 Y0 I2 J0\n"
+    (said,) = parse_program("G21 F600\n" + arcs, BARE, fanuc).assumptions
+    assert said.startswith("line 2: no G17, G18 or G19 before the first arc")
+    assert not parse_program("G21 F600 G17\n" + arcs, BARE, fanuc).assumptions
+    assert not parse_program("G21 F600\n" + arcs, BARE).assumptions

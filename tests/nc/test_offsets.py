@@ -33,6 +33,7 @@ def last(text: str) -> list[float]:
         ("G10 L20 P3 X0\nG0 X50\nG56 G0 X0", [1, 2, 3]),
         ("G10 L2 P2 X7\nG55 G0 X0 Y0", [7, -5, 3]),
         ("G52 X3\nG0 X0", [3, 2, 3]),
+        ("G92 Z9\nG10 L10 P3 Z7\nG43 H3\nG0 Z7", [1, 2, 3]),  # the place gets the coordinate, G92 counted in
         ("G92 X0\nG52 X3\nG92.2\nG0 X0\nG92.3 G0 X0", [3, 2, 3]),
         ("G43 H1\nG0 Z0", [1, 2, 25]),
         ("G43 H2\nG43.2 H1\nG0 X0 Z0", [4, 2, 35]),

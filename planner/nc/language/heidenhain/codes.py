@@ -58,11 +58,8 @@ REFUSED = {
 def is_of_the_builder(code: int) -> bool:
     """Whether an M code, which is none of this control's, would be taken for one of RS274NGC or of a printer."""
     found = setting("M", 10 * code, "", "")
-    return _in_rs274(code) or (code > OWN_LAST and found is not None and found.what is not UNKNOWN_M)
-
-
-def _in_rs274(code: int) -> bool:
-    return OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP
+    of_printers = code > OWN_LAST and found is not None and found.what is not UNKNOWN_M
+    return of_printers or (OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP)
 
 
 class Codes(Definitions):
@@ -105,8 +102,8 @@ class Codes(Definitions):
             elif code in (0, 1, 5, 9, *AT_END):
                 after.append(row)
             else:
-                said = [assumed_row(block.place, "machine code")] if is_of_the_builder(code) else []
-                before += [*said, *([] if _in_rs274(code) else [row])]
+                # planned and flat programs do not have it: whoever read them would take it for another
+                before.append(assumed_row(block.place, "machine code") if is_of_the_builder(code) else row)
         return before, after, machine
 
     def _codes_alone(

@@ -43,14 +43,18 @@ class Reader:
     ):
         self.trajectory, self.motion, self.limits, self.given = trajectory, motion, limits, given
         self._times = dt, seed, cells
-        self.delivered = Delivered(trajectory.dt, given)
+        self.delivered = self._delivered()
         self.comparison = None if motion is None else Comparison(trajectory.axes, motion.end)
+
+    def _delivered(self) -> Delivered:
+        dt = self.trajectory.dt
+        return Delivered(dt, self.given, max(dt, self._times[0]) if self.motion is None else None)
 
     def read(
         self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
     ) -> list[Look]:
         """What both show beside a path; `progress` is called with the fraction done."""
-        self.delivered = Delivered(self.trajectory.dt, self.given)
+        self.delivered = self._delivered()
         seen = Watch(pieces, self.limits, middles=True)
         samples = self.trajectory.chunks()
         between = None if self.motion is None else self._between(pieces, seen, samples, progress)

@@ -1,4 +1,5 @@
-"""What the samples themselves must be: at the machine's period, dense enough, with enough digits, in seconds, from rest to rest.
+"""What the samples themselves must be: at the machine's period (of a motion known by samples alone: not far above it), dense enough,
+with enough digits, in seconds, from rest to rest.
 
 Density. Where the motion cannot be asked, nothing is known of it between two samples h apart but that it keeps the machine's limits,
 if it does: per axis it is within a h^2 / 8 of the chord. At h <= dt that is the machine's own interpolation, and the chord is what it
@@ -42,6 +43,8 @@ from planner.verify.stream import Limits
 # machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at least 1000 times.
 TOO_SLOW, TOO_SPARSE = 200.0, 10.0
 TIME_UNITS = ((1e5, 1e6, "microseconds"), (TOO_SLOW, 1e3, "milliseconds"))
+# A clock that jitters has periods up to so many times the longest one that is right [-]; a sample that is missing makes one of two.
+JITTER = 1.5
 # The rounding of differences is mentioned if it is more than this share of a limit [-].
 WORTH_A_WORD = 1e-3
 
@@ -66,11 +69,13 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
 class Delivered:
     """What is kept of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run [mm].
 
+    longest : periods up to `JITTER` times it are right [s], of a motion that is known by its samples alone and judged at their own
+              times; None where every period has to be dt
     ends : t, position, velocity and acceleration of the first two samples and the last two, of fewer than four all
     """
 
-    def __init__(self, dt: float, given: Given):
-        self.dt, self.given = dt, given
+    def __init__(self, dt: float, given: Given, longest: float | None = None):
+        self.dt, self.given, self.longest = dt, given, longest
         self.ends: dict[str, FloatArray] = {}
         self.run = 0.0
         self._wrong, self._first = 0, (0.0, 0.0)  # how many periods, and the first: when, how long
@@ -90,7 +95,8 @@ class Delivered:
         )
         when, periods = np.append(self._last[0], t[:-1]), np.append(self._last[1], np.diff(t))
         self._last = when[-1:], periods[-1:]
-        self._judge(when[:-1], periods[:-1] - self.dt, periods[:-1])
+        off = periods - self.dt if self.longest is None else np.maximum(periods - JITTER * self.longest, 0.0)
+        self._judge(when[:-1], off[:-1], periods[:-1])
         for name, column in columns.items():
             have = self.ends.get(name, column[:0])
             seen = np.concatenate([have, column])
@@ -106,7 +112,8 @@ class Delivered:
         """Periods that are not dt."""
         when, periods = self._last
         self._last = when[:0], periods[:0]
-        self._judge(when, np.maximum(periods - self.dt, 0.0), periods, self.given.end_rounding)
+        most = self.dt if self.longest is None else JITTER * self.longest
+        self._judge(when, np.maximum(periods - most, 0.0), periods, self.given.end_rounding)
         if not self._wrong:
             return []
         return [

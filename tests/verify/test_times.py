@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from motions import JERK_FREE, Asked, Moves, machine, polyline, sample
+from motions import JERK_FREE, Asked, Moves, changed, machine, polyline, sample
 
 from planner.motion.timing import WATCHED
-from planner.verify import verify
+from planner.verify import Given, verify
 from planner.verify.times import PER_PERIOD, PER_PIECE, cells_per_period, look
 
 M = machine()
@@ -106,3 +106,35 @@ def test_chords_between_the_times_cut_no_corners(dt):
 def test_cells_per_period_are_bounded():
     assert cells_per_period(0.02, 1e-6, 1e9) == 16
     assert cells_per_period(0.001, 1.0, 1.0) == PER_PERIOD
+
+
+def test_samples_of_a_clock_that_jitters_are_judged_at_their_own_times():
+    # times off by up to 2 us, and rows 0.3 to 1 period apart: the motion is right, and is read where the samples are
+    m = machine()
+    toolpath = Moves().line(30, feed=50).toolpath(m)
+    duration, at = polyline([(0, 0, 0), (30, 0, 0)], feed=50)
+    random = np.random.default_rng(5)
+    even = np.arange(m.dt, duration - 0.3 * m.dt, m.dt)
+    jittering = np.concatenate([[0.0], even + random.uniform(-2e-6, 2e-6, len(even)), [duration]])
+    uneven = np.cumsum(np.append(0.0, random.uniform(0.3, 1.0, 4000) * m.dt))
+    uneven = np.append(uneven[uneven < duration - 0.3 * m.dt], duration)
+    whole = sample((duration, at), m.dt)
+    for t in (jittering, uneven):
+        columns = dict(zip(("position", "velocity", "acceleration", "jerk"), at(t), strict=True))
+        nothing = np.zeros(len(t))
+        rows = {
+            "t": t,
+            "s": nothing,
+            "feed": nothing,
+            "block": nothing.astype(int),
+            "line": nothing.astype(int),
+        }
+        read = changed(whole, **columns, **rows)
+        verdict = verify(read, toolpath, m, given=Given(columns=()), not_limited=("jerk",))
+        assert verdict.passed, verdict.faults
+        # a sample that is missing still shows
+        keep = np.arange(len(t)) != len(t) // 2
+        if t is jittering:
+            less = changed(whole, **{name: value[keep] for name, value in (columns | rows).items()})
+            verdict = verify(less, toolpath, m, given=Given(columns=()), not_limited=("jerk",))
+            assert any(text.startswith("period: ") for text in verdict.faults)

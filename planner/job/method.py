@@ -16,13 +16,16 @@ from planner.delivery import periods
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.job.by_run import RunsInTime, broken_runs, full_stops, job_of_run
 from planner.job.job import FILTERS, Job
 from planner.job.plan import Plan
 from planner.job.stages import Progress, Stages
 from planner.job.trace import Log
 from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import require_samples
 from planner.nc.program import Program
+from planner.tube.splice import Spliced, SplicedRun
 from planner.verify import ThreadCheck, Verdict
 
 # A job is planned again at most so often with less tolerance where chords between samples leave it; every time the samples fall
@@ -32,6 +35,9 @@ PERIOD_ROUNDS = 8
 # more and more from then on (without that the verdict of 53750 of the campaign fails). Where a round changed nothing the next one takes
 # twice as much.
 CORNER_ROUNDS = 4
+# Runs on which the verdict finds something are planned each by itself where they are no more than this share of all [-], and so often
+# those on which it finds something then.
+ALONE_MOST, ALONE_ROUNDS = 0.1, 3
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 # Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
 INSTEAD_POINTS = SIZES.instead_planned
@@ -130,6 +136,8 @@ class Method(ABC):
 
     def _planned_again(self, job: Job, made: Plan) -> Plan:
         """The plan of another method, or with less tolerance, in the place of one that leaves it."""
+        if (alone := self._runs_alone(job, made)) is not None:
+            return alone
         rival = self._rival(job, made) if made.grid_points <= INSTEAD_POINTS else None
         if self.keeps_tolerance:
             made = self._with_less(made, job if rival is None else _faster_than(rival, job))
@@ -143,6 +151,51 @@ class Method(ABC):
             said = f"another motion failed: {made.verdict.faults[0]}"
         said = f"{said}; {rival.sentence}"
         return dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
+
+    def _runs_alone(self, job: Job, made: Plan) -> Plan | None:
+        """The plan with the runs on which its verdict finds something planned each by itself, and all others as they are; None where
+        these are not few, or what comes of it does not pass."""
+        machine, toolpath = job.real
+        if (
+            made.trajectory is None
+            or made.verdict is None
+            or machine.fir is not None
+            or not self.keeps_tolerance
+        ):
+            return None
+        motion = job.motion_of[made.trajectory]
+        stops = full_stops(job.toolpath)
+        if len(stops) < 3 or isinstance(motion, ShapedMotion) or len(stops) != len(full_stops(toolpath)):
+            return None
+        runs, verdict = RunsInTime(motion, job), made.verdict
+        parts = [runs.spliced(k) for k in range(len(stops) - 1)]
+        left = set(range(len(parts)))
+        for _ in range(ALONE_ROUNDS):
+            edges = np.append(0.0, np.cumsum([part.lasting for part in parts]))
+            broken = broken_runs(edges, verdict)
+            left -= set(broken)
+            if not broken or len(left) < (1.0 - ALONE_MOST) * len(parts):
+                return None
+            for k in broken:
+                of_run = job_of_run(job, int(stops[k]), int(stops[k + 1]))
+                plan = self.plan_within_periods(of_run)
+                if plan.trajectory is None or not _passed(plan):
+                    return None
+                own = job.motion_of[plan.trajectory]
+                parts[k] = SplicedRun(motion=own, begin=0.0, end=own.end)
+            jerk = made.verdict.limits.get("jerk." + toolpath.axes[0])
+            not_limited = () if jerk is None or jerk.limited else ("jerk",)
+            whole = Spliced(runs=tuple(parts))
+            trajectory, verdict = job.deliver(whole, not_limited)
+            job.tell(
+                "runs alone", found=trajectory.cycle_time, before=made.cycle_time, runs=len(parts) - len(left)
+            )
+            if verdict.passed:
+                grid = made.grid
+                if grid is not None:
+                    grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges(), whole.begin))
+                return dataclasses.replace(made, trajectory=trajectory, verdict=verdict, grid=grid)
+        return None
 
     def _with_less(self, made: Plan, job: Job) -> Plan:
         """The plan made again with less and less tolerance until chords between samples keep it, as long as it takes no longer than

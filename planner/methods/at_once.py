@@ -8,14 +8,13 @@ way; all others are taken. Where that is more than half of the job, or there are
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.feedrate.solution import Status
-from planner.geometry.toolpath import Toolpath
+from planner.job.by_run import broken_runs, job_of_run
 from planner.job.job import Job
 from planner.job.plan import Plan
 from planner.methods.all_runs import searched_runs
@@ -24,7 +23,7 @@ from planner.optimal.loop import Settings
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
 from planner.tube.parts import FoundRun, parts_of
-from planner.tube.run import TubeRun, tube_runs_of
+from planner.tube.run import tube_runs_of
 from planner.tube.splice import Spliced, SplicedRun
 from planner.verify import Verdict
 
@@ -117,7 +116,8 @@ class _Alone:
             why = (
                 found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
             )
-            part = _job_of(self.job, found[k].run)
+            run = found[k].run
+            part = job_of_run(self.job, int(run.first[0]), int(run.first[-1]))
             plan = self._otherwise(part)
             if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
                 return False
@@ -140,28 +140,4 @@ class _Alone:
     def broken(self, found: list[FoundRun], start: Start, verdict: Verdict) -> list[int]:
         """The runs on which a verdict finds something at a known time."""
         lasting = [sum(part.lasting for part in parts) for parts in self.parts(found, start)]
-        at = np.array([[each.begin, each.end] for each in verdict.excesses]).reshape(-1, 2)
-        first, last = np.searchsorted(np.cumsum(lasting), at).T.clip(0, len(found) - 1)
-        return sorted(
-            {k for a, b in zip(first.tolist(), last.tolist(), strict=True) for k in range(a, b + 1)}
-        )
-
-
-def _job_of(job: Job, run: TubeRun) -> Job:
-    """The job of one run, from the standstill before it."""
-
-    def part(toolpath: Toolpath) -> Toolpath:
-        first, last = int(run.first[0]), int(run.first[-1])
-        kept = np.zeros(len(toolpath), bool)
-        kept[first:last] = True
-        of_run, whole = toolpath.part(kept), last == len(toolpath)
-        columns = {}
-        for name in ("joint", "theta", "tolerance", "dwell"):
-            columns[name] = getattr(toolpath, name)[first : last + 1].copy()
-        if not whole:  # what stands there belongs to the next run
-            columns["dwell"][-1] = 0.0
-        return dataclasses.replace(of_run, **columns)
-
-    machine, judged_by = job.real
-    judged = None if job.judged is None else (machine, part(judged_by))
-    return dataclasses.replace(job, toolpath=part(job.toolpath), judged=judged, noted=[], most=np.inf)
+        return broken_runs(np.append(0.0, np.cumsum(lasting)), verdict)

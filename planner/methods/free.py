@@ -14,13 +14,13 @@ from planner.base.arrays import FloatArray
 from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
+from planner.job.by_run import RunsInTime
 from planner.job.job import Delivered, Job
 from planner.job.method import Method
 from planner.job.plan import Plan
 from planner.job.records import NO_TABLES, GridHistory, Tables
-from planner.motion.timing import MotionInTime, in_chunks
-from planner.motion.trajectory import Trajectory, joined
-from planner.motion.vertex_times import passing_times, standstills
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
 from planner.optimal.effort import Search
 from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
@@ -33,8 +33,6 @@ from planner.tube.run import TubeRun
 from planner.tube.solvers import TubeSolver
 from planner.tube.splice import Spliced, SplicedRun
 
-# The start is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more often than that in all.
-START_PERIOD, START_SAMPLES = 0.02, 200_000
 # Times nearer to each other than this share of a leg's mean time are one [-].
 LEAST_APART = 1e-6
 # What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each other [-].
@@ -84,7 +82,7 @@ def _part(report: Callable[[float], None], begin: float, end: float) -> Callable
     return lambda share: report(begin + share * (end - begin))
 
 
-class Start:
+class Start(RunsInTime):
     """A motion from which the search begins, and where in it the runs are.
 
     cut  : how finely it is cut into steps
@@ -92,29 +90,9 @@ class Start:
     """
 
     def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT, plan: Plan | None = None):
-        acceleration, jerk = (job.machine.limits(q, job.toolpath.axes) for q in ("acceleration", "jerk"))
-        period = max(START_PERIOD * float((acceleration / jerk).min()), motion.end / START_SAMPLES)
-        even = np.arange(0.0, motion.end, period)
-        edges = np.append(motion.t, motion.end)
-        self.plan, self.motion, self.cut = plan, motion, cut
-        self.seen = joined(list(in_chunks(motion, period, np.concatenate([even, edges]))))
-        self.times = passing_times(self.seen, job.toolpath)
-        self.arrival, self.departure = standstills(self.seen, job.toolpath, self.times)
+        super().__init__(motion, job)
+        self.plan, self.cut = plan, cut
         self._guesses: dict[int, Guess] = {}
-
-    def lasting(self, k: int) -> float:
-        """Time along run k [s]."""
-        return float(self.arrival[k + 1] - self.departure[k])
-
-    def spliced(self, k: int) -> SplicedRun:
-        """The motion along run k, with the standstill before it, and the one at the end of the job."""
-        begin = self.arrival[k] if k else 0.0
-        last = k + 2 == len(self.arrival)
-        return SplicedRun(
-            motion=self.motion,
-            begin=float(begin),
-            end=self.motion.end if last else float(self.arrival[k + 1]),
-        )
 
     def guess(self, k: int, run: TubeRun) -> Guess:
         """The motion along run k, cut into steps."""

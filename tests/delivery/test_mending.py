@@ -12,8 +12,10 @@ from planner.delivery import mending
 from planner.delivery.pacing import runs_of, slower_runs
 from planner.delivery.periods import Standing
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.job.stages import Stages
+from planner.job.trace import Trace
 from planner.machine import load_machine
 from planner.methods.kinematic import KinematicMethod
 from planner.methods.registry import plan
@@ -146,3 +148,34 @@ def test_how_much_slower_an_excess_has_to_be():
 def test_methods_that_exceed_limits_on_purpose_are_delivered_as_they_are():
     text = "G21 G90 G64 P0.02 F6000\nG1 X2\nX4 Y1\nX6\nM2\n"
     assert not plan(parse_program(text), "mill", method="fir-plain").verdict.passed
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Careless(KinematicMethod):
+    """Takes more than the tolerance at one corner of a job of many runs."""
+
+    share: float = 0.0
+
+    def plan_job(self, job):
+        tolerance = job.toolpath.tolerance.copy()
+        corner = np.flatnonzero(job.toolpath.joint == Joint.CORNER)
+        if len(corner) > 1:
+            tolerance[corner[len(corner) // 2]] *= 1.0 + self.share
+        loose = dataclasses.replace(job.toolpath, tolerance=tolerance)
+        return super().plan_job(dataclasses.replace(job, toolpath=loose, judged=job.real))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.005, 0.2])
+def test_a_corner_beyond_the_tolerance_costs_its_run(share):
+    """The path itself leaves the tolerance there, which no slower motion mends: its run is planned by itself."""
+    job = job_of(["corner", "feed"] * 250)
+    program, machine = job.program, MACHINE.model_copy(update={"normal_acceleration": None})
+    plain = KinematicMethod().plan(program, machine)
+    assert plain.verdict.passed
+    assert not Careless(share=share).plan_job(dataclasses.replace(job, machine=machine)).verdict.passed
+    told = Trace()
+    made = Careless(share=share).plan(program, machine, log=told)
+    assert made.verdict.passed, made.verdict.faults
+    assert [step.facts["runs"] for step in told.steps if step.name == "runs alone"] == [1]
+    assert abs(made.cycle_time / plain.cycle_time - 1.0) < WORTH

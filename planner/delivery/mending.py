@@ -23,8 +23,8 @@ from planner.verify.excess import OF_CHORDS, Kind
 # So often a motion is mended and judged again, at other times each time: an excess may be larger between the places looked at before.
 ROUNDS = 6
 MOST_SLOWER = 2.0  # [-]
-# What is slowed down is slowed down by this much more [-], and ten times that each time again.
-MORE = 1e-5
+# What is slowed down is slowed down by this much more [-], and so many times that each time again.
+MORE, MORE_AGAIN = 1e-5, 4.0
 # Of an error of which it is not known how much the path itself has the share is taken to be none at first; it is slowed down by so
 # many times that in each further round [-].
 AGAIN = 2.0
@@ -34,6 +34,8 @@ PERIODS = 3.0
 JOINED = 4.0
 # A motion that is not faster [mm/s], nor accelerated more [mm/s2], rests: less is rounding of long sums.
 STANDS = 1e-6, 1e-3
+AT_REST = 1e-6  # as near to a rest as that [s] is at it
+BOTH_SIDES = 2  # from this round on what is found at a rest is taken to be of the run before it too
 PART = 32  # ends of pieces that are looked at for a rest at first
 MENDED = OF_CHORDS | {Kind.LIMIT, Kind.FILTERS, Kind.CORNER_SPEED, Kind.EXACT}
 
@@ -49,11 +51,13 @@ def mended(
     slower = np.array([each.slower for each in verdict.excesses])
     if not len(slower) or not set(verdict.kinds) <= MENDED or slower.max() > MOST_SLOWER:
         return None
-    more = MORE * 10.0**again
+    more = MORE * MORE_AGAIN**again
     unknown = np.array([each.kind in (Kind.CONTOUR, Kind.FILTERS) for each in verdict.excesses])
     by = slower * (1.0 + more) - 1.0
     by = np.where(unknown, by * AGAIN**again, by)
     edges = np.array([[each.begin, each.end] for each in verdict.excesses])
+    if again >= BOTH_SIDES:
+        edges[:, 0] -= 2.0 * AT_REST
     edges = without_stands(np.stack(stands, axis=1), edges.ravel())[0].reshape(-1, 2)
     w, pad = _reach(verdict), PERIODS * dt
     jerk_limited = any(name.startswith("jerk") and check.limited for name, check in verdict.limits.items())
@@ -91,7 +95,7 @@ def _rests(
 ) -> tuple[float, float]:
     """The last rest of the motion up to `begin` and the first from `end` on, as far as `within` [s]; its own ends beyond that."""
     edges = np.append(motion.t, motion.end)
-    k, n = np.searchsorted(edges, begin, side="right"), np.searchsorted(edges, end)
+    k, n = np.searchsorted(edges, [begin + AT_REST, end + AT_REST])  # jumps are of what is behind the rest
     low, high = np.searchsorted(edges, begin - within), np.searchsorted(edges, end + within, side="right")
 
     def rests(times: FloatArray) -> FloatArray:

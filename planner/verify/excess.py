@@ -113,7 +113,8 @@ def above(ratio: FloatArray) -> FloatArray:
     return np.where(ratio > 1.0 + RATIO_ROUNDING, ratio, 0.0)
 
 
-def of_check(name: str, time: float, ratio: float) -> Excess:
-    """Of one place of which no more is known: the largest ratio of a quantity, "jerk.e" for example."""
+def of_check(name: str, span: tuple[float, float], ratio: float) -> Excess:
+    """Of one place of which no more is known than the largest ratio of a quantity, "jerk.e" for example, and the `span` [s] that it is
+    of."""
     power = POWERS[NAMES.index(name.partition(".")[0])]
-    return Excess(kind=Kind.LIMIT, name=name, begin=time, end=time, ratio=ratio, power=power)
+    return Excess(kind=Kind.LIMIT, name=name, begin=span[0], end=span[1], ratio=ratio, power=power)

@@ -66,7 +66,8 @@ def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tupl
     ]
     shown = {each.name for each in found}
     broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
-    return found + [of_check(check.name, check.time, check.ratio) for check in broken]
+    back = rows.BACK * looks[0].seen.gap_max  # a difference of positions is of what lies so far behind it
+    return found + [of_check(check.name, (check.time - back, check.time), check.ratio) for check in broken]
 
 
 # ---- limits and columns ----------------------------------------------------------------------------------------------

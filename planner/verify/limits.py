@@ -52,6 +52,7 @@ VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERAT
 GROUPS = 6
 FEED, NORMAL, CHORD = range(3)
 ROWS_ALONE = 3
+BACK = 3  # periods that a third difference reaches back
 OVER = 5  # velocity, acceleration and jerk of any axis, feed, normal acceleration
 
 

@@ -182,3 +182,15 @@ def test_a_corner_beyond_the_tolerance_costs_its_run(share):
     assert made.verdict.passed, made.verdict.faults
     assert [step.facts["runs"] for step in told.steps if step.name == "runs alone"] == [1]
     assert abs(made.cycle_time / plain.cycle_time - 1.0) < WORTH
+
+
+@pytest.mark.parametrize(("again", "before"), [(0, 1.0), (mending.BOTH_SIDES, 1.1 ** (1.0 / 3.0))])
+def test_an_excess_at_a_rest_is_of_the_run_behind_it_and_then_of_both(again, before):
+    job = job_of(["feed", "jerk"])
+    made, motion = planned(job)
+    at = float(runs_of(motion).end[1])
+    excess = Excess(kind=Kind.LIMIT, name="jerk", begin=at, end=at, ratio=1.1, power=3)
+    verdict = dataclasses.replace(made.verdict, kinds=(Kind.LIMIT,), excesses=(excess,))
+    slower = mending.mended(motion, NO_STANDS, verdict, MACHINE.dt, again)
+    lasting = np.diff(slower.run_at(np.array([at - 0.004, at, at + 0.004]))) / 0.004
+    np.testing.assert_allclose(lasting, [before, 1.1 ** (1.0 / 3.0)], rtol=1e-3)

@@ -169,7 +169,16 @@ def summary(rows: list[Row]) -> str:
         lines.append(
             f"| time, quantile {share:g} | | " + " | ".join(f"{more[way]:+.1e}" for way in OTHERS) + " |"
         )
-    lines += ["", "What differs:", ""]
+    lines += [
+        "",
+        "Not as it should be: another outcome; in parts setpoints that differ by more than rounding; on other routes a time that",
+        f"differs by more than {ANOTHER_ROUTE:g}. Splines that no search of geometry and feed follows are what their windows make of",
+        "them, up to some 1e-3 of the time. With all sizes small the time is that of less effort, which the quantiles show. Jobs",
+        "that took more than their share of processor time on a way (`too long`) are not compared there.",
+        "",
+        "What differs:",
+        "",
+    ]
     lines += [
         f"* {row['seed']}, {way}: {said}" for row in rows for way, said in row["differs"].items() if said
     ] or ["nothing"]

@@ -30,6 +30,12 @@ STOPS = (
     "G21 G90 F2000\nG0 X4 Z2\nG1 Z-1 F600\nG4 P0.02\nG61.1\nG1 X9 Y3\nX3 Y6\nG64 P0.02\nX1 Y1\nG0 Z4\nM2\n"
 )
 PRINT = "G21 G90 M83 F2400\nG1 X5 E0.4\nX9 Y4 E0.4\nG1 E-1 F1800\nG0 X9 Y9\nG1 E1 F1800\nG1 X2 Y9 E0.5 F2400\nX0 Y5 E0.4\nM2\n"
+# A picture for a laser: short lines, each with its power.
+RASTER = "G21 G90 G64 P0.05 F3000\nM4 S0\n" + "".join(
+    f"G1 X{0.7 * (x if y % 2 else 11 - x):.1f} Y{0.2 * y:.1f} S{37 * x * (y + 1) % 1000}\n"
+    for y in range(8)
+    for x in range(12)
+)
 LOOP = "G21 G90 G64 P0.02 F1800\n#1=0\nO100 WHILE [#1 LT 30]\n#1=[#1+1]\nG1 X[#1*0.7] Y[#1-2*FIX[#1/2]]\nO100 ENDWHILE\nM2\n"
 
 
@@ -68,6 +74,7 @@ def jobs() -> list[Job]:
         Job("print", PRINT, machine=with_extruder(), settings={"effort": "quick"}),
         Job("second-order", CHORDS, method="second-order"),
         Job("kinematic", CHORDS, method="kinematic"),
+        Job("raster", RASTER + "M5\nM2\n", method="kinematic"),
         Job("bezier", TURNS, method="bezier"),
         Job("fir", problems.pentagon(), method="fir"),
         Job("fir-spline", problems.pentagon(), method="fir-spline"),

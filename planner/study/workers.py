@@ -7,7 +7,6 @@ dies ends the sweep, and the points so far are kept.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -69,7 +68,7 @@ def planned_on_cluster(
         raise NotSolvedError(
             f"more than {DEATHS} workers died over one point; the points so far are kept ({fault})"
         ) from None
-    except (CancelledError, asyncio.CancelledError, distributed.comm.CommClosedError):
+    except (CancelledError, distributed.comm.CommClosedError):
         raise NotSolvedError(
             f"--cluster {address}: the scheduler has gone, and with it what it was asked for; the points so far are kept: with a new "
             "scheduler the same command goes on with them"

@@ -27,8 +27,8 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.names import NORMAL
 from planner.control_files import models
+from planner.control_files.candidates import standing
 from planner.control_files.chords import Polyline, programmed_polyline
-from planner.control_files.for_linuxcnc import standing
 from planner.control_files.linuxcnc_model import linuxcnc_time
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.job.plan import Plan

@@ -96,7 +96,7 @@ def export_command(
             said = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
         else:
             periods, miss = write_pvt(new, trajectory, unit, WITHIN if within is None else within)
-            said = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} um of the setpoints"
+            said = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
         new.rename(output)
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
@@ -120,7 +120,7 @@ def _say_assumed(assumptions: Sequence[object]) -> None:
 
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
     """Write the program of a plan's directory for a control, and say what it holds."""
-    from planner.control_files.program import write_program
+    from planner.control_files.program import NO_JERK, write_program
     from planner.report.html.saved import saved_plan
 
     if os.path.lexists(output):
@@ -144,7 +144,11 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
         shutil.rmtree(new, ignore_errors=True)
     _say_assumed(saved.program.assumptions)
     say(f"{output / made.file}: {made.sentence}")
-    if made.note is not None:
-        say(f"note: {made.note}", err=True)
+    for text in made.assumptions:
+        say(f"  {text}")
+    for text in made.notes:
+        say(f"note: {text}", err=True)
     for name, seconds in made.predicted.items():
         say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
+    if made.predicted:
+        say(f"  {for_.value} {NO_JERK}")

@@ -8,18 +8,23 @@ happens (an M word) are vertices in any case.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.control_files.rows import Group
 from planner.geometry.chords import polyline
+from planner.geometry.distance import distance_near
 from planner.job.plan import Plan
 from planner.motion.trajectory import Trajectory
-from planner.nc.program import Kind
+from planner.nc.program import Kind, Program
 
 ROUNDS = 30  # of raising the density, each by a tenth at least: far more than curvature between setpoints can ask for
 DECIMALS = 4  # of a coordinate in mm
+LINEAR = 3  # axes that chords have: x, y, z
+PLACES = 5  # of a chord at which its distance from the path is measured
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,16 +45,19 @@ class Polyline:
     miss: float
 
 
-def planned_polyline(plan: Plan, within: float) -> Polyline:
+def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
     """The planned motion as a polyline.
 
     within : how far it may miss a setpoint [mm], above the rounding of coordinates
+    breaks : (K,) blocks before which something else happens, ascending; None for those of the program's events
 
     Raises ValueError for a plan without a trajectory.
     """
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    fixed = _fixed(plan, trajectory)
+    if breaks is None:
+        breaks = np.unique([event.block for event in plan.program.events]).astype(np.int64)
+    fixed = _fixed(plan, trajectory, breaks)
     density = _density(trajectory, within)
     for _ in range(ROUNDS):
         along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s))])
@@ -94,23 +102,76 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
     )
 
 
+def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence[Group]) -> Polyline:
+    """The polyline of a program of which chords replace a part: theirs there, and else that of the program's own words.
+
+    Chords begin and end where the program has its blocks end, and leave axes alone that the program has not placed: the words around
+    them may be relative, or shift the coordinates.
+    """
+    points = [own.points[:1]]
+    feed: list[FloatArray] = []
+    block: list[Array] = []
+    rapid: list[Array] = []
+    for group in groups:
+        line = planned if group.replaced else own
+        begin, end = np.searchsorted(line.block, [group.first, group.last]).tolist()
+        ends, here = line.points[begin + 1 : end + 1].copy(), points[-1][-1]
+        of, fast, which = line.feed[begin:end], line.rapid[begin:end], line.block[begin:end]
+        if group.replaced:
+            last, k = here.copy(), group.last - 1
+            last[:LINEAR] = _rounded(program.end[k, :LINEAR])
+            if not len(ends) and (last != here).any():  # shorter than a period
+                ends, of, which = last[None].copy(), program.feed[k : k + 1], np.array([k])
+                fast = program.kind[k : k + 1] == Kind.RAPID
+            ends[-1:] = last
+            for a, letter in enumerate(program.axes):
+                if a >= LINEAR or letter.upper() not in group.placed:
+                    ends[:, a] = here[a]
+        if len(ends):
+            for column, more in zip((points, feed, block, rapid), (ends, of, which, fast), strict=True):
+                column.append(more)
+    return Polyline(
+        points=np.vstack(points),
+        feed=np.concatenate(feed),
+        block=np.concatenate(block),
+        rapid=np.concatenate(rapid),
+        miss=max(planned.miss, own.miss),
+    )
+
+
+def off_the_path(line: Polyline, plan: Plan, groups: Sequence[Group]) -> float:
+    """How far the first and last straight moves of the groups that chords replace are from the programmed path [mm]: these
+    end where the program does, not at a setpoint."""
+    toolpath = plan.toolpath
+    replaced = [group for group in groups if group.replaced]
+    first = np.searchsorted(line.block, [group.first for group in replaced])
+    last = np.searchsorted(line.block, [group.last for group in replaced]) - 1
+    moves = np.unique(np.concatenate([first, last]))
+    moves = moves[(moves >= 0) & (moves < len(line.block))]
+    start, step = line.points[moves], line.points[moves + 1] - line.points[moves]
+    segment = np.minimum(np.searchsorted(toolpath.block, line.block[moves]), len(toolpath) - 1)
+    worst = 0.0
+    for place in np.linspace(0.0, 1.0, PLACES):
+        worst = max(worst, float(distance_near(toolpath, start + place * step, segment).max(initial=0.0)))
+    return worst
+
+
 def _rounded(points: FloatArray) -> FloatArray:
     """Points (n, A) as they are written."""
     found: FloatArray = np.round(points, DECIMALS)
     return found
 
 
-def _fixed(plan: Plan, trajectory: Trajectory) -> Array:
-    """(T,) setpoints that are vertices: ends, standstills, where rapid moves begin and end, and where words without a motion stand."""
+def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
+    """(T,) setpoints that are vertices: ends, standstills, where rapid moves begin and end, and the last before each of the breaks."""
     fixed = np.zeros(len(trajectory), dtype=bool)
     fixed[[0, -1]] = True
     at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
     fixed |= at_rest
     rapid = plan.program.kind[trajectory.block] == Kind.RAPID
     fixed[:-1] |= rapid[1:] != rapid[:-1]
-    events = np.unique([event.block for event in plan.program.events if event.block < len(plan.program)])
-    if len(events):
-        passed = np.searchsorted(events, trajectory.block, side="right")
+    if len(breaks):
+        passed = np.searchsorted(breaks, trajectory.block, side="right")
         fixed[:-1] |= passed[1:] != passed[:-1]
     return fixed
 

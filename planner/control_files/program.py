@@ -17,16 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.units import MICROMETRE
-from planner.control_files.chords import DECIMALS, Polyline, planned_polyline, programmed_polyline
-from planner.control_files.dialect import DIALECTS, polyline_text
-from planner.control_files.for_linuxcnc import best, own_words, standing, with_mode
-from planner.control_files.for_linuxcnc import candidates as candidates_of
-from planner.control_files.models import CONTROLS, predicted_time
+from planner.control_files import for_linuxcnc
+from planner.control_files.candidates import AS_IT_IS, Candidate, Candidates, standing
+from planner.control_files.controls import CONTROLS
+from planner.control_files.header import FIRST_RUN, assumptions
+from planner.control_files.models import CONTROLS as MODELS
+from planner.control_files.models import predicted_time
 from planner.job.plan import Plan
-from planner.machine import Machine
 
 SHARES = (
     1.0,
@@ -34,10 +33,7 @@ SHARES = (
     0.25,
     0.1,
 )  # of the room for chords: wider ones need fewer lines, narrower ones turn less at each
-ROUNDING = 2.0 * 10.0**-DECIMALS  # room that coordinates need [mm]
-LESS = 0.9  # of the tolerance: what a plan should take that leaves room for chords
-LITTLE = 0.05  # of the tolerance: room below this is worth a note
-LINUXCNC = "linuxcnc"
+NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster than the plan"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +43,15 @@ class Exported:
     file      : its name
     sentence  : what it holds
     predicted : predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path mode of its own
-    note      : what would leave the chords more room, or None
+    assumptions : where coordinates and start are, and how a first run goes
+    notes     : what was left out or written another way, what the control needs, and what would leave the chords more room
     """
 
     file: str
     sentence: str
     predicted: dict[str, float]
-    note: str | None = None
+    assumptions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -> Exported:
@@ -62,8 +60,8 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     control   : "grbl", "klipper", "marlin" or "linuxcnc"
     tolerance : of the path [mm], which plan and chords share
 
-    Where the plan leaves no room for chords the program as it is is written, and a note says so. Raises InputError if the motion leaves
-    the program, and for a program with the tool centre point on.
+    Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises InputError if the motion
+    leaves the program, for a program with the tool centre point on, and with its line for what the control has no words for.
     """
     if plan.joints is not None:
         raise InputError(
@@ -71,107 +69,62 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
             "planned feeds, and --for linuxcnc-stream and --for pvt play the setpoints of its joints",
             source=plan.program.source,
         )
-    if control == LINUXCNC:
-        return _for_linuxcnc(directory, plan, tolerance)
-    room = _room(plan, tolerance)
-    candidates: dict[str, Polyline] = {}
+    job = Candidates(plan, CONTROLS[control], tolerance)
+    linuxcnc = control == for_linuxcnc.NAME
+    found = for_linuxcnc.candidates(job) if linuxcnc else _candidates(job)
+    order = for_linuxcnc.best_first(found) if linuxcnc else sorted(found, key=lambda one: one.time)
+    chosen, data, notes = _first_written(job, order)
+    file = f"{control}.ngc" if linuxcnc else f"{control}.gcode"
+    (directory / file).write_bytes(data)
+    if chosen.replaced is not None and job.why_not:
+        notes = (f"the program as it is is no {control} program: {job.why_not}", *notes)
+    if len(found) > 1 or job.room is None:
+        notes = (*notes, *job.room_notes())
+    return Exported(
+        file=file,
+        sentence=_sentence(chosen),
+        predicted={one.name: one.time for one in found if np.isfinite(one.time)},
+        assumptions=(*assumptions(job.source, as_it_is=chosen.replaced is None), FIRST_RUN),
+        notes=notes,
+    )
+
+
+def _first_written(job: Candidates, order: list[Candidate]) -> tuple[Candidate, bytes, tuple[str, ...]]:
+    """The first candidate for which the control has the words. Raises InputError if there is none."""
+    refused: InputError | None = None
+    for one in order:
+        try:
+            return one, *job.written(one)
+        except InputError as fault:
+            refused = refused or fault
+    assert refused is not None
+    raise refused
+
+
+def _sentence(chosen: Candidate) -> str:
+    if chosen.replaced is None:
+        return f"{chosen.name}, byte for byte" + (f" behind a line G21 {chosen.mode}" if chosen.mode else "")
+    return ", ".join(part for part in (chosen.name, f"{len(chosen.line.feed):,} moves", chosen.mode) if part)
+
+
+def _candidates(job: Candidates) -> list[Candidate]:
+    """For controls that stay on the path."""
+    room = job.room
+    found = []
     for share in SHARES if room is not None else ():
         chords = share * (room or 0.0)
-        candidates[f"planned path, chords within {chords / MICROMETRE:.3g} um"] = planned_polyline(
-            plan, chords
-        )
-    candidates["program as it is"] = programmed_polyline(plan, room or tolerance)
-    predicted = {name: _predicted(line, plan, control) for name, line in candidates.items()}
-    name = min(predicted, key=predicted.__getitem__)
-    line, file = candidates[name], f"{control}.gcode"
-    _write(directory / file, line, plan, control, "")
-    return Exported(
-        file=file,
-        sentence=f"{name}, {len(line.feed):,} moves",
-        predicted=predicted,
-        note=_no_room(plan, tolerance) if room is None else _little_room(room, plan, tolerance),
-    )
+        found += job.chords(chords, f"planned path, chords within {chords / MICROMETRE:.3g} µm")
+    found += job.own(room or job.tolerance)
+    return [one.at(_predicted(job, one)) for one in found]
 
 
-def _for_linuxcnc(directory: Path, plan: Plan, tolerance: float) -> Exported:
-    """`write_program` for LinuxCNC."""
-    room, text = _room(plan, tolerance), own_words(plan.program, plan)
-    found = candidates_of(plan, tolerance, room or 0.0, text)
-    chosen, file = best(found), f"{LINUXCNC}.ngc"
-    if chosen.line is None:
-        assert text is not None
-        (directory / file).write_bytes(with_mode(text, chosen.mode))
-        said = "its own geometry and words"
-    else:
-        _write(directory / file, chosen.line, plan, LINUXCNC, chosen.mode)
-        said = f"{len(chosen.line.feed):,} moves"
-    note = _no_room(plan, tolerance) if room is None else _little_room(room, plan, tolerance)
-    return Exported(
-        file=file,
-        sentence=", ".join(part for part in (chosen.name, said, chosen.mode) if part),
-        predicted={one.name: one.time for one in found if np.isfinite(one.time)},
-        note=note
-        if len(found) > 1
-        else None,  # a program with its own path mode is written as it is, whatever the room
-    )
-
-
-def _write(file: Path, line: Polyline, plan: Plan, control: str, mode: str) -> None:
-    axes = _axes(plan)
-    rapid = _rapid_speed(line, plan.machine, axes)
-    text = polyline_text(line, plan.program, axes, rapid, DIALECTS[control], mode)
-    file.write_text(text, encoding="ascii", errors="replace")
-
-
-def _axes(plan: Plan) -> tuple[str, ...]:
-    return plan.toolpath.axes
-
-
-def _room(plan: Plan, tolerance: float) -> float | None:
-    """How far chords may miss the planned motion [mm]; None if that is nothing. Raises InputError if the motion leaves the program."""
-    left = tolerance - _used(plan)
-    return None if left < 2.0 * ROUNDING else left - ROUNDING
-
-
-def _used(plan: Plan) -> float:
-    """What the plan takes of the tolerance [mm]. Raises InputError if the motion leaves the program."""
-    verdict = plan.verdict
-    assert verdict is not None
-    if verdict.contour_error_mm is None or verdict.vertex_error_mm is None:
-        raise InputError(
-            "the motion leaves the program, so there is no telling what chords may add; see its verdict"
-        )
-    return max(verdict.contour_error_mm, verdict.vertex_error_mm)
-
-
-def _no_room(plan: Plan, tolerance: float) -> str:
-    return (
-        f"the plan uses {_used(plan) / MICROMETRE:.3f} of {tolerance / MICROMETRE:g} um, which leaves no room for chords: plan with "
-        f"--tolerance {LESS * tolerance:.4g}, and export with --tolerance {tolerance:g}"
-    )
-
-
-def _little_room(room: float, plan: Plan, tolerance: float) -> str | None:
-    if room > LITTLE * tolerance:
-        return None
-    return (
-        f"the plan uses {_used(plan) / MICROMETRE:.3f} of {tolerance / MICROMETRE:g} um, which leaves little room for chords: a plan "
-        f"with --tolerance {LESS * tolerance:.4g}, exported with --tolerance {tolerance:g}, may be faster on the control"
-    )
-
-
-def _predicted(line: Polyline, plan: Plan, control: str) -> float:
-    """Time that a control takes for a polyline, dwells included [s]."""
-    stands = standing(plan, line)
+def _predicted(job: Candidates, one: Candidate) -> float:
+    """Time that the control takes for a candidate, dwells included [s]."""
+    plan, line = job.plan, one.line
     feed = np.where(line.rapid, np.inf, line.feed)
-    moving = predicted_time(line.points, feed, stands, plan.machine, _axes(plan), CONTROLS[control])
+    if one.name == AS_IT_IS and job.control.rapid_feed:
+        feed = np.where(line.rapid, job.feed_in_force[line.block], feed)
+    moving = predicted_time(
+        line.points, feed, standing(plan, line), plan.machine, plan.toolpath.axes, MODELS[job.control.name]
+    )
     return moving + float(plan.program.dwell.sum())
-
-
-def _rapid_speed(line: Polyline, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
-    """(n,) highest speed of each move by the velocities of the axes [mm/s]."""
-    step = np.diff(line.points, axis=0)
-    length = np.linalg.norm(step, axis=1, keepdims=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found: FloatArray = np.nanmin(machine.limits("velocity", axes) / np.abs(step / length), axis=1)
-    return found

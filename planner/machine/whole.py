@@ -39,6 +39,7 @@ ROTARY_RADIUS = 50.0
 EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
+_MACRO_OF, _MACRO = re.compile(r"M[1-9]\d{0,3}|M0"), re.compile(r"[A-Za-z_]\w*(\.\d)?")
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
 
 
@@ -57,6 +58,7 @@ class Machine(Record):
     blend_rapids        : whether joints between G0 and feed moves are rounded
     rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
                           file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
+    macros              : what the control does for an M code or T: the name of its macro, by the code ("M6"), for exports
     kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
     control             : what is set in the control's own planner, or None: its defaults
     """
@@ -80,6 +82,7 @@ class Machine(Record):
     kinematics: KinematicsData | None = None
     control: ControlData | None = None
     tools: dict[str, ToolData] = Field(default_factory=dict)
+    macros: dict[str, str] = Field(default_factory=dict)
     positions: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     work_offsets: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
@@ -142,6 +145,11 @@ class Machine(Record):
         for letter in self.kinematics.axes if self.kinematics else ():
             if letter not in self.axes:
                 raise ValueError(f"kinematics: axis '{letter}' is missing; write a table [axes.{letter}]")
+        for code, name in self.macros.items():
+            if not _MACRO_OF.fullmatch(code) or not _MACRO.fullmatch(name):
+                raise ValueError(
+                    f'macros: {code} = "{name}" is not known; write an M code and the name of a macro, e.g. M6 = "TOOL_CHANGE"'
+                )
         for tool in self.tools:
             if not tool.isdecimal() or len(tool) > TOOL_DIGITS:
                 raise ValueError(f"tools: '{tool[:TOOL_DIGITS]}' is not a tool number; write e.g. 1 = 25.0")

@@ -132,6 +132,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
         synchronised=later(program.synchronised),
         splines=dataclasses.replace(program.splines, block=later(program.splines.block)),
         events=events,
+        origins=dataclasses.replace(program.origins, block=later(program.origins.block)),
         **columns,
     )
 

@@ -75,6 +75,7 @@ class Interpreter:
             at_tip=self.tool_point.chain is not None,
         )
         store = Store(len(state.further.letters))
+        store.keep_origin(state)
         self.found = Findings(strict=reading.strict)
         self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.found)
         self.state.strict = reading.strict
@@ -273,6 +274,7 @@ class Interpreter:
             self._check_parked(block)
             homing.go_to_switches(self.state, self.store, block, self.found)
             self._one_shot(block)
+            self.store.keep_origin(self.state)
             self.mover.execute(block)
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
                 text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
@@ -320,6 +322,7 @@ class Interpreter:
         if "retract mode" in g:
             state.to_level, state.retract_given = g["retract mode"] == 980, True
         state.apply_offsets()
+        self.store.keep_origin(state)
 
     # --- what moves ---------------------------------------------------------------------------------------------------------
 

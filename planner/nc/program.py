@@ -115,6 +115,36 @@ class SetLimit:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Origins:
+    """Where programmed zero is, from block to block: K rows, one for each change.
+
+    block  : (K,) the first block that it holds for, not decreasing; of several rows of one block the last holds
+    offset : (K, 3) its machine position: work offset, G92 and tool length together [mm]
+    turned : (K,) whether the work system is rotated about z, so that adding `offset` is not enough
+    """
+
+    block: Array
+    offset: FloatArray
+    turned: Array
+
+    def __post_init__(self) -> None:
+        changes = len(self.block)
+        freeze(self, "block", np.int64, (changes,))
+        freeze(self, "offset", np.float64, (changes, 3))
+        freeze(self, "turned", np.bool_, (changes,))
+
+    def at(self, block: int) -> tuple[FloatArray, bool]:
+        """Offset (3,) and rotation that hold for a block."""
+        row = int(np.searchsorted(self.block, block, side="right")) - 1
+        return (self.offset[row], bool(self.turned[row])) if row >= 0 else (np.zeros(3), False)
+
+
+def no_origins() -> Origins:
+    """Programmed zero at machine zero throughout."""
+    return Origins(block=np.zeros(0), offset=np.zeros((0, 3)), turned=np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
 
@@ -166,6 +196,7 @@ class Program:
     synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no other, ascending
     splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
+    origins      : where programmed zero is in machine coordinates
     notes        : what a user should know of how it was read; `assumptions` come first
     assumptions  : what the reader assumed and what may change geometry or time: "line 9: tool 3 has no length in the machine file: 0
                    (2 times)"
@@ -198,6 +229,7 @@ class Program:
     synchronised: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
+    origins: Origins = field(default_factory=no_origins)
     notes: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))

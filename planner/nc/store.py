@@ -14,7 +14,7 @@ from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
 from planner.nc.faults import Notes
 from planner.nc.further import LETTERS, ROTARY, rotary_feed
-from planner.nc.program import FEED_MOVES, Frame, Kind, Program, SplineTable
+from planner.nc.program import FEED_MOVES, Frame, Kind, Origins, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
 
@@ -84,6 +84,7 @@ class Store:
         self.splines: list[tuple[int, FloatArray, FloatArray]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []
         self.synchronised: list[int] = []
+        self.origins: list[tuple[int, FloatArray, bool]] = []
 
     def begin(self, words: int) -> None:
         """Be ready for a chunk of so many words."""
@@ -148,6 +149,12 @@ class Store:
         event.value[k] = value
         self.events += 1
 
+    def keep_origin(self, state: State) -> None:
+        """Keep where programmed zero is from here on, if that has changed."""
+        last = self.origins[-1] if self.origins else (0, np.zeros(3), False)
+        if state.rotated != last[2] or not np.array_equal(state.offset, last[1]):
+            self.origins.append((self.blocks, state.offset.copy(), state.rotated))
+
     def _spline_points(self, further: FloatArray) -> FloatArray:
         """(K, 4, A) control points of the splines, along which the further axes (B, F) stand still."""
         points = np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3)
@@ -202,6 +209,11 @@ class Store:
                 line=self.event.line[seen].copy(),
                 letter=self.event.letter[seen].copy(),
                 value=self.event.value[seen].copy(),
+            ),
+            origins=Origins(
+                block=np.array([origin[0] for origin in self.origins]),
+                offset=np.array([origin[1] for origin in self.origins]).reshape(-1, 3),
+                turned=np.array([origin[2] for origin in self.origins]),
             ),
             notes=notes.assumptions + notes.others,
             assumptions=notes.assumptions,

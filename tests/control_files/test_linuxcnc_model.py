@@ -152,7 +152,7 @@ def test_corners_with_long_legs_keep_their_own_words(tmp_path: Path) -> None:
         planner.read_program(text=LONG_LEGS), MACHINE, tolerance=0.045, effort="quick", method="second-order"
     )
     made = write_program(tmp_path, plan, "linuxcnc", 0.05)
-    assert made.sentence == "program as it is, its own geometry and words, G64 P0.0500 Q0.0000"
+    assert made.sentence == "program as it is, byte for byte behind a line G21 G64 P0.0500 Q0.0000"
     text = (tmp_path / "linuxcnc.ngc").read_text()
     assert text.replace("G21 G64 P0.0500 Q0.0000\n", "", 1) == LONG_LEGS
     assert text.splitlines()[:2] == ["%", "G21 G64 P0.0500 Q0.0000"]
@@ -179,10 +179,10 @@ def test_a_path_mode_of_the_program_stays(mode: str, tmp_path: Path) -> None:
     text = f"{mode}\n{LONG_LEGS[2:]}"
     plan = planner.plan(planner.read_program(text=text), MACHINE, method="stop")
     made = write_program(tmp_path, plan, "linuxcnc", 0.05)
-    assert made.sentence == "program as it is, with its own path mode, its own geometry and words"
+    assert made.sentence == "program as it is, with its own path mode, byte for byte"
     assert (tmp_path / "linuxcnc.ngc").read_bytes() == text.encode()
     assert made.predicted == {}
-    assert made.note is None
+    assert not made.notes
 
 
 def test_programs_of_another_dialect_are_written_as_moves(tmp_path: Path) -> None:
@@ -191,4 +191,4 @@ def test_programs_of_another_dialect_are_written_as_moves(tmp_path: Path) -> Non
     made = write_program(tmp_path, plan, "linuxcnc", 0.05)
     again = planner.read_program(text=(tmp_path / made.file).read_text())
     assert again.end[-1] == pytest.approx([40, 40, 0])
-    assert made.note is None or "room" in made.note
+    assert "is no linuxcnc program" in made.notes[0]

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import planner
+from planner.control_files.candidates import OWN_PATH, Candidates
 from planner.control_files.chords import planned_polyline, programmed_polyline
-from planner.control_files.dialect import DIALECTS, polyline_text
+from planner.control_files.controls import CONTROLS
 from planner.control_files.program import write_program
 from planner.geometry.distance import distance_near
 from planner.job.plan import Plan
@@ -22,7 +23,7 @@ from tests.commands.command_line import run
 AXIS = {"velocity": 100.0, "acceleration": 2000.0, "jerk": 200000.0}
 MACHINE = Machine(name="m", dt=0.001, tolerance=0.05, axes={"x": AXIS, "y": AXIS, "z": AXIS})
 ZIGZAG = "G21 F6000\n" + "".join(f"G1 X{1.7 * k:.3f} Y{k % 2}\n" for k in range(1, 13))
-WORDS = "G21 F3000\nT2 M6\nS900 M3\nG0 X5 Y5\nG1 Z-1\nG3 X15 Y15 J10\nG4 P0.25\nG1 X0\nM5\nG0 Z5\nM2\n"
+WORDS = "G21 F3000\nT2 M6\nS900 M3\nG0 X5 Y5 Z5\nG1 Z-1\nG3 X15 Y15 J10\nG4 P0.25\nG1 X0\nM5\nG0 Z5\nM2\n"
 TOLERANCE = 0.05
 
 
@@ -43,7 +44,7 @@ def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[:, None] - a - np.clip(u, 0, 1)[..., None] * chord, axis=2).min(axis=1)
 
 
-@pytest.mark.parametrize("control", list(DIALECTS))
+@pytest.mark.parametrize("control", list(CONTROLS))
 def test_an_exported_program_is_within_the_tolerance(plan: Plan, control: str, tmp_path: Path) -> None:
     made = write_program(tmp_path, plan, control, TOLERANCE)
     text = (tmp_path / made.file).read_text()
@@ -65,7 +66,7 @@ def test_the_fastest_prediction_is_written(plan: Plan, tmp_path: Path) -> None:
     best = min(made.predicted, key=made.predicted.__getitem__)
     assert made.sentence.startswith(best)
     assert best.startswith("planned path"), "Klipper slows down at every corner of the zig-zag"
-    assert made.predicted[best] < 0.9 * made.predicted["program as it is"]
+    assert made.predicted[best] < 0.9 * made.predicted[OWN_PATH]
     assert len(made.predicted) == 5
 
 
@@ -95,24 +96,22 @@ def test_the_program_as_it_is_has_its_vertices_and_chords_on_its_arcs(with_words
 @pytest.mark.parametrize(
     ("control", "said"),
     [
-        ("linuxcnc", ["T2", "M6", "S900", "M3", "G0", "G1", "G4 P0.25", "G1", "M5", "G0", "M2"]),
-        ("grbl", ["T2", "M0", "S900", "M3", "G0", "G1", "G4 P0.25", "G1", "M5", "G0", "M2"]),
-        ("marlin", ["T2", "M0", "S900", "M3", "G0", "G1", "G4 P250", "G1", "M5", "G0", "M400"]),
+        ("linuxcnc", ["T2 M6", "M3 S900", "G0", "G1", "G4 P0.25", "G1", "M5", "G0", "M2"]),
+        ("grbl", ["T2", "M0", "M3 S900", "G0", "G1", "G4 P0.25", "G1", "M5", "G0", "M2"]),
+        ("marlin", ["M0", "M3 S900", "G0", "G1", "G4 P250", "G1", "M5", "G0", "M400"]),
     ],
 )
 def test_other_words_stand_where_they_stood(with_words: Plan, control: str, said: list[str]) -> None:
-    line = planned_polyline(with_words, 2e-3)
-    text = polyline_text(
-        line, with_words.program, ("x", "y", "z"), np.full(len(line.feed), 70.0), DIALECTS[control], ""
-    )
-    found = [re.match(r"G4 P[\d.]+|[GMTS]\d+", row) for row in text.splitlines()[1:]]
-    words = [one.group() for one in found if one and one.group() not in ("G21", "G90")]
+    job = Candidates(with_words, CONTROLS[control], TOLERANCE)
+    text = job.written(job.chords(2e-3, "chords")[0])[0].decode()
+    found = [re.match(r"G4 P[\d.]+|T2 M6|M3 S900|[GMT]\d+", row) for row in text.splitlines()[1:]]
+    words = [one.group() for one in found if one and one.group() not in ("G21", "G17", "G90")]
     kept = [word for k, word in enumerate(words) if k == 0 or word != words[k - 1]]
     assert kept == said
     rapid = re.search(r"G0 .*?F([\d.]+)", text)
-    assert (rapid is not None) == (control == "marlin"), "only where G0 is a G1"
+    assert (rapid is not None) == (control == "marlin"), "only where G0 moves at the F in force"
     if rapid:
-        assert float(rapid.group(1)) == pytest.approx(70 * 60, rel=1e-3)
+        assert float(rapid.group(1)) == pytest.approx(100 * 60, rel=1e-3), "the slowest of the axes that move"
 
 
 def test_a_plan_that_leaves_no_room_gives_the_program_as_it_is_and_says_so(
@@ -121,11 +120,10 @@ def test_a_plan_that_leaves_no_room_gives_the_program_as_it_is_and_says_so(
     assert plan.verdict is not None
     assert plan.verdict.contour_error_mm is not None
     made = write_program(tmp_path, plan, "grbl", 0.045)
-    assert made.sentence.startswith("program as it is")
-    assert made.note is not None
+    assert made.sentence == "program as it is, byte for byte"
     assert (
         "leaves no room for chords: plan with --tolerance 0.0405, and export with --tolerance 0.045"
-        in made.note
+        in made.notes[0]
     )
     (tmp_path / made.file).unlink()
     lost = dataclasses.replace(plan, verdict=dataclasses.replace(plan.verdict, contour_error_mm=None))

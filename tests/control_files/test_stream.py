@@ -90,7 +90,7 @@ def test_command_writes_new_directories_only(tmp_path: Path, motion: Trajectory)
         "0.01",
     )
     assert pvt.exit_code == 0, pvt.output
-    assert "um of the setpoints" in pvt.output
+    assert "µm of the setpoints" in pvt.output
     assert (tmp_path / "pvt" / "pvt.csv").exists()
     for arguments, said in [
         ((tmp_path / "plan", "--for", "pvt", "-o", tmp_path / "pvt"), "exists already"),

@@ -1,0 +1,339 @@
+"""The lines of a program as an export needs them: their words, the blocks that they make, and which of them chords may replace.
+
+Chords are written in the program's own coordinates. They say where the tool is only as far as the program does, so a line is replaced
+only if its words alone tell where it begins and ends: straight moves, arcs, cycles and splines under G90 or G91 at a feed per minute,
+of axes that an absolute coordinate has placed before. Everything else stays a line of its own, among it
+
+    the first moves of each axis           wherever the machine stands, they lead to the same place
+    G53, G28, G30, homing                  machine coordinates; what they move has no place in the program's coordinates afterwards
+    G54 to G59.3, G10, G52, G92, G43, G49  they shift those coordinates: all axes are placed anew (G92 places those that it names)
+    rotary and second axes, E              chords have X, Y and Z only
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array
+from planner.machine import Machine
+from planner.nc import codes
+from planner.nc.integers import integers_of
+from planner.nc.language.flat import flat_number
+from planner.nc.leader import without_leader
+from planner.nc.lexer import FAULT, Words, split_words
+from planner.nc.program import MOVES, Kind, Program
+from planner.nc.settings import AXES, EVERYTHING, TEXTS, setting
+
+LINEAR = "XYZ"
+# G codes in tenths.
+G4, G10, G53, G52, G92 = 40, 100, 530, 520, 920
+HOMES = (280, 300)
+# Beside work offsets: what shifts the coordinates that follow (G52, G92.1 to G92.3, G10, tool lengths).
+SHIFTS = frozenset((G52, 921, 922, 923, G10, 430, 431, 432, 434, 490))
+COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
+ENDS = frozenset((20, 300))  # M2 and M30, in tenths
+_ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
+_IN_PLANE = {170: "XY", 180: "XZ", 190: "YZ"}
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word: its letter, its number, and the number as it is written."""
+
+    letter: str
+    value: float
+    text: str
+
+    @property
+    def code(self) -> int:
+        """The number in tenths."""
+        return round(self.value * 10)
+
+    def __str__(self) -> str:
+        return self.letter + self.text
+
+
+@dataclass(slots=True)
+class Row:
+    """A line of a program with at least one word.
+
+    line     : 1-based
+    words    : those of RS274NGC's moves, modes and switches; line numbers are left out
+    others   : codes of other kinds, each with the words that are its own: settings, names, messages, what the user leaves out
+    text     : the line without its comments and number, where it is no words: homing, commands to the control; "" otherwise
+    first, last : its blocks are those from `first` to before `last`
+    motion   : motion code in tenths that its coordinates belong to; -1 for none
+    absolute, inch, per_minute : G90, G20 and G94 are in force at its end
+    inch_before : G20 was in force before it, which its F word is read in
+    plane    : letters of the axes of arcs
+    radius   : cutter radius compensation acts on it, or ends with it
+    placed   : letters of axes whose place the program's words have told before it
+    plain    : chords may replace what it moves
+    """
+
+    line: int
+    words: list[Word]
+    others: list[list[Word]]
+    text: str
+    first: int
+    last: int
+    motion: int = -1
+    absolute: bool = True
+    inch: bool = False
+    inch_before: bool = False
+    per_minute: bool = True
+    plane: str = "XY"
+    radius: bool = False
+    placed: frozenset[str] = frozenset()
+    plain: bool = False
+
+    def g(self) -> list[int]:
+        """Its G codes in tenths."""
+        return [word.code for word in self.words if word.letter == "G"]
+
+    def m(self) -> list[int]:
+        """Its M codes."""
+        return [word.code // 10 for word in self.words if word.letter == "M"]
+
+    def value(self, letter: str) -> Word | None:
+        """Its word of a letter."""
+        return next((word for word in self.words if word.letter == letter), None)
+
+    @property
+    def named(self) -> str:
+        """Letters of its axis words."""
+        return "".join(word.letter for word in self.words if word.letter in AXES)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it makes blocks that have a motion code."""
+        return self.motion >= 0 and self.last > self.first
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed before them."""
+
+    first: int
+    last: int
+    replaced: bool
+    placed: frozenset[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """The rows of a program up to its end.
+
+    program : what the rows read as, block by block those of the plan
+    data    : the text
+    """
+
+    program: Program
+    data: bytes
+    rows: list[Row]
+
+
+def rows_of(data: bytes, program: Program, machine: Machine | None) -> Source:
+    """The rows of a text that reads as `program` on a machine."""
+    reading = program.reading
+    read = data if reading.strict else without_leader(data)[0]
+    words = split_words(read, block_delete=reading.block_delete)
+    applied = integers_of(machine).applied(words)
+    rows = _rows(words, applied, program)
+    axes = "".join(letter.upper() for letter in machine.axes) if machine else LINEAR
+    _Follower(program, LINEAR + "".join(c for c in axes if c in AXES and c not in LINEAR)).follow(rows)
+    return Source(program=program, data=data, rows=rows)
+
+
+def _rows(words: Words, applied: Words, program: Program) -> list[Row]:
+    letters, values, first = words.letter.tolist(), applied.value.tolist(), words.first.tolist()
+    same = (applied.value == words.value).tolist()
+    begin = np.searchsorted(program.line, words.line, side="left").tolist()
+    end = np.searchsorted(program.line, words.line, side="right").tolist()
+    ignored = frozenset(program.reading.ignore)
+    rows, begun = [], False
+    for r, line in enumerate(words.line.tolist()):
+        found, text = [], ""
+        for w in range(first[r], first[r + 1]):
+            if letters[w] == FAULT:
+                text = text or _text(words, first[r])
+            elif letters[w] != ord("N"):
+                number = words.text(w)[1:].replace(" ", "").replace("\t", "").lstrip("+")
+                found.append(Word(chr(letters[w]), values[w], number if same[w] else flat_number(values[w])))
+        mine, others = _parted(found, ignored)
+        if others and others[0][0].letter == "M" and others[0][0].code // 10 in TEXTS:
+            others, text = [], _text(words, first[r])
+        rows.append(Row(line, [] if text else mine, [] if text else others, text, begin[r], end[r]))
+        if (begun and found and found[0].letter == "%") or not {
+            word.code for word in mine if word.letter == "M"
+        }.isdisjoint(ENDS):
+            break
+        begun = True
+    return rows
+
+
+def _text(words: Words, word: int) -> str:
+    """The line from a word on, without its comments and its number."""
+    start = int(words.at[word])
+    stop = words.data.find(b"\n", start)
+    text = words.data[start : stop if stop >= 0 else len(words.data)].decode("utf-8", "replace")
+    text = text.partition(";")[0].partition("(")[0].strip()
+    return text[len(words.text(word)) :].strip() if words.letter[word] == ord("N") else text
+
+
+def _parted(words: list[Word], ignored: frozenset[str]) -> tuple[list[Word], list[list[Word]]]:
+    """The words of moves, modes and switches; and the others, each code with the words behind it that are its own."""
+    letters = "".join(word.letter for word in words)
+    mine: list[Word] = []
+    others: list[list[Word]] = []
+    own = ""
+    for k, word in enumerate(words):
+        if word.letter in "%O$":
+            others.append([word])
+            own = EVERYTHING if word.letter == "%" else ""
+        elif word.letter in "GM":
+            known = word.code in (codes.G_GROUP if word.letter == "G" else codes.M_GROUP)
+            left_out = f"{word.letter}{codes.number(word.code)}" in ignored
+            behind = re.split("[GM]", letters[k + 1 :], maxsplit=1)[0]
+            found = setting(word.letter, word.code, letters[:k].replace("M", ""), behind)
+            if known and not left_out and found is None:
+                mine.append(word)
+                own = ""
+            else:
+                others.append([word])
+                own = found.own if found and not left_out else EVERYTHING
+        elif word.letter in own:
+            others[-1].append(word)
+        else:
+            mine.append(word)
+    return mine, others
+
+
+class _Follower:
+    """Goes through the rows once, and fills in what is in force on each."""
+
+    def __init__(self, program: Program, axes: str):
+        self.program, self.axes, self.ignored = program, axes, frozenset(program.reading.ignore)
+        self.motion, self.absolute, self.inch, self.per_minute, self.diameters = -1, True, False, True, False
+        self.plane, self.radius, self.leaving = 170, False, False  # leaving: no move has come after G40
+        self.placed: frozenset[str] = frozenset()
+        self.simple = np.isin(program.kind, MOVES)
+        self.simple[program.synchronised] = False
+        before = np.vstack([program.start, program.end])
+        self.turns = {
+            letter.upper(): np.diff(before[:, k]) != 0.0
+            for k, letter in enumerate(program.axes)
+            if letter.upper() not in LINEAR
+        }
+
+    def follow(self, rows: list[Row]) -> None:
+        """Fill in the rows."""
+        for row in rows:
+            row.inch_before, row.placed = self.inch, self.placed
+            if row.text:
+                row.absolute, row.inch, row.per_minute = self.absolute, self.inch, self.per_minute
+                if row.last > row.first:  # homing
+                    self.placed = frozenset()
+                continue
+            g = row.g()
+            self._modes(g)
+            row.absolute, row.inch, row.per_minute = self.absolute, self.inch, self.per_minute
+            row.plane = _IN_PLANE[self.plane]
+            row.radius = self.radius or not COMPENSATION_ON.isdisjoint(g)
+            if any(codes.G_GROUP[code] == "work offset" or code in SHIFTS for code in g):
+                self.placed = row.placed = frozenset()
+            self._place(row, g)
+            self.radius = row.radius and not (self.leaving and row.moves)
+
+    def _modes(self, g: list[int]) -> None:
+        groups = {codes.G_GROUP[code]: code for code in g}
+        if "motion" in groups or "cycle end" in groups:
+            self.motion = groups.get("motion", -1)
+        self.inch = groups.get("units", 200 if self.inch else 210) == 200
+        self.absolute = groups.get("distance mode", 900 if self.absolute else 910) == 900
+        self.per_minute = groups.get("feed mode", 940 if self.per_minute else 930) == 940
+        self.diameters = groups.get("lathe diameter mode", 70 if self.diameters else 80) == 70
+        self.plane = groups.get("plane", self.plane)
+        if not COMPENSATION_ON.isdisjoint(g):
+            self.leaving = False
+        elif COMPENSATION_OFF in g:
+            self.leaving = True
+
+    def _place(self, row: Row, g: list[int]) -> None:
+        """Which axes the row moves, whether chords may do it, and which are placed after it."""
+        named = frozenset(row.named)
+        one_shot = next((code for code in g if codes.G_GROUP[code] == "one-shot"), -1)
+        if one_shot == G92:
+            self.placed |= named
+        elif one_shot in HOMES:
+            self.placed -= named or frozenset(self.axes)
+        elif one_shot == G53:
+            row.motion = self.motion
+            self.placed -= named
+        elif one_shot == -1 and (named or (self.motion in codes.ARCS and _is_arc(row, g))):
+            row.motion = self.motion
+            if row.moves:
+                row.plain = self._is_plain(row, named)
+            self.placed |= named if self.absolute else frozenset()
+
+    def _is_plain(self, row: Row, named: frozenset[str]) -> bool:
+        blocks = slice(row.first, row.last)
+        needed = named
+        if row.motion in codes.CYCLES or row.radius:
+            needed = needed | frozenset(LINEAR)
+        elif row.motion > 10:
+            needed = needed | frozenset(row.plane)
+        cycle = row.motion in _ROUGH_CYCLES
+        known = row.motion <= 30 or cycle or row.motion in codes.SPLINES
+        return bool(
+            known
+            and needed <= row.placed
+            and self.per_minute
+            and not self.diameters
+            and not self.program.origins.at(row.first)[1]
+            and (self.simple[blocks] | (cycle & (self.program.kind[blocks] >= Kind.DWELL))).all()
+            and not any(self.turns[letter][blocks].any() for letter in self.turns)
+            and row.value("E") is None
+            and self.ignored.isdisjoint(named)
+        )
+
+
+def _is_arc(row: Row, g: list[int]) -> bool:
+    """Whether a row under G2 or G3 is a full circle, which needs no coordinate."""
+    return not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
+
+
+def groups(rows: list[Row], replaced: Array) -> list[Group]:
+    """The blocks of the rows in groups: those that chords replace one after the other, and those of the program's own words.
+
+    replaced : (R,) the rows that chords replace
+    """
+    found: list[Group] = []
+    parted = True
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        shifts = any(codes.G_GROUP[code] in ("one-shot", "work offset", "tool length") for code in row.g())
+        parted |= shifts or bool(row.text)
+        if row.last == row.first:
+            continue
+        last = found[-1] if found else None
+        if last is not None and last.replaced == chords and not (parted and chords):
+            found[-1] = Group(last.first, row.last, last.replaced, last.placed)
+        else:
+            found.append(Group(row.first, row.last, chords, row.placed))
+        parted = shifts
+    return found
+
+
+def breaks(rows: list[Row], replaced: Array) -> Array:
+    """(K,) the blocks before which something else than a chord stands, ascending: there the polyline has a vertex.
+
+    replaced : (R,) the rows that chords replace
+    """
+    found: set[int] = set()
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:
+            found |= {row.first, row.last}
+    return np.array(sorted(found), dtype=np.int64)

@@ -119,7 +119,7 @@ def _broken(text, out, machine, control, places, reading) -> str:  # type: ignor
 
 
 def _broken_for_linuxcnc(text, out, places) -> str:  # type: ignore[no-untyped-def]
-    for start, offset in places:
+    for start, offset in places[1::4]:  # a process each
         found, before = interpreted(out, start, offset), interpreted(text, start, offset)
         if isinstance(found, str):
             return f"rs274: {found}"

@@ -205,6 +205,7 @@ def _parted(words: list[Word], ignored: frozenset[str]) -> tuple[list[Word], lis
             else:
                 others.append([word])
                 own = found.own if found and not left_out else EVERYTHING
+                own += "E" if word.code == G92 else ""
         elif word.letter in own:
             others[-1].append(word)
         else:

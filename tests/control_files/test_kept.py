@@ -114,7 +114,7 @@ def test_steps_between_chords_begin_where_the_program_has_them_begin() -> None:
     (one,) = job.chords(2e-3, "chords")
     lines = job.written(one)[0].decode().splitlines()
     step = next(k for k, line in enumerate(lines) if line.startswith("G91"))
-    assert re.search(r"Y10( F\d+)?$", lines[step - 1]), "the corner of the program"
+    assert re.search(r"Y10( F[\d.]+)?$", lines[step - 1]), "the corner of the program"
     assert any(line.startswith("G92 X0") for line in lines)
 
 

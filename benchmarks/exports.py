@@ -132,10 +132,12 @@ def of_file(file: Path, machine: Machine) -> list[Row]:
     """The exports of a program of a folder, by the cheapest method."""
     reading = Reading(extruder="ignore")
     try:
-        program = planner.read_program(file, machine, extruder="ignore")
-        plan = planner.plan(program, machine, method="kinematic", extruder="ignore")
+        program = planner.read_program(file, machine, reading)
+        plan = planner.plan(program, machine, method="kinematic", tolerance=0.9 * TOLERANCE)
     except InputError as fault:
         return [Row(file.name, control, "not read", str(fault.message)) for control in CONTROLS]
+    if plan.trajectory is None or plan.verdict is None or plan.verdict.contour_error_mm is None:
+        return [Row(file.name, control, "not planned", plan.sentence) for control in CONTROLS]
     return [_exported(file, plan, machine, control, reading) for control in CONTROLS]
 
 

@@ -39,11 +39,12 @@ def prefix(start: tuple[float, ...], offset: tuple[float, ...]) -> str:
 
 
 def readable(text: str, control: str = "") -> str:
-    """A program as the reader knows it: PAUSE is M0, a control's milliseconds are seconds, and there is no percent sign."""
+    """A program as the reader knows it: PAUSE is M0, milliseconds are seconds; without percent signs, and M400 at its end."""
     if control in MILLISECONDS:
         text = re.sub(
             r"^G4 P([\d.]+)", lambda found: f"G4 P{float(found[1]) / 1e3:g}", text, flags=re.MULTILINE
         )
+    text = re.sub(r"^M400\s*$", "", text, flags=re.MULTILINE)
     text = re.sub(r"^PAUSE\b.*$", "M0", text, flags=re.MULTILINE)
     return re.sub(r"^\s*%.*$", "", text, flags=re.MULTILINE)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.units import MILLISECOND
-from planner.control_files.controls import Control
-from planner.control_files.rows import G4, G10, G92, HOMES, Row, Source, Word
+from planner.control_files.controls import Control, is_command
+from planner.control_files.rows import G4, G10, G92, HOMES, Row, Source, Word, sets_tools
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.leader import without_leader
@@ -69,18 +69,7 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
 
 def _row_why_not(row: Row, source: Source, control: Control) -> str:
     if row.text:
-        known = (
-            r"\$[HX]"
-            if control.name == "grbl"
-            else r"(G28\b|M11[78]\b).*"
-            if control.one_command
-            else r"\b\B"
-        )
-        return (
-            ""
-            if re.fullmatch(known, row.text, re.IGNORECASE)
-            else f"{row.text!r} is no command of this control"
-        )
+        return "" if is_command(row.text, control) else f"{row.text!r} is no command of this control"
     for other in row.others:
         if not _is_known(other, source, control):
             return f"{''.join(map(str, other))} is not known"
@@ -141,6 +130,8 @@ def _grbl_why_not(row: Row, source: Source, control: Control) -> str:
     absolute = source.program.reading.arc_centres == ABSOLUTE
     if row.motion in codes.ARCS and (row.value("P") is not None or absolute):
         return "an arc with P, or with absolute centres"
+    if sets_tools(row):
+        return "G10 or G43.1 with more than grbl's"
     if row.inch != row.inch_before and row.value("F") is not None:
         return "F beside G20 or G21, which grbl reads in the new units"
     length = sum(len(word.text) + 1 for word in row.words)

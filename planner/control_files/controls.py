@@ -11,6 +11,7 @@ A word that stands in no table is refused with its line. Where the tables come f
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from planner.nc import codes
@@ -148,6 +149,20 @@ LINUXCNC = Control(
     percent=True,
     line_max=255,
 )
+# Lines that are no words, by control: homing, unlocking, messages, Klipper's own commands.
+_COMMANDS = {
+    "grbl": re.compile(r"\$[HX]", re.IGNORECASE),
+    "klipper": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*|SET_VELOCITY_LIMIT\b.*", re.IGNORECASE),
+    "marlin": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*", re.IGNORECASE),
+}
+
+
+def is_command(line: str, control: Control) -> bool:
+    """Whether a line that is no words is one that the control knows."""
+    known = _COMMANDS.get(control.name)
+    return known is not None and known.fullmatch(line) is not None
+
+
 CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
 # Codes that mean the same on every control, but that need a build of it with an option: what is said of them.
 OPTIONS = {

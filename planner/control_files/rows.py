@@ -2,7 +2,7 @@
 
 Chords are written in the program's own coordinates. They say where the tool is only as far as the program does, so a line is replaced
 only if its words alone tell where it begins and ends: straight moves, arcs, cycles and splines under G90 or G91 at a feed per minute,
-of axes that an absolute coordinate has placed before. Everything else stays a line of its own, among it
+of axes that an absolute coordinate has placed before. Everything else stays a line of its own:
 
     the first moves of each axis           wherever the machine stands, they lead to the same place
     G53, G28, G30, homing                  machine coordinates; what they move has no place in the program's coordinates afterwards
@@ -25,6 +25,7 @@ from planner.nc.language.flat import flat_number
 from planner.nc.leader import without_leader
 from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.program import MOVES, Kind, Program
+from planner.nc.set_limits import SPEED_FACTOR
 from planner.nc.settings import AXES, EVERYTHING, TEXTS, setting
 
 LINEAR = "XYZ"
@@ -220,6 +221,7 @@ class _Follower:
         self.program, self.axes, self.ignored = program, axes, frozenset(program.reading.ignore)
         self.motion, self.absolute, self.inch, self.per_minute, self.diameters = -1, True, False, True, False
         self.plane, self.radius, self.leaving = 170, False, False  # leaving: no move has come after G40
+        self.factor = 100.0  # of F, in percent
         self.placed: frozenset[str] = frozenset()
         self.simple = np.isin(program.kind, MOVES)
         self.simple[program.synchronised] = False
@@ -234,6 +236,9 @@ class _Follower:
         """Fill in the rows."""
         for row in rows:
             row.inch_before, row.placed = self.inch, self.placed
+            for other in row.others:
+                if f"{other[0]}" == SPEED_FACTOR:  # F words of chords would count by it once more
+                    self.factor = next((word.value for word in other if word.letter == "S"), 0.0)
             if row.text:
                 row.absolute, row.inch, row.per_minute = self.absolute, self.inch, self.per_minute
                 if row.last > row.first:  # homing
@@ -293,6 +298,7 @@ class _Follower:
             known
             and needed <= row.placed
             and self.per_minute
+            and self.factor == 100.0
             and not self.diameters
             and not self.program.origins.at(row.first)[1]
             and (self.simple[blocks] | (cycle & (self.program.kind[blocks] >= Kind.DWELL))).all()
@@ -307,11 +313,16 @@ def _is_arc(row: Row, g: list[int]) -> bool:
     return not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
 
 
-def groups(rows: list[Row], replaced: Array) -> list[Group]:
-    """The blocks of the rows in groups: those that chords replace one after the other, and those of the program's own words.
+def sets_tools(row: Row) -> bool:
+    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows neither."""
+    kind = row.value("L")
+    more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
+    lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)
+    return (G10 in row.g() and more) or lengths
 
-    replaced : (R,) the rows that chords replace
-    """
+
+def groups(rows: list[Row], replaced: Array) -> list[Group]:
+    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words; `replaced` (R,)."""
     found: list[Group] = []
     parted = True
     for row, chords in zip(rows, replaced.tolist(), strict=True):
@@ -329,10 +340,7 @@ def groups(rows: list[Row], replaced: Array) -> list[Group]:
 
 
 def breaks(rows: list[Row], replaced: Array) -> Array:
-    """(K,) the blocks before which something else than a chord stands, ascending: there the polyline has a vertex.
-
-    replaced : (R,) the rows that chords replace
-    """
+    """(K,) the blocks before which something else than a chord stands, ascending, for the rows that chords replace (R,)."""
     found: set[int] = set()
     for row, chords in zip(rows, replaced.tolist(), strict=True):
         if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 from planner.base.units import MILLISECOND
+from planner.control_files.controls import is_command
 from planner.control_files.output import Output, called
 from planner.control_files.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, G92, Row, Word
 from planner.nc import codes
@@ -22,14 +21,7 @@ class Switches(Output):
 
     def _command(self, row: Row) -> None:
         """A line that is no words: homing, a message, a command to the control."""
-        name = self.control.name
-        home = re.fullmatch(r"G28[XYZ\s]*0*", row.text, re.IGNORECASE)
-        keeps = (
-            re.fullmatch(r"\$[HX]", row.text, re.IGNORECASE)
-            if name == "grbl"
-            else (home or re.match(r"M11[78]\b", row.text)) and self.control.one_command
-        )
-        if not keeps:
+        if not is_command(row.text, self.control):
             self._refuse(row, row.text)
         self._say(row.text)
 
@@ -132,6 +124,7 @@ class Switches(Output):
                 continue
             if group == "cutter compensation" and not self.control.cycles:
                 if code in COMPENSATION_ON:
+                    self._know_diameter(row, code)
                     self._note("G41", f"{name} is left out: the tool's radius is in the moves", row)
                 elif code != COMPENSATION_OFF or code in self.control.g:
                     said.append(name)
@@ -153,6 +146,15 @@ class Switches(Output):
                 self._refuse(row, name)
         for text in [" ".join(said)] if said and not self.control.one_command else said:
             self._say(text)
+
+    def _know_diameter(self, row: Row, code: int) -> None:
+        """Refuse the radius of a tool that the machine file does not have: its centre would go along the contour."""
+        word = row.value("D")
+        number = word.text if word is not None else self.tool[1:]
+        tool = self.machine.tools.get(str(int(float(number)))) if number else None
+        given = code in (411, 421) and word is not None  # the diameter itself
+        if not given and (tool is None or not tool.diameter):
+            self._refuse(row, f"G{codes.number(code)} of a tool whose diameter the machine file does not say")
 
     def _surface_speed(self, row: Row, name: str) -> None:
         if name not in {f"G{codes.number(code)}" for code in self.control.g}:

@@ -13,9 +13,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.control_files.chords import DECIMALS, Polyline
-from planner.control_files.controls import LINUXCNC, Control
+from planner.control_files.controls import GRBL, LINUXCNC, Control
 from planner.control_files.output import INCH_DECIMALS
-from planner.control_files.rows import G4, G10, G53, HOMES, Row, Source, Word
+from planner.control_files.rows import G4, G10, G53, HOMES, Row, Source, Word, sets_tools
 from planner.control_files.switches import Switches
 from planner.machine import Machine
 from planner.nc import codes
@@ -93,6 +93,8 @@ class Translator(Switches):
         """A line of its own that moves, or whose coordinates shift others, word for word."""
         g = row.g()
         one_shot = _one_shot(row)
+        if self.control.name == GRBL.name and sets_tools(row):
+            self._refuse(row, "G10 or G43.1 with more than an origin, or a length in Z")
         if {431, 432} & set(g) and not row.moves:
             return  # the coordinates are those of the tool length
         if one_shot == G10 and self.program.reading.dialect == FANUC:

@@ -253,6 +253,14 @@ def test_what_no_straight_move_can_say_is_refused_with_its_line() -> None:
     assert refused("G21 G90\nG0 X0 Y0\nM140 S60\nG1 X4 F30\nM2\n", "grbl").startswith("3: M140")
 
 
+def test_a_radius_that_nobody_knows_is_refused() -> None:
+    """The control has no G41: the tool's centre would go along the contour."""
+    text = "G21 G90\nT4 M6\nG0 X0 Y0 Z1\nG41 D4 G1 X5 Y-3 F300\nX20\nG40 X30 Y9\nM2\n"
+    assert refused(text, "grbl").startswith("4: G41 of a tool whose diameter the machine file does not say")
+    assert refused("G21 G90\nG10 L1 P3 Z4\nG0 X1 Y1\nG1 X3 F60\nM2\n", "grbl").startswith("2: G10")
+    assert refused("G21 G90\nG43.1 X1 Z4\nG0 X1 Y1\nG1 X3 F60\nM2\n", "grbl").startswith("2: G10 or G43.1")
+
+
 @pytest.mark.parametrize("control", ["grbl", "klipper", "marlin"])
 def test_cycles_and_compensation_become_straight_moves(control: str) -> None:
     text = (
@@ -272,6 +280,13 @@ def test_printers_words_and_extruders_stay() -> None:
     assert exported(text + "G17\n", "klipper", "own", extruder="ignore") == [
         "G90", *(line.split(" ;")[0] for line in text.splitlines() if line != "G90"), "M400",
     ]  # fmt: skip
+
+
+def test_planned_feeds_do_not_count_by_a_speed_factor_once_more() -> None:
+    text = "G21\nG90\nM82\nG1 X0 Y0 F900\nG1 X9\nM220 S300\nG1 X2\nG1 Y4\nM220 S100\nG1 X8\nG1 X1 Y1\n"
+    lines = exported(text, "klipper")
+    first, last = lines.index("M220 S300"), lines.index("M220 S100")
+    assert [re.sub(" F900", "", line) for line in lines[first + 1 : last]] == ["G1 X2", "G1 Y4"]
 
 
 def test_the_head_says_from_what_for_which_control_and_with_which_assumptions(tmp_path: Path) -> None:

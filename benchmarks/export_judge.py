@@ -8,6 +8,7 @@ discrete Frechet distance of points that are close together), and dwells and sto
 from __future__ import annotations
 
 import math
+import os
 import re
 import subprocess
 import tempfile
@@ -183,6 +184,7 @@ def interpreted(text: str, start: tuple[float, ...], offset: tuple[float, ...]) 
             capture_output=True,
             text=True,
             check=False,
+            env={**os.environ, "HOME": folder},  # where it shares its tool table with whatever else runs
         )
     if ran.returncode:
         return (ran.stdout + ran.stderr).strip().splitlines()[-1] if ran.stdout + ran.stderr else "refused"

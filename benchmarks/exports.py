@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import signal
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -128,6 +129,25 @@ def _broken_for_linuxcnc(text, out, places) -> str:  # type: ignore[no-untyped-d
     return ""
 
 
+def of_file_within(file: Path, machine: Machine, seconds: float) -> list[Row]:
+    """`of_file`, given up after so many CPU seconds."""
+
+    def too_long(*_: object) -> None:
+        raise TimeoutError
+
+    signal.signal(signal.SIGPROF, too_long)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        return of_file(file, machine)
+    except TimeoutError:
+        return [
+            Row(file.name, control, "not tried", f"takes longer than {seconds:g} CPU s")
+            for control in CONTROLS
+        ]
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
 def of_file(file: Path, machine: Machine) -> list[Row]:
     """The exports of a program of a folder, by the cheapest method."""
     reading = Reading(extruder="ignore")
@@ -170,6 +190,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--programs", type=Path)
     parser.add_argument("--largest", type=int, default=10**9, help="bytes of a program of the folder")
+    parser.add_argument("--limit", type=float, default=60.0, help="CPU seconds of a program of the folder")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--name", default="exports")
     options = parser.parse_args()
@@ -186,7 +207,7 @@ def main() -> None:
         machine = load_machine("mill")
         for file in sorted(options.programs.iterdir()):
             if file.suffix not in KEEP_OUT and file.stat().st_size <= options.largest:
-                files += of_file(file, machine)
+                files += of_file_within(file, machine, options.limit)
                 print(*files[-len(CONTROLS) :], sep="\n", flush=True)
     data = {
         "jobs": options.jobs,
@@ -226,7 +247,7 @@ def _table(rows: list[Row], files: list[Row], programs: int) -> str:
 
 
 def _cell(row: Row) -> str:
-    why = row.why.split(";")[0] if row.outcome in ("refused", "not read") else ""
+    why = row.why.split(";")[0] if row.outcome in ("refused", "not read", "not tried", "not planned") else ""
     text = f"{row.outcome}: {why}" if why else row.outcome
     return (f"**broken: {row.broken}** {text}" if row.broken else text).replace("|", "/")
 

@@ -42,7 +42,9 @@ def follow(
     )
     if not search:
         seen.match.tally[SEARCHED] = SEARCH_MAX
-    anywhere = AtStop(np.full(axes, np.inf), np.zeros(axes))  # the motion need not rest
+    anywhere = AtStop(
+        np.full(axes, np.inf), np.full(axes, np.inf), np.zeros(axes)
+    )  # the motion need not rest
     carried_t, carried = np.empty(0), np.empty((0, axes))
     for new_t, new in parts:
         t, position = np.concatenate([carried_t, new_t]), np.concatenate([carried, new])

@@ -99,10 +99,11 @@ def new_match(pieces: ProgramPieces) -> Match:
 
 
 class AtStop(NamedTuple):
-    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2], and errors of positions by their
-    digits [mm]."""
+    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2] and jerks [mm/s3], inf where they are not
+    limited, and errors of positions by their digits [mm]."""
 
     acceleration_max: FloatArray
+    jerk_max: FloatArray
     rounding: FloatArray
 
 
@@ -321,7 +322,8 @@ def _watch_stop(
     """What the chord to the present sample, one of `parts` of a period, shows of the stop at vertex i.
 
     If the motion rests at the vertex at some time within a period h, then with |acceleration| <= a its chord over the period
-    is at most a h^2 / 2 long, and the nearer end of the period is at most a (h/2)^2 / 2 away. Per axis, each.
+    is at most a h^2 / 2 long, and the nearer end of the period is at most a (h/2)^2 / 2 away; where jerk is limited to j, at rest the
+    acceleration is zero too, and it is j h^3 / 6 and j (h/2)^3 / 6. Per axis, each.
     """
     before, point = match.place[BEFORE], match.place[POINT]
     acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
@@ -329,7 +331,11 @@ def _watch_stop(
     for axis in range(len(point)):
         move = abs(point[axis] - before[axis])
         bow = acceleration_max[axis] * period * period / 8.0
-        slow = max(slow, max(move * parts - STILL - 2.0 * rounding[axis], 0.0) / (4.0 * bow))
+        most = 4.0 * bow
+        if math.isfinite(at_stop.jerk_max[axis]):
+            bow = min(bow, at_stop.jerk_max[axis] * period**3 / 48.0)
+            most = min(most, at_stop.jerk_max[axis] * period**3 / 6.0)
+        slow = max(slow, max(move * parts - STILL - 2.0 * rounding[axis], 0.0) / most)
         away_sq += (bow + rounding[axis]) ** 2
         still = still and move <= STILL
     away = math.sqrt(away_sq) + PLACE_ROUNDING

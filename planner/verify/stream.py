@@ -149,7 +149,8 @@ def _block(
     seen.gap_max = max(seen.gap_max, float(periods.max(initial=0.0)))
     place = nowhere(len(t))
     piece = place.piece
-    at_stop = AtStop(limits.acceleration_at_stop, limits.rounding)
+    jerk = limits.per_axis[2] if limits.jerk_limited else np.full(len(limits.rounding), np.inf)
+    at_stop = AtStop(limits.acceleration_at_stop, jerk, limits.rounding)
     match_samples(pieces, seen.match, t, position, skip, middles, at_stop, place)
     speed = np.full(len(t), np.nan)
     if limits.judged[0]:

@@ -240,3 +240,14 @@ def test_a_toolpath_that_contradicts_itself_is_refused():
     broken = type(toolpath)(**{**fields, "start": moved})
     with pytest.raises(ValueError, match=r"segment 2 \(line 30\) does not start where the one before ends"):
         verify(sample(polyline(SQUARE), M.dt), broken, M)
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.8])
+def test_a_stop_run_through_slowly_is_no_rest_where_jerk_is_limited(speed):
+    # a period of 1 ms shows of a rest at most j h^3/6 = 0.033 um of 2e5 mm/s3, which is 0.033 mm/s; a h/2 is 1 mm/s of 2000 mm/s2
+    toolpath = Moves().line(0.5, feed=speed).dwell(1e-4).line(1, feed=speed).toolpath(M)
+    verdict = judge(polyline([(0, 0, 0), (1, 0, 0)], feed=speed, jerk=2e5), toolpath)
+    assert "no full stop" in fault(verdict, "stop")
+    rests = chain(*(polyline([(a, 0, 0), (a + 0.5, 0, 0)], feed=speed, jerk=2e5) for a in (0.0, 0.5)))
+    verdict = judge(rests, toolpath)
+    assert not [text for text in verdict.faults if text.startswith("stop")], verdict.faults

@@ -100,6 +100,8 @@ def make_corners(*, turns: bool = True) -> CornerCheck:
         "miss": np.array([0.015, 0.01, 0.0]),
         "chord_error": np.array([0.001, 0.001, 0.0]),
         "budget_ratio": np.array([0.8, 0.55, 0.0]),
+        "delivered_speed": feed / own,
+        "delivered_budget": np.array([0.75, 0.5, 0.0]),
     }
     return CornerCheck(**(columns if turns else {name: column[:0] for name, column in columns.items()}))
 
@@ -139,6 +141,7 @@ def make_plan(
             s=t,
             feed=t,
             active=np.arange(40) % 3,
+            reached=np.eye(5, dtype=bool)[np.arange(40) % 3],
             active_names=("feed", "velocity.x", "acceleration.y", "none", "rest"),
             share=np.array([0.25, 0.002, 0.7, 0.03, 0.018]),
         )

@@ -1,6 +1,7 @@
 """The limit of the programmed feed, the F word or the machine's largest feed:  feed <= F,  so x <= F^2.
 
-At a point between two blocks the smaller of both counts.
+At a point between two blocks the smaller of both counts. With rotary axes F is the speed of the linear ones (geometry/word_feed.py):
+on a curve that rounds a corner or a spline their part of the path is another one than on the block, and F holds there too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.limit import Cap, Limit
+from planner.geometry.word_feed import allowed_along
+from planner.machine import LINEAR_AXES
 
 if TYPE_CHECKING:
     from planner.constraints.on_grid import OnGrid
@@ -29,7 +32,13 @@ class ProgrammedFeed(Limit):
 
     def at_points(self, grid: OnGrid) -> Iterator[Cap]:
         feed_sq = self.inside(grid)
-        yield Cap(self.name, np.minimum(feed_sq[grid.left], feed_sq[grid.right]))
+        cap = np.minimum(feed_sq[grid.left], feed_sq[grid.right])
+        if set(grid.axes) - set(LINEAR_AXES):
+            samples = grid.samples
+            for side in (grid.left, grid.right):
+                held = allowed_along(samples.path.toolpath, samples.segment[side], samples.d1)
+                cap = np.minimum(cap, feed_sq_max(held))
+        yield Cap(self.name, cap)
 
     def inside(self, grid: OnGrid) -> FloatArray:
         samples = grid.samples

@@ -296,10 +296,14 @@ def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> Flo
     return feed
 
 
+def feed_groups(axes: tuple[str, ...]) -> Array:
+    """(A,) what F goes by, of which the first that moves counts: 0 for x, y, z, 1 for u, v, w, 2 for rotary axes."""
+    return np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
+
+
 def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath) -> FloatArray:
     """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes by (program.py)."""
-    change = (laid.end - laid.start) ** 2
-    groups = np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
+    change, groups = (laid.end - laid.start) ** 2, feed_groups(axes)
     further = change[:, groups > 0].sum(axis=1)
     linear, parallel, rotary = (np.sqrt(change[:, groups == n].sum(axis=1)) for n in range(3))
     turned = (laid.arc >= 0) | (laid.curve >= 0)

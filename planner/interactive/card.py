@@ -9,17 +9,26 @@ from collections.abc import Iterable
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from planner.base.units import MICROMETRE
-from planner.report.colours import LIGHT, limit_colours
+from planner.report.colours import COLOURS
 from planner.report.html.picture import path_picture
-from planner.report.optimum import price_rows
+from planner.report.rows import VERDICT, plan_rows
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
 SIZE = 320.0  # of the picture, its longer side [px]
+BAR = COLOURS[0]
+# Rows of the table of a plan that are shown, besides what more of the limits saves.
+SHOWN = (
+    "cycle time",
+    "stopping at every block",
+    "beside the motion",
+    "total",
+    "contour error",
+    "corners missed by",
+    VERDICT,
+    "",
+)
 NOTES, HELD = 4, 5  # notes, and limits with the largest shares of the time, that are shown
 
 
@@ -47,31 +56,19 @@ def _rows(plan: Plan) -> Iterable[tuple[str, str]]:
     if plan.trajectory is None or plan.verdict is None:
         yield "not solved", html.escape(plan.sentence)
         return
-    time, verdict = plan.trajectory.cycle_time, plan.verdict
-    yield "cycle time", f"<b>{time:.4f} s</b>"
-    if plan.method != "stop" and np.isfinite(plan.stop_time):
-        yield "stopping at every block", f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
-    yield "verdict", "<b>passed</b>" if verdict.passed else f"<b>failed</b>: {html.escape(verdict.faults[0])}"
-    if verdict.contour_error_mm is not None:
-        yield "contour error", f"{verdict.contour_error_mm / MICROMETRE:.3f} µm"
-    if plan.prices is not None:
-        for label, text in price_rows(plan.prices, time)[:2]:
-            yield label, html.escape(text)
+    for label, text in plan_rows(plan):
+        if label in SHOWN or "saves" in label or label.endswith("more tolerance"):
+            shown = html.escape(text)
+            yield html.escape(label), f"<b>{shown}</b>" if label in ("cycle time", VERDICT) else shown
 
 
 def _held(plan: Plan) -> str:
-    """A bar of the cycle time by what holds the motion, and its legend."""
+    """What holds the motion, each with its share of the cycle time as a bar."""
     if plan.grid is None:
         return ""
-    ranked = plan.grid.ranked()
-    shown = ranked[:HELD]
-    colours = limit_colours([name for name, _ in shown])
-    if len(ranked) > HELD:
-        shown.append(("others", sum(share for _, share in ranked[HELD:])))
-        colours.append(LIGHT)
-    parts, words = [], []
-    for (name, share), colour in zip(shown, colours, strict=True):
-        parts.append(f'<span style="background:{colour};width:{100 * share:.2f}%"></span>')
-        words.append(f'<span style="color:{colour}">■</span> {html.escape(name)} {100 * share:.0f} %')
-    bar = f'<div style="display:flex;height:8px;max-width:420px;margin:6px 0 2px">{"".join(parts)}</div>'
-    return f"{bar}<small>held by {' &nbsp; '.join(words)}</small>"
+    rows = "".join(
+        f'<div style="display:flex;align-items:center;gap:6px"><span style="flex:0 0 120px">{html.escape(name)} {percent} %</span>'
+        f'<span style="background:{BAR};height:8px;width:{2 * percent}px"></span></div>'
+        for name, percent in plan.grid.percents()[:HELD]
+    )
+    return f"<small>held by{rows}</small>"

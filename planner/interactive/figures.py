@@ -77,7 +77,7 @@ class PlanFigures:
                     mode="lines",
                     name="motion",
                     line=line,
-                    customdata=np.stack([shown.line, shown.feed, named, shown.t], axis=1).tolist(),
+                    customdata=np.stack([shown.line, samples.feed, named, shown.t], axis=1).tolist(),
                     hovertemplate="line %{customdata[0]}<br>feed %{customdata[1]:.4~g} mm/s<br>held by %{customdata[2]}"
                     "<br>t %{customdata[3]:.4f} s<extra></extra>",
                 ),
@@ -146,7 +146,7 @@ class PlanFigures:
     def _feed_traces(self, against: str) -> list[Any]:
         shown, go = self._samples.shown, _graph_objects()
         x = getattr(shown, against)
-        asked = self._plan.program.feed[shown.block]
+        asked = self._samples.programmed
         dashed = {"color": GREY, "width": 1, "dash": "dash"}
         return [
             go.Scattergl(
@@ -156,7 +156,7 @@ class PlanFigures:
                 line=dashed,
                 hoverinfo="skip",
             ),
-            go.Scattergl(x=x, y=shown.feed, name="feed", line={"color": COLOURS[0], "width": 1.6}),
+            go.Scattergl(x=x, y=self._samples.feed, name="feed", line={"color": COLOURS[0], "width": 1.6}),
         ]
 
     def _coloured(self, color: str) -> Mapping[str, Any]:
@@ -176,8 +176,8 @@ class PlanFigures:
                 "showscale": True,
                 "colorbar": bar,
             }
-        values = samples.shown.feed if color == "feed" else samples.deviation / MICROMETRE
-        counts = np.isfinite(self._plan.program.feed[samples.shown.block])
+        values = samples.feed if color == "feed" else samples.deviation / MICROMETRE
+        counts = np.isfinite(samples.programmed)
         if (
             color == "deviation" or not counts.any()
         ):  # else rapids have the colour of the fastest move with a feed

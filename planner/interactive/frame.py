@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from planner.base.errors import InputError
 from planner.job.at_tip import joints_of
 from planner.report.trajectory_file import trajectory_columns, units
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     import pandas
@@ -26,8 +27,12 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
     trajectory = plan.require().trajectory
     assert trajectory is not None
     joints = joints_of(plan)
-    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory, joints))
+    word = WordFeed(plan.toolpath)
+    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory, joints, word.of))
     table.attrs["units"] = units(
-        trajectory.axes, extruder=plan.toolpath.extrusion is not None, tip=joints is not None
+        trajectory.axes,
+        extruder=plan.toolpath.extrusion is not None,
+        tip=joints is not None,
+        feed=word.units,
     )
     return table

@@ -310,4 +310,4 @@ class Job:
 
 def _largest_shares(grid: GridHistory) -> str:
     """The three limits that hold a motion longest."""
-    return ", ".join(f"{name} {share:.0%}" for name, share in grid.ranked()[:3])
+    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents()[:3])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -10,6 +11,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 
 SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
+SHARE_DIGITS = 4  # of a share of the cycle time, in every output
+WORDS = {"none": "nothing", "rest": "dwells"}  # for what no limit holds
 PRICES_SHOWN = 4  # of a price list, in a line
 
 
@@ -53,29 +56,35 @@ class CornerTable:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
-    """The profile at the grid points of the solver, and the active limit at each of them (sensitivity/activity.py).
+    """The profile at the grid points of the solver, and the limits that are active at each of them (sensitivity/activity.py).
 
     t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
-    active       : (P,) index in `active_names` of the limit that is active in the interval to the right of each point
+    active       : (P,) index in `active_names` of the limit that is shown for the interval to the right of each point: of those that
+                   are active there the one with the largest price, or the closest
+    reached      : (P, K) which of the K of `active_names` are active there
     active_names : names of limits, then "none" and "rest"
-    share        : fraction of the cycle time in which each of them is active [-]; they add up to 1
+    share        : (K,) fraction of the cycle time in which each is active [-]; those that are active together count in full each
     """
 
     t: FloatArray
     s: FloatArray
     feed: FloatArray
     active: Array
+    reached: Array
     active_names: tuple[str, ...]
     share: FloatArray
 
     def ranked(self) -> list[tuple[str, float]]:
-        """Names and fractions of the cycle time: the limits, largest fraction first, then "none" and "rest"."""
-        limits, others = (
-            np.flatnonzero(self.share[:-2]),
-            len(self.share) - 2 + np.flatnonzero(self.share[-2:]),
-        )
-        order = [*limits[np.argsort(-self.share[limits], kind="stable")], *others]
-        return [(self.active_names[k], float(self.share[k])) for k in order]
+        """Names and fractions of the cycle time, to `SHARE_DIGITS`: the limits, largest fraction first, then "none" and "rest"."""
+        share = np.round(self.share, SHARE_DIGITS)
+        limits, others = np.flatnonzero(share[:-2]), len(share) - 2 + np.flatnonzero(share[-2:])
+        order = [*limits[np.argsort(-share[limits], kind="stable")], *others]
+        return [(self.active_names[k], float(share[k])) for k in order]
+
+    def percents(self) -> list[tuple[str, int]]:
+        """Those of `ranked` in whole per cent, halves up, from 1 % on; "nothing" and "dwells" for "none" and "rest"."""
+        found = [(WORDS.get(name, name), math.floor(100.0 * share + 0.5)) for name, share in self.ranked()]
+        return [(name, percent) for name, percent in found if percent]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -33,7 +33,9 @@ from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
+from planner.report.rows import plan_rows
 from planner.report.trajectory_file import Format, units, write_trajectory
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -75,14 +77,15 @@ def write_plan(
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
         trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
+        feed_of = WordFeed(plan.toolpath).of
         if isinstance(trajectory, TrajectoryOnDemand):  # evaluated once for both files
             watch = BlockWatch(plan.toolpath)
             write_trajectory(
-                new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about, joints
+                new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about, joints, feed_of
             )
             blocks = watch.planned(trajectory)
         else:
-            write_trajectory(new / f"trajectory.{file_format}", trajectory, about, joints)
+            write_trajectory(new / f"trajectory.{file_format}", trajectory, about, joints, feed_of)
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
@@ -175,6 +178,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "notes": plan.notes,
             "timings_s": plan.timings,
             "versions": versions(),
+            "told": plan_rows(plan),
         }
     )
 
@@ -229,6 +233,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
                 trajectory.axes,
                 extruder=plan.toolpath.extrusion is not None,
                 tip=plan.joints is not None,
+                feed=WordFeed(plan.toolpath).units,
             ),
             "tool_point": _tool_point(plan.program.tool_point),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),

@@ -15,24 +15,30 @@ from planner.base.units import MICROMETRE
 if TYPE_CHECKING:
     from planner.job.records import DearCorners, GridHistory, PriceList
 
-SHARE_SHOWN = 0.01  # what holds less of the time is told as "others" [-]
 LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
 SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]
 MILLISECOND = 1e-3  # [s]
-OTHERS = "others"
 NOTHING = "nothing"
 HINT = "a hint only"
 
 
 def held_by_text(grid: GridHistory) -> str:
-    """Active limits with their share of the time: "jerk.y 41 %, feed 12 %, ..."."""
-    ranked = grid.ranked()
-    told = [(name, share) for name, share in ranked if share >= SHARE_SHOWN]
-    rest = sum(share for _, share in ranked) - sum(share for _, share in told)
-    if rest >= SHARE_SHOWN:
-        told.append((OTHERS, rest))
-    words = {"none": NOTHING, "rest": "dwells"}
-    return ", ".join(f"{words.get(name, name)} {100.0 * share:.0f} %" for name, share in told)
+    """Active limits with their share of the time: "feed 98 %, jerk.y 41 %, ..."."""
+    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents())
+
+
+def held_by_rows(grid: GridHistory, prices: PriceList | None) -> list[tuple[str, int, str]]:
+    """What is active, for how many per cent of the time, and what more of it saves: "" where that is not known or nothing."""
+    return [(name, percent, _saves(prices, name)) for name, percent in grid.percents()]
+
+
+def _saves(prices: PriceList | None, name: str) -> str:
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    if prices is None or prices.saved.get(name, 0.0) <= 0.0:
+        return ""
+    more = f"{MORE_TOLERANCE / MICROMETRE:g} µm" if name == "tolerance" else f"{100.0 * MORE_LIMIT:g} %"
+    return f"{more} more: {_seconds(prices, name)}"
 
 
 def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:

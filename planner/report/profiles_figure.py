@@ -15,7 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
+from planner.job.records import WORDS
 from planner.machine import ROTARY_AXES
+from planner.report.optimum import held_by_rows
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -26,7 +29,6 @@ BLUE, VERMILION = "#0072B2", "#D55E00"
 # Okabe and Ito without black (limits) and grey (others)
 BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
 OTHERS = "#d0d0d0"
-SHARE_MIN = 0.005  # constraints that limit a smaller share of the time are shown together
 
 
 def profiles_figure(plan: Plan) -> Figure:
@@ -49,8 +51,8 @@ def profiles_figure(plan: Plan) -> Figure:
         figure.legend(
             handles=handles,
             loc="outside upper center",
-            ncols=min(len(handles), 4),
-            title="limited by (share of the time)",
+            ncols=min(len(handles), 3),
+            title="held by (share of the time, and what more of it saves)",
             title_fontsize=8,
             handlelength=1.2,
             columnspacing=1.4,
@@ -83,7 +85,8 @@ def profiles_figure(plan: Plan) -> Figure:
 def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
     trajectory = plan.trajectory
     assert trajectory is not None
-    programmed = plan.program.feed[np.clip(trajectory.block, 0, None)]
+    word = WordFeed(plan.toolpath)
+    feed, programmed = word.of(trajectory), word.programmed(plan.program, np.clip(trajectory.block, 0, None))
     finite = np.isfinite(programmed)
     if finite.any():
         edges = np.flatnonzero(programmed[1:] != programmed[:-1])
@@ -96,8 +99,8 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
                 linewidth=0.7,
                 zorder=1,
             )
-    draw_profile(panel, t, trajectory.feed, BLUE)
-    panel.set_ylim(0.0, 1.08 * max(float(trajectory.feed.max()), 1e-9))
+    draw_profile(panel, t, feed, BLUE)
+    panel.set_ylim(0.0, 1.08 * max(float(feed.max()), 1e-9))
     top = panel.get_ylim()[1]
     if finite.any() and programmed[finite].min() > top:
         said = f"programmed feed {programmed[finite].min():.4g} mm/s is never reached"
@@ -106,20 +109,16 @@ def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
 
 
 def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
-    """A strip whose colour names the limiting constraint; returns the legend, the most frequent first."""
+    """A strip whose colour names what is active, of several the dearest; returns the legend, the largest share first."""
     grid = plan.grid
     assert grid is not None
     assert plan.trajectory is not None
     t = np.asarray(grid.t, dtype=float)
-    duration = np.maximum(np.diff(t), 0.0)
-    active = np.asarray(grid.active)[:-1]
-    share = np.bincount(active, weights=duration, minlength=len(grid.active_names))
-    ranked = [int(k) for k in np.argsort(-share, kind="stable") if share[k] > 0]
-    shown = [k for k in ranked if share[k] >= SHARE_MIN * share.sum()][: len(BANDS)]
-    colour_of = np.full(len(share), len(shown))
-    colour_of[shown] = np.arange(len(shown))
-    winner = majority(t, colour_of[active], len(shown) + 1, plan.trajectory.cycle_time)
-    colours = [matplotlib.colors.to_rgb(c) for c in (*BANDS[: len(shown)], OTHERS)]
+    held = held_by_rows(grid, plan.prices)[: len(BANDS)]
+    place = {name: k for k, (name, _, _) in enumerate(held)}
+    colour_of = np.array([place.get(WORDS.get(name, name), len(held)) for name in grid.active_names])
+    winner = majority(t, colour_of[grid.active[:-1]], len(held) + 1, plan.trajectory.cycle_time)
+    colours = [matplotlib.colors.to_rgb(c) for c in (*BANDS[: len(held)], OTHERS)]
     panel.imshow(
         np.array(colours)[winner][None],
         aspect="auto",
@@ -129,14 +128,8 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     panel.set_yticks([])
     panel.spines[:].set_visible(False)
     panel.tick_params(bottom=False)
-    total = max(float(share.sum()), 1e-12)
-    entries = [(grid.active_names[k], share[k], BANDS[i]) for i, k in enumerate(shown)]
-    if len(shown) < len(ranked):
-        entries.append(("others", float(sum(share[k] for k in ranked[len(shown) :])), OTHERS))
-    return [
-        Patch(color=colour, label=f"{_words(name)} ({_percent(time / total)})")
-        for name, time, colour in entries
-    ]
+    labels = [f"{name} {percent} %" + (f" ({saves})" if saves else "") for name, percent, saves in held]
+    return [Patch(color=colour, label=label) for label, colour in zip(labels, BANDS, strict=False)]
 
 
 def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
@@ -195,13 +188,3 @@ def _time_unit(seconds: float) -> tuple[float, str]:
     if seconds < 0.5:
         return 1e3, "ms"
     return (1.0 / 60.0, "min") if seconds > 300.0 else (1.0, "s")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= SHARE_MIN else "< 1 %"
-
-
-def _words(name: str) -> str:
-    """acceleration.x -> acceleration X"""
-    what, _, axis = name.partition(".")
-    return f"{what} {axis.upper()}".strip().replace("_", " ")

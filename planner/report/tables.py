@@ -10,27 +10,31 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from planner.base.names import SINGLE_CORNERS
 from planner.base.sizes import SIZES
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.nc.info import PLACES_SHOWN
-from planner.report.beside import beside_rows
-from planner.report.optimum import held_by_text, price_rows
-from planner.report.times import hours_text
+from planner.report.rows import (
+    FAILED,
+    PASSED,
+    VERDICT,
+    first_of,
+    plan_rows,
+    ratio_text,
+    smoothing,
+    verdict_rows,
+)
 
 if TYPE_CHECKING:
-    from planner.base.arrays import FloatArray
     from planner.job.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
     from planner.nc.program import Expansion
-    from planner.verify import CornerCheck, Ringing, Verdict
+    from planner.verify import CornerCheck, Verdict
 
 CALLS_SHOWN = 10  # subprograms that `info` names
 CORNERS_SHOWN = SIZES.table_corners
 # Lines of each, so that a table fits a terminal of 24 rows.
-FAULTS_SHOWN = 8
 NOTES_SHOWN = 8
 ASSUMED_SHOWN = 8
 
@@ -40,44 +44,17 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
 
     notes : printed below, without what `assumed_lines` says first; None for those of the plan
     """
-    title = f"{plan.program.source}: {plan.method}{_smoothing(plan)}, machine {plan.machine.name}"
+    title = f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
     table = _pairs()
-    if plan.trajectory is not None:
-        time = plan.trajectory.cycle_time
-        table.add_row("cycle time", f"{time:.4f} s{hours_text(time)}")
-        if plan.method != "stop" and np.isfinite(plan.stop_time):
-            table.add_row(
-                "stopping at every block",
-                f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long",
-            )
-        for row in beside_rows(plan.beside, time, float(plan.program.dwell.sum())):
-            table.add_row(row[0], Text(row[1]))
-    if plan.verdict is not None:
-        _add_verdict(table, plan.verdict)
-    if plan.grid is not None:
-        table.add_row("held by", held_by_text(plan.grid))
-    if plan.prices is not None and plan.trajectory is not None:
-        for row in price_rows(plan.prices, plan.trajectory.cycle_time):
-            table.add_row(*row)
-    table.add_row("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}")
-    stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
-    table.add_row("computing time [s]", f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-")
-    table.add_row("solution", plan.sentence)
+    _add(table, plan_rows(plan))
     first = set(plan.program.assumptions)
     said = [note for note in (plan.notes if notes is None else notes) if note not in first]
-    return _titled(title, table, *(Text(f"note: {note}") for note in _first(said, NOTES_SHOWN)))
+    return _titled(title, table, *(Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)))
 
 
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
     """What was assumed of a program and may change geometry or time: the first lines of what a command prints; at most so many."""
-    return [Text(f"assumed: {text}", style="yellow") for text in _first(assumptions, most)]
-
-
-def _smoothing(plan: Plan) -> str:
-    """How the path was smoothed, where the method's name does not say it."""
-    if plan.corner in (None, plan.method):
-        return ""
-    return f" on {plan.corner} corners" if plan.geometry == SINGLE_CORNERS else f", geometry {plan.geometry}"
+    return [Text(f"assumed: {text}", style="yellow") for text in first_of(assumptions, most)]
 
 
 def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = None) -> Group:
@@ -86,9 +63,7 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
     asked : name and text of the lines before it
     """
     table = _pairs()
-    for name, text in (asked or {}).items():
-        table.add_row(name, text)
-    _add_verdict(table, verdict)
+    _add(table, [*(asked or {}).items(), *verdict_rows(verdict)])
     return _titled(title, table)
 
 
@@ -96,7 +71,8 @@ def corners_table(corners: CornerCheck) -> Table | None:
     """Eq. 18-20 at every programmed corner; of many corners those closest to the limits. None without corners."""
     if not len(corners):
         return None
-    closest = np.maximum(corners.speed_ratio, corners.budget_ratio)
+    speed, budget = corners.told()
+    closest = np.maximum(speed, budget)
     worst = np.argsort(-closest, kind="stable")[:CORNERS_SHOWN]  # NaN, not looked at, comes last
     shown = f"the {len(worst):,} closest to eq. 18-19 of " if len(worst) < len(corners) else ""
     table = Table(title=f"{shown}{len(corners):,} corners", title_justify="left", box=None, pad_edge=False)
@@ -113,8 +89,8 @@ def corners_table(corners: CornerCheck) -> Table | None:
     for k in sorted(worst):
         known = (
             f"{corners.feed_planned[k]:.3f}",
-            ratio_text(corners.speed_ratio[k]),
-            ratio_text(corners.budget_ratio[k]),
+            ratio_text(speed[k]),
+            ratio_text(budget[k]),
             f"{corners.feed_paper[k]:.3f}",
             f"{corners.gain[k]:.3f}",
         )
@@ -224,73 +200,15 @@ def machines_table(machines: Iterable[Machine]) -> Table:
     return table
 
 
-def _add_verdict(table: Table, verdict: Verdict) -> None:
-    for quantity, checks in _by_quantity(verdict).items():
-        said = ", ".join(
-            f"{name.partition('.')[2] or ''} {ratio_text(check.ratio)}".strip() for name, check in checks
-        )
-        free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
-        table.add_row(f"{quantity.replace('_', ' ')} / limit", said + free)
-    table.add_row("contour error", _micrometres(verdict.contour_error_mm, verdict))
-    if verdict.linear_error_mm is not None:
-        both = f"{verdict.linear_error_mm / MICROMETRE:.3f} µm in linear axes, {verdict.angle_error_deg:.4g}° in rotary ones"
-        table.add_row("of it", both)
-    table.add_row("corners missed by", _micrometres(verdict.vertex_error_mm, verdict))
-    if (after := verdict.after_filters) is not None:
-        table.add_row("contour error after the filters", _micrometres(after.contour_error_mm, verdict))
-        table.add_row("corners missed after the filters by", _micrometres(after.vertex_error_mm, verdict))
-    table.add_row("end error", f"{verdict.end_error_mm / MICROMETRE:.3g} µm")
-    table.add_row("corners", verdict.corners.sentence())
-    for mode in verdict.ringing:
-        table.add_row(f"rings at {mode.frequency:g} Hz", _ringing_text(mode))
-    if verdict.passed:
-        table.add_row("verdict", Text("passed", style="green"))
-        return
-    table.add_row("verdict", Text("FAILED", style="bold red"))
-    for fault in _first(verdict.faults, FAULTS_SHOWN):
-        table.add_row("", Text(fault))
-
-
-def _ringing_text(mode: Ringing) -> str:
-    """Amplitudes after the motion and peaks during it, axis by axis."""
-
-    def said(values: FloatArray) -> str:
-        return ", ".join(
-            f"{axis} {value / MICROMETRE:.4g} µm" for axis, value in zip(mode.axes, values, strict=True)
-        )
-
-    return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
-
-
-def _micrometres(distance: float | None, verdict: Verdict) -> str:
-    """A distance [mm], or why it is not known."""
-    if distance is None:
-        return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
-    return f"{distance / MICROMETRE:.3f} µm"
-
-
-def _by_quantity(verdict: Verdict) -> dict[str, list]:
-    """Limits grouped by what stands before the dot: velocity.x, velocity.y -> velocity."""
-    groups: dict[str, list] = {}
-    for name, check in verdict.limits.items():
-        groups.setdefault(name.partition(".")[0], []).append((name, check))
-    return groups
-
-
-def ratio_text(value: float) -> str:
-    """A ratio to a limit as text; near 1 with six digits, to which the verdict rounds."""
-    if not np.isfinite(value):
-        return "-"
-    return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
+def _add(table: Table, rows: Iterable[tuple[str, str]]) -> None:
+    """Rows as they are, the verdict in its colour."""
+    for label, text in rows:
+        style = {PASSED: "green", FAILED: "bold red"}.get(text, "") if label == VERDICT else ""
+        table.add_row(Text(label), Text(text, style=style))
 
 
 def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
-
-
-def _first(items: Sequence[str], count: int) -> list[str]:
-    more = len(items) - count
-    return [*items[:count], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _pairs() -> Table:

@@ -21,6 +21,7 @@ from planner.geometry.chords import points_on
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
 from planner.report.tool_lines import TOOL, tool_lines
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -47,7 +48,7 @@ def toolpath_figure(plan: Plan) -> Figure:
     view = _flat_view(extent)
     shown = view if view is not None else list(range(len(linear)))
     keep = one_per_pixel(motion[:, shown])
-    points, feed = motion[keep][:, shown], trajectory.feed[keep]
+    points, feed = motion[keep][:, shown], WordFeed(plan.toolpath).of(trajectory.rows(keep))
     rapid = plan.program.kind[trajectory.block[keep]] == Kind.RAPID
     figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
     ends = np.stack([points[:-1], points[1:]], axis=1)

@@ -7,7 +7,7 @@ A trajectory file is a table, one row per sample:
     line (of the NC program), block (its index; several blocks can come from one line)
 
 Of a program with the tool centre point on, the axes are the joints, s and feed are those of the tip, and its place follows as
-tip_x, tip_y, tip_z [mm].
+tip_x, tip_y, tip_z [mm]. The feed is what F means (word_feed.py); s is the length in all axes, an angle counting at a radius.
 
 as Parquet (`.parquet`), CSV (`.csv`: one header line, shortest digits that read back to the same float64) or
 NumPy (`.npz`: one array per column). Metadata (machine, tolerance, units, versions, `run_id`) is in the
@@ -17,6 +17,7 @@ in `trajectory.meta.json` beside it; always as JSON.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
@@ -33,6 +34,7 @@ from planner.report.trajectory_reader import CSV_METADATA, FORMATS, Format, read
 __all__ = ["FORMATS", "Format", "read_trajectory", "units", "write_trajectory"]
 
 Joints = Callable[[Trajectory], Trajectory]
+Feeds = Callable[[Trajectory], FloatArray]
 TIP = "tip_"  # before the names of the columns of the tool's tip
 ROW_GROUP = SIZES.row_group
 
@@ -42,10 +44,12 @@ def write_trajectory(
     trajectory: Trajectory,
     about: dict[str, Any] | None = None,
     joints_of: Joints | None = None,
+    feed_of: Feeds | None = None,
 ) -> None:
     """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its metadata.
 
     joints_of : the joints of a motion of the tip, of any of its samples; None where the trajectory is that of the axes
+    feed_of   : the feed of any of its samples as F words mean it (word_feed.py); None for that along the path in all axes
 
     Raises InputError for another suffix.
     """
@@ -53,30 +57,36 @@ def write_trajectory(
     text = json.dumps(about or {}, allow_nan=False)
     match path.suffix:
         case ".parquet":
-            _write_parquet(path, _groups(trajectory, joints_of), text)
+            _write_parquet(path, _groups(trajectory, joints_of, feed_of), text)
         case ".csv":
-            _write_csv(path, _groups(trajectory, joints_of))
+            _write_csv(path, _groups(trajectory, joints_of, feed_of))
             path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
         case ".npz":
-            columns = trajectory_columns(trajectory, joints_of)
+            columns = trajectory_columns(trajectory, joints_of, feed_of)
             np.savez(path, metadata=np.array(text), allow_pickle=False, **columns)
         case _:
             raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
 
 
-def units(axes: tuple[str, ...], *, extruder: bool = False, tip: bool = False) -> dict[str, str]:
+def units(
+    axes: tuple[str, ...], *, extruder: bool = False, tip: bool = False, feed: str = "mm/s"
+) -> dict[str, str]:
     """The unit of every column, by its name; `extruder`: there are columns of one; `tip`: there are those of the tool's tip."""
     said = {"t": "s"}
     for axis in (*axes, EXTRUDER) if extruder else axes:
         length = "deg" if axis in ROTARY_AXES else "mm"
         for prefix, per in zip(("", "v", "a", "j"), ("", "/s", "/s2", "/s3"), strict=True):
             said[prefix + axis] = length + per
-    said |= {"s": "mm", "feed": "mm/s", "line": "1", "block": "1"}
+    said |= {"s": "mm", "feed": feed, "line": "1", "block": "1"}
     return said | ({TIP + axis: "mm" for axis in LINEAR_AXES} if tip else {})
 
 
-def trajectory_columns(trajectory: Trajectory, joints_of: Joints | None = None) -> dict[str, Array]:
-    """The columns of a trajectory file by their names, each (T,); `joints_of` as in `write_trajectory`."""
+def trajectory_columns(
+    trajectory: Trajectory, joints_of: Joints | None = None, feed_of: Feeds | None = None
+) -> dict[str, Array]:
+    """The columns of a trajectory file by their names, each (T,); the rest as in `write_trajectory`."""
+    if feed_of is not None:
+        trajectory = dataclasses.replace(trajectory, feed=feed_of(trajectory))
     if joints_of is not None:
         tip = {TIP + axis: trajectory.position[:, trajectory.axes.index(axis)] for axis in LINEAR_AXES}
         return trajectory_columns(joints_of(trajectory)) | tip
@@ -101,12 +111,14 @@ def trajectory_columns(trajectory: Trajectory, joints_of: Joints | None = None) 
     }
 
 
-def _groups(trajectory: Trajectory, joints_of: Joints | None) -> Iterator[dict[str, Array]]:
+def _groups(
+    trajectory: Trajectory, joints_of: Joints | None, feed_of: Feeds | None
+) -> Iterator[dict[str, Array]]:
     """The columns of `ROW_GROUP` samples at a time."""
     parts: list[dict[str, Array]] = []
     count = 0
     for chunk in trajectory.chunks():
-        columns, done = trajectory_columns(chunk, joints_of), 0
+        columns, done = trajectory_columns(chunk, joints_of, feed_of), 0
         while done < len(chunk):
             new = min(ROW_GROUP - count, len(chunk) - done)
             parts.append({name: column[done : done + new] for name, column in columns.items()})

@@ -1,9 +1,11 @@
 """Which limit is active where, and for what share of the cycle time.
 
 A time-optimal motion is nearly always at some limit: with a larger limit it would be faster there, at once or after the rest of the
-motion has adapted (sensitivity/prices.py says by how much). A limit is active in an interval if its ratio is within `HELD` of 1. If
-several are, they share the time of the interval equally, so that all shares add up to 1 with "none", the time in which no limit is
-reached, and "rest", the dwells.
+motion has adapted (sensitivity/prices.py says by how much). A limit is active in an interval if its ratio is within `HELD` of 1. Those
+that are active together count in full each, so that shares may add up to more than 1: a path that is followed at F along the edge of
+the tolerance is at both all the time, and the prices tell which of them costs time. Of the bounds on the feed itself
+(F, velocities) the lowest is active. "none" is the time in which no limit is reached,
+"rest" that of the dwells.
 """
 
 from __future__ import annotations
@@ -28,23 +30,25 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray,
     none, rest = len(names) - 2, len(names) - 1
     moving = problem.interval
     lasting = np.diff(t, append=end)
-    holders = np.zeros(len(problem))
+    reached = np.zeros((len(problem), len(names)), dtype=bool)
     closest, active = np.full(len(problem), 1.0 - HELD), np.full(len(problem), none)
+    bounds = len(problem.bound_names)
+    behind = np.append((solution.feed_sq / problem.feed_sq_limit)[1:], 0.0)
     for limit, ratio in ratios_by_limit(problem, solution):
-        holders += ratio >= 1.0 - HELD
+        if limit < bounds:  # an interval is at a bound of the feed where it begins and ends there
+            ratio = np.minimum(ratio, behind)
+        reached[:, limit] |= ratio >= 1.0 - HELD
         nearer = ratio > closest
         closest[nearer], active[nearer] = ratio[nearer], limit
-    part = np.divide(lasting, holders, out=np.zeros(len(problem)), where=moving & (holders > 0))
-    time = np.zeros(len(names))
-    for limit, ratio in ratios_by_limit(problem, solution):
-        time[limit] = part[ratio >= 1.0 - HELD].sum()
-    time[none], time[rest] = lasting[moving & (holders == 0)].sum(), lasting[~moving].sum()
+    reached[~moving] = False
+    reached[:, none], reached[:, rest] = moving & ~reached.any(axis=1), ~moving
     active[~moving] = rest
     return GridHistory(
         t=t,
         s=problem.s,
         feed=np.sqrt(solution.feed_sq),
         active=active,
+        reached=reached,
         active_names=names,
-        share=time / time.sum(),
+        share=lasting @ reached / lasting.sum(),
     )

@@ -1,7 +1,7 @@
 """What a motion is at where geometry and feed were found together: step by step, from the search's steps (tube/shares.py).
 
-A limit, or the tolerance, is active in a step that comes within `HELD` of it; those that are share its time. Shown is the one that has
-the largest price there. Where the motion of the start stays, it is what held that.
+A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each. Shown is the one that has the
+largest price there. Where the motion of the start stays, it is what held that.
 """
 
 from __future__ import annotations
@@ -36,19 +36,21 @@ class _Rows:
     """Rows of a history, as they are gathered."""
 
     names: tuple[str, ...]
-    share: FloatArray
     t: list[FloatArray] = field(default_factory=list)
     active: list[Array] = field(default_factory=list)
+    reached: list[Array] = field(default_factory=list)
 
-    def add(self, t: FloatArray, active: Array) -> None:
+    def add(self, t: FloatArray, active: Array, reached: Array) -> None:
+        """Rows that begin at these times, and what is shown and active in them."""
         self.t.append(t)
         self.active.append(active)
+        self.reached.append(reached)
 
     def stand(self, begin: float, lasting: float) -> None:
         """A standstill."""
         if lasting > STANDS:
-            self.add(np.array([begin]), np.array([len(self.names) - 1]))
-            self.share[-1] += lasting
+            rest = np.arange(len(self.names)) == len(self.names) - 1
+            self.add(np.array([begin]), np.flatnonzero(rest), rest[None])
 
 
 def found_history(
@@ -76,7 +78,7 @@ def found_history(
     known = [each.active_names[:-2] for each in (start, *alone.values()) if each is not None]
     others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)
-    rows = _Rows(names, np.zeros(len(names)))
+    rows = _Rows(names)
     parts = list(zip(motion.runs, motion.begin[:-1].tolist(), strict=True))
     for k, one in enumerate(found):
         for lo, hi, stays in [(0, 0, True)] if k in kept else one.ranges():
@@ -91,14 +93,15 @@ def found_history(
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
     t = slowed.run_at(t)
     single, which = np.unique(np.minimum(t, slowed.end), return_inverse=True)
-    seen = slowed.at(single, SEEN)
+    seen, reached = slowed.at(single, SEEN), np.concatenate(rows.reached)
     return GridHistory(
         t=t,
         s=seen.s[which],
         feed=seen.feed[which],
         active=np.concatenate(rows.active),
+        reached=reached,
         active_names=names,
-        share=rows.share / rows.share.sum(),
+        share=np.diff(t, append=slowed.end) @ reached / slowed.end,
     )
 
 
@@ -108,9 +111,9 @@ def _of_start(rows: _Rows, start: GridHistory, part: SplicedRun, begin: float) -
     lo, hi = np.searchsorted(start.t, [part.begin, part.end])
     lo = max(lo - 1, 0)
     t = np.append(np.clip(start.t[lo:hi], part.begin, part.end), part.end)
-    active = index[start.active[lo:hi]]
-    rows.add(begin + t[:-1] - part.begin, active)
-    np.add.at(rows.share, active, np.diff(t))
+    reached = np.zeros((hi - lo, len(rows.names)), dtype=bool)
+    reached[:, index] = start.reached[lo:hi]
+    rows.add(begin + t[:-1] - part.begin, index[start.active[lo:hi]], reached)
 
 
 def _of_steps(
@@ -130,17 +133,16 @@ def _of_steps(
     moving, many = len(run.axis), len(toolpath.axes)
     column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
     column = np.append(column, 3 * many + np.arange(3))
-    holders = used.sum(axis=1)
-    part_of = np.divide(own.h, holders, out=np.zeros(hi - lo), where=holders > 0)
-    np.add.at(rows.share, column, (used * part_of[:, None]).sum(axis=0))
-    rows.share[-2] += own.h[holders == 0].sum()
+    reached = np.zeros((hi - lo, len(rows.names)), dtype=bool)
+    reached[:, column] = used
+    reached[:, -2] = ~used.any(axis=1)
     paid = np.zeros(used.shape)
     if found.price is not None:
         of = [*range(3 * moving), *(3 * moving + column for column in PRICE_OF)]
         paid = -found.price[lo:hi, of]
         paid[:, -1] -= found.price[lo:hi, 3 * moving + price.VERTEX]
     active = column[np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)]
-    active = np.where(holders > 0, active, len(rows.names) - 2)
+    active = np.where(reached[:, -2], len(rows.names) - 2, active)
     t = begin + before + np.append(0.0, np.cumsum(own.h))
-    rows.add(t[:-1], active)
+    rows.add(t[:-1], active, reached)
     rows.stand(t[-1], part.end - part.begin - (t[-1] - begin))

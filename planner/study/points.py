@@ -68,7 +68,7 @@ def _found(plan: Plan) -> dict[str, Any]:
         "corner_ratio": verdict.corners.worst_ratio,
         "held_by": ""
         if plan.grid is None
-        else ", ".join(f"{name} {share:.0%}" for name, share in plan.grid.ranked()[:_HELD]),
+        else ", ".join(f"{name} {percent} %" for name, percent in plan.grid.percents()[:_HELD]),
     }
 
 

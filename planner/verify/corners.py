@@ -39,6 +39,7 @@ class CornerCheck:
     miss             : (C,) distance of the vertex from the motion [mm]; from the chords of its samples where there is nothing else
     chord_error      : (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
     budget_ratio     : (C,) the largest of miss + chord_error and the distance from the delivered chords, over eps [-]
+    delivered_speed, delivered_budget : (C,) both ratios as the samples and the chords between them show them, alone [-]
     judged           : False if the limit behind eq. (19) is reported only
     """
 
@@ -55,6 +56,8 @@ class CornerCheck:
     miss: FloatArray
     chord_error: FloatArray
     budget_ratio: FloatArray
+    delivered_speed: FloatArray
+    delivered_budget: FloatArray
     judged: bool = True
 
     def __post_init__(self) -> None:
@@ -113,15 +116,23 @@ class CornerCheck:
         """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the programmed feed."""
         return self.looked & ~self.stands & (self.feed_paper < self.feed_programmed)
 
+    def told(self) -> tuple[FloatArray, FloatArray]:
+        """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its file say the same; where a
+        corner is broken, the largest of all readings."""
+        return (
+            np.where(self.too_fast, self.speed_ratio, self.delivered_speed),
+            np.where(self.overdrawn, self.budget_ratio, self.delivered_budget),
+        )
+
     @property
     def worst_speed_ratio(self) -> float:
-        """Largest ratio of eq. (19); NaN without corners that were looked at."""
-        return _largest(self.speed_ratio[self.looked])
+        """Largest ratio of eq. (19) in `told`; NaN without corners that were looked at."""
+        return _largest(self.told()[0][self.looked])
 
     @property
     def worst_budget_ratio(self) -> float:
-        """Largest ratio of eq. (18); NaN without corners that were looked at."""
-        return _largest(self.budget_ratio[self.looked])
+        """Largest ratio of eq. (18) in `told`; NaN without corners that were looked at."""
+        return _largest(self.told()[1][self.looked])
 
     @property
     def worst_ratio(self) -> float:

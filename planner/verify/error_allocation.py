@@ -106,6 +106,7 @@ def check_corners(
     found = [_nearest_sample(trajectory, near[0]["near_time"][n], vertex[n], machine, limits) for n in parts]
     reading, period = _joined([one[0] for one in found]), np.concatenate([one[1] for one in found])
     chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
+    delivered = speed_ratio, budget_ratio
     looked = miss <= NEAR_MISS * eps
     if motion is None or not len(corner):
         looked &= _bow(machine, toolpath.axes, period) <= eps
@@ -136,6 +137,8 @@ def check_corners(
         miss=known(miss),
         chord_error=known(chord),
         budget_ratio=known(budget_ratio),
+        delivered_speed=known(delivered[0]),
+        delivered_budget=known(delivered[1]),
         judged=judged,
     )
 

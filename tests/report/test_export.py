@@ -77,7 +77,7 @@ def test_summary_has_the_contract_s_keys() -> None:
         "not_looked_at": 0,
         "held": 3,
         "worst_speed_ratio": 1.0,
-        "worst_budget_ratio": 0.8,
+        "worst_budget_ratio": 0.75,
         "stopped_at": 1,
         "gain": pytest.approx(1.35),
         "gain_min": pytest.approx(1.3),

@@ -36,11 +36,11 @@ PRICES = PriceList(
 
 
 def test_what_holds_the_motion() -> None:
-    """The largest first; what holds less than a percent is gathered, and nothing is told of it if that is less still."""
+    """The largest first, in whole per cent; what holds less than one is not told."""
     grid = make_plan().grid
     assert held_by_text(grid) == "acceleration.y 70 %, feed 25 %, nothing 3 %, dwells 2 %"
     many = dataclasses.replace(grid, share=np.array([0.008, 0.007, 0.985, 0.0, 0.0]))
-    assert held_by_text(many) == "acceleration.y 98 %, others 2 %"
+    assert held_by_text(many) == "acceleration.y 99 %, feed 1 %, velocity.x 1 %"
 
 
 def test_what_more_saves() -> None:
@@ -115,7 +115,13 @@ def test_the_plan_s_table() -> None:
 def test_the_summary() -> None:
     said = json.loads(json.dumps(summary(make_plan(prices=PRICES)), allow_nan=False))
     assert said["held_by"]["acceleration.y"] == 0.7
-    assert sum(said["held_by"].values()) == pytest.approx(1.0)
+    assert said["held_by"] == {
+        "acceleration.y": 0.7,
+        "feed": 0.25,
+        "velocity.x": 0.002,
+        "none": 0.03,
+        "rest": 0.018,
+    }
     prices = said["prices"]
     assert prices["limits"] == PRICES.limits
     assert prices["saved_s"] == PRICES.saved
@@ -137,7 +143,10 @@ def test_a_real_plan() -> None:
     program = parse_program("G21 G90\nG1 X20 F6000\nY10\nX0\nY0\n", machine)
     plan = planner.plan(program, machine, method="optimal")
     said = json.loads(json.dumps(summary(plan), allow_nan=False))
-    assert sum(said["held_by"].values()) == pytest.approx(1.0)
+    assert sum(said["held_by"].values()) > 1.0, (
+        "in the corners two jerks are active together, and count in full"
+    )
+    assert max(said["held_by"].values()) <= 1.0
     assert {corner["line"] for corner in said["prices"]["corners"]} == {2, 3, 4}
     worth = max(
         (name for name in said["prices"]["saved_s"] if name != "tolerance"), key=said["prices"]["saved_s"].get

@@ -69,6 +69,8 @@ def test_a_corner_that_was_not_looked_at_is_listed() -> None:
         "miss",
         "chord_error",
         "budget_ratio",
+        "delivered_speed",
+        "delivered_budget",
     ):
         columns[name][1] = np.nan
     corners = CornerCheck(**columns)

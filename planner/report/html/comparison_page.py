@@ -85,10 +85,10 @@ def _columns(row: Row, prefix: str, program: Program) -> dict[str, Array]:
     columns: dict[str, Array] = {
         "t": shown.t.astype(np.float32),
         "s": shown.s.astype(np.float32),
-        "feed": shown.feed.astype(np.float32),
+        "feed": row.shown.feed.astype(np.float32),
         "deviation": row.shown.deviation.astype(np.float32),
         "line": shown.line.astype(np.int32),
-        "programmed": np.nan_to_num(program.feed[shown.block], posinf=np.nan).astype(np.float32),
+        "programmed": np.nan_to_num(row.shown.programmed, posinf=np.nan).astype(np.float32),
     }
     for axis in LINEAR_AXES:
         at = shown.position[:, shown.axes.index(axis)] if axis in shown.axes else np.zeros(len(shown))

@@ -20,6 +20,7 @@ from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
 from planner.report.block_feeds import planned_blocks
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
@@ -42,6 +43,8 @@ class Samples:
     shown     : the samples, rotary axes in rad
     limit     : (N,) index in `limits` of the limit that holds the motion there
     limits    : their names; the last one is `NO_LIMIT`
+    feed      : (N,) as F words mean it [mm/s, deg/s where rotary axes move alone]
+    programmed : (N,) F of the block; inf for rapids
     deviation : (N,) distance from the programmed path near the block of the sample [mm]
     price     : (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is not known
     """
@@ -50,6 +53,8 @@ class Samples:
     shown: Trajectory
     limit: Array
     limits: tuple[str, ...]
+    feed: FloatArray
+    programmed: FloatArray
     deviation: FloatArray
     price: FloatArray | None
 
@@ -85,12 +90,15 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
     step = max(1, -(-len(trajectory) // (most if len(trajectory) <= most else most // 2)))
     shown = _thinned(trajectory, step)
     names, limit = _limits(plan, shown)
+    word = WordFeed(plan.toolpath)
     segment = np.maximum(np.searchsorted(plan.toolpath.block, shown.block, side="right") - 1, 0)
     return Samples(
         step=step,
         shown=shown,
         limit=limit,
         limits=names,
+        feed=word.of(shown),
+        programmed=word.programmed(plan.program, shown.block),
         deviation=distance_near(plan.toolpath, shown.position, segment),
         price=_price(plan, shown.position, segment),
     )
@@ -140,7 +148,8 @@ def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
         names += [f"{quantity}.{axis}" for axis in shown.axes]
         ratios += list(share.T)
     names.append("feed")
-    ratios.append(shown.feed / plan.program.feed[shown.block])
+    word = WordFeed(plan.toolpath)
+    ratios.append(word.of(shown) / word.programmed(plan.program, shown.block))
     return _used(tuple(names), np.argmax(np.stack(ratios), axis=0))
 
 
@@ -165,8 +174,8 @@ def lines_of(plan: Plan, samples: Samples) -> Lines:
     segment = np.maximum(np.searchsorted(toolpath.block, samples.shown.block, side="right") - 1, 0)
     at = row[segment]
     highest, unseen = np.full(rows, -1.0), np.zeros(rows)
-    np.maximum.at(highest, at, samples.shown.feed)
-    np.maximum.at(unseen, row, blocks.highest)
+    np.maximum.at(highest, at, samples.feed)
+    np.maximum.at(unseen, row, WordFeed(toolpath).of_segments(blocks.highest))
     deviation = np.full(rows, -1.0)
     np.maximum.at(deviation, at, samples.deviation)
     places = plan.prices.places if plan.prices is not None else None

@@ -25,6 +25,7 @@ from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.html.picture import path_picture
 from planner.report.replace import check_file
+from planner.report.rows import plan_rows
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -60,7 +61,7 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
     columns, about = _columns(plan)
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
-    about["summary"] = said or summary(plan)
+    about["summary"] = {"told": plan_rows(plan)} | (said or summary(plan))
     return page_of(
         "report", "planned", plan.program.source, about, columns, PICTURE=path_picture(plan, PICTURE)
     )
@@ -75,11 +76,11 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     columns: dict[str, Array] = {
         "t": shown.t,
         "s": shown.s.astype(np.float32),
-        "feed": shown.feed.astype(np.float32),
+        "feed": samples.feed.astype(np.float32),
         "line": shown.line.astype(np.int32),
         "limit": samples.limit.astype(np.uint8),
         "deviation": samples.deviation.astype(np.float32),
-        "programmed": np.nan_to_num(plan.program.feed[shown.block], posinf=np.nan).astype(np.float32),
+        "programmed": np.nan_to_num(samples.programmed, posinf=np.nan).astype(np.float32),
         "path": programmed_path(plan.toolpath).astype(np.float32).ravel(),
         "line_number": lines.line.astype(np.int32),
         "line_planned": lines.planned.astype(np.float32),
@@ -122,15 +123,15 @@ def _corners(plan: Plan) -> dict[str, list[Any]]:
     found = plan.corners
     if found is None:
         return {}
-    seen = np.flatnonzero(found.looked)
-    worst = np.maximum(found.speed_ratio[seen], found.budget_ratio[seen])
+    seen, (speed, budget) = np.flatnonzero(found.looked), found.told()
+    worst = np.maximum(speed, budget)[seen]
     seen = np.sort(seen[np.argsort(-worst, kind="stable")[:CORNERS_MAX]])
     return {
         "line": found.line[seen].tolist(),
         "angle": np.degrees(found.theta[seen]).tolist(),
         "feed": found.feed_planned[seen].tolist(),
-        "eq19": found.speed_ratio[seen].tolist(),
-        "eq18": found.budget_ratio[seen].tolist(),
+        "eq19": speed[seen].tolist(),
+        "eq18": budget[seen].tolist(),
         "eq20": found.feed_paper[seen].tolist(),
         "gain": found.gain[seen].tolist(),
     }

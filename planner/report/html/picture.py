@@ -10,6 +10,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES
 from planner.report.colours import CIVIDIS
 from planner.report.tool_lines import TOOL, tool_lines
+from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -41,8 +42,9 @@ def path_picture(plan: Plan, size: float) -> str:
     asked = np.isfinite(
         plan.program.feed[shown.block]
     )  # rapids have the colour of the fastest move with a feed
-    highest = float(shown.feed[asked].max() if asked.any() else shown.feed.max())
-    colour = np.minimum(shown.feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
+    feed = WordFeed(plan.toolpath).of(shown)
+    highest = float(feed[asked].max() if asked.any() else feed.max())
+    colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
     )

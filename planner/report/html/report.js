@@ -14,14 +14,16 @@
       (summary.tolerance_mm === null ? "" : `, tolerance ${summary.tolerance_mm} mm`) + `; ${summary.blocks.toLocaleString()} blocks`;
     element("verdict").textContent = passed ? "passed" : "failed";
     element("verdict").className = passed ? "passed" : "failed";
-    const figures = [
-      ["cycle time", digits(summary.cycle_time_s, 6) + " s"],
-      ["stopping at every block", digits(summary.stop_time_s, 5) + " s"],
-      ["contour error", summary.verdict.contour_error_mm === null ? "–" : digits(1000 * summary.verdict.contour_error_mm, 3) + " µm"],
-    ];
-    for (const [name, value] of figures) {
+    // Words and figures are those of the terminal: summary.told. The header has some of them, the table "In words" all.
+    const told = summary.told || [], header = ["cycle time", "stopping at every block", "beside the motion", "total", "contour error", "corners missed by"];
+    for (const [name, value] of told) {
+      const line = make("tr");
+      line.append(make("th", name), make("td", value));
+      element("told").append(line);
+    }
+    for (const [name, value] of told.filter(([label]) => header.includes(label))) {
       const pair = make("div");
-      pair.append(make("dt", name), make("dd", value));
+      pair.append(make("dt", name), make("dd", value.split(":")[0]));
       element("figures").append(pair);
     }
     const rows = [["limit", "largest ratio"], ...Object.entries(summary.verdict.limits).map(([name, ratio]) => [name, digits(ratio, 6), ratio])];
@@ -353,14 +355,16 @@
 
   // Shares of the time
   {
-    const held = Object.entries(summary.held_by || {}).filter(([, share]) => share > 0.0005).reverse();
+    const word = { none: "nothing", rest: "dwells" };
+    const held = Object.entries(summary.held_by || {}).filter(([, share]) => Math.floor(100 * share + 0.5) > 0).reverse();
     const named = about.limits;
     const colour = (name) => (named.includes(name) ? limitColour(named.indexOf(name)) : "#606060");
     if (held.length) {
-      await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(name)), x: held.map(([, share]) => 100 * share),
-        marker: { color: held.map(([name]) => colour(name)) }, hovertemplate: "%{y}: %{x:.3g} % of the time<extra></extra>" }],
+      await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(word[name] || name)), x: held.map(([, share]) => 100 * share),
+        marker: { color: held.map(([name]) => colour(name)) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
+        hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
       { margin: { l: 110, r: 14, t: 6, b: 40 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
-        xaxis: { title: { text: "share of the cycle time [%]" }, gridcolor: rule }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
+        xaxis: { title: { text: "share of the cycle time, each in full [%]" }, gridcolor: rule }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
     } else element("share").remove();
   }
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from planner.base.errors import InputError
 from planner.feedrate.solution import Status
@@ -22,6 +25,7 @@ from planner.nc.reading import Reading
 from planner.report.export import json_ready, program_file
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
+from planner.report.word_feed import WordFeed
 from planner.verify.axes import fit_axes
 from planner.verify.judge import NOT_LIMITED_NAMES
 
@@ -61,6 +65,9 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         program=program, toolpath=toolpath, machine=machine, given=given, not_limited=about.not_limited
     )
     chain = chain_of(program, machine)
+    trajectory = motion if chain is None else tip_of_setpoints(motion, chain)
+    if WordFeed(toolpath).mixed:  # files have the feed that F means
+        trajectory = dataclasses.replace(trajectory, feed=np.linalg.norm(trajectory.velocity, axis=1))
     stop_time = summary.get("stop_time_s")
     plan = Plan(
         method=summary["method"],
@@ -71,7 +78,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         toolpath=toolpath,
         status=Status[summary["status"]],
         sentence=summary["sentence"],
-        trajectory=motion if chain is None else tip_of_setpoints(motion, chain),
+        trajectory=trajectory,
         joints=None if chain is None else motion,
         verdict=judged(motion, how),
         rounded=None,

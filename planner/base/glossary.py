@@ -55,7 +55,8 @@ TERMS = {
     "fraction": "a number between 0 and 1 that says how much of something is used",
     "ratio": "a value divided by its limit: 1 is at the limit",
     "limit": "the largest value that the machine or the program allows",
-    "active limit": "a limit that the motion has reached; `held by` in the output tells for how much of the time, those that are active together in full each",
+    "active limit": "a limit that the motion has reached; `held by` in the output tells for how much of the time, "
+    "each in full",
     "binding": "said of a limit whose change would change the cycle time",
     "multiplier": "the cycle time that one unit of a limit is worth at the optimum, also called its shadow price",
     "sensitivity": "what a change of a limit or of the tolerance does to the cycle time; printed as `10 % more saves`",

@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.constraints import chord_error
 from planner.corners.allocation import error_rate
+from planner.geometry.word_feed import allowed_along
 from planner.machine import Machine
 from planner.path.samples import PathSamples
 
@@ -60,6 +61,10 @@ class OnGrid:
     def right(self) -> Array:
         """(P,) index of the interval to the right of every point."""
         return interval_sides(self.samples)[1]
+
+    def feed_of_words(self, side: Array) -> FloatArray:
+        """(P,) feed along the path in all axes at which F holds for what it goes by, by the blocks of the intervals `side` (P,) [mm/s]."""
+        return allowed_along(self.samples.path.toolpath, self.samples.segment[side], self.samples.d1)
 
     def sides(self) -> tuple[Side, Side]:
         """The curves to the left and to the right of the points."""

@@ -13,7 +13,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.constraints.limit import Cap, Limit
-from planner.geometry.word_feed import allowed_along
 from planner.machine import LINEAR_AXES
 
 if TYPE_CHECKING:
@@ -34,10 +33,8 @@ class ProgrammedFeed(Limit):
         feed_sq = self.inside(grid)
         cap = np.minimum(feed_sq[grid.left], feed_sq[grid.right])
         if set(grid.axes) - set(LINEAR_AXES):
-            samples = grid.samples
             for side in (grid.left, grid.right):
-                held = allowed_along(samples.path.toolpath, samples.segment[side], samples.d1)
-                cap = np.minimum(cap, feed_sq_max(held))
+                cap = np.minimum(cap, feed_sq_max(grid.feed_of_words(side)))
         yield Cap(self.name, cap)
 
     def inside(self, grid: OnGrid) -> FloatArray:

@@ -63,7 +63,7 @@ class OnGrid:
         return interval_sides(self.samples)[1]
 
     def feed_of_words(self, side: Array) -> FloatArray:
-        """(P,) feed along the path in all axes at which F holds for what it goes by, by the blocks of the intervals `side` (P,) [mm/s]."""
+        """(P,) feed along the path in all axes at which what F goes by moves at F, for intervals `side` (P,) [mm/s]."""
         return allowed_along(self.samples.path.toolpath, self.samples.segment[side], self.samples.d1)
 
     def sides(self) -> tuple[Side, Side]:

@@ -145,7 +145,11 @@ class Method(ABC):
             return made
         what = f"method {rival.method} loses"
         if rival.method == made.method:
-            what = f"{rival.corner} corners lose"
+            what = (
+                "the plan of less effort loses"
+                if rival.corner == made.corner
+                else f"{rival.corner} corners lose"
+            )
         said = f"{what} less to the period"
         if made.verdict is not None and made.verdict.faults and made.cycle_time <= rival.cycle_time:
             said = f"another motion failed: {made.verdict.faults[0]}"

@@ -71,12 +71,13 @@ class OptimalMethod(Method):
 
     @property
     def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
-        """Full stops, method kinematic and single corners, where the chords between samples take tolerance from splines. The first
-        two have closed forms: what takes longer than they do is not planned to the end."""
+        """Full stops, method kinematic, less effort and single corners, where chords between samples take tolerance from splines. The
+        first two have closed forms: what takes longer than they do is not planned to the end."""
         if self.corner != AUTO or self.shaped:
             return ()
         corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
-        return (StopMethod(join_lines=True), KinematicMethod(), *corners)
+        quick = () if self.effort == QUICK else (dataclasses.replace(self, effort=QUICK),)
+        return (StopMethod(join_lines=True), KinematicMethod(), *quick, *corners)
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(

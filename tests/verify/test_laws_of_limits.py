@@ -12,8 +12,8 @@ import pytest
 from judging import judge
 from motions import Moves, along, chain, helix, rest_to_rest, straight
 from motions import machine as machine_with
-from setpoints import trajectory_of
 
+from benchmarks.setpoints import trajectory_of
 from planner import JointLimit, PathLimit
 from planner.constraints.axis_acceleration import JUMP
 from planner.constraints.limit import RowPoint

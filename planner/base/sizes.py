@@ -65,6 +65,7 @@ class Sizes:
     places_at_once: int = _size(PARTS, 100_000, 350)  # times of its own: 30 MB
     corners_at_once: int = _size(PARTS, 100_000, 3)  # 50 MB
     filtered_at_once: int = _size(PARTS, 50_000, 37)  # times behind filters: 5 MB
+    convolved_at_once: int = _size(PARTS, 50_000, 40)  # setpoints, for the planner: 5 MB
     stops_at_once: int = _size(PARTS, 500, 2)  # 5 MB an array
     prices_at_once: int = _size(PARTS, 100_000, 17)  # points of the grid: half a kilobyte each
 

@@ -1,6 +1,9 @@
 """The limit of the chord error: between two setpoints the machine runs along the chord, which cuts off the curve.
 
-    kappa x dt^2/8 <= eps_ch                     eq. (19), approximate form: rigorous, because the interpolator advances the arc
+It does where it runs "linear" from setpoint to setpoint and where it jumps ("hold"), all axes at once. A "cubic" of both ends is off by
+a quarter of that at most, where the normal acceleration steps from nothing to kappa x, as at the end of an arc:
+
+    kappa x dt^2/8 <= eps_ch, cubic dt^2/32      eq. (19), approximate form: rigorous, because the interpolator advances the arc
                                                  length feed*dt per period (docs/papers.md D)
 
 eps_ch is the chord's part of the error budget (on_grid.py).
@@ -20,13 +23,13 @@ if TYPE_CHECKING:
 
 
 def rate(machine: Machine) -> float:
-    """dt^2/8 [s2]: chord error per unit of normal acceleration."""
-    return machine.dt**2 / 8.0
+    """dt^2/8 [s2], or dt^2/32 with cubics: chord error per unit of normal acceleration."""
+    return machine.dt**2 / (32.0 if machine.interpolation == "cubic" else 8.0)
 
 
-def feed_sq_max(kappa: FloatArray, tol: FloatArray, dt: float) -> FloatArray:
-    """(P,) kappa x dt^2/8 <= tol for curvatures (P,) [1/mm], tolerances (P,) [mm] and the period dt [s]; inf on straights [mm2/s2]."""
-    return over(tol, kappa * dt**2 / 8.0)
+def feed_sq_max(kappa: FloatArray, tol: FloatArray, rate: float) -> FloatArray:
+    """(P,) kappa x rate <= tol for curvatures (P,) [1/mm], tolerances (P,) [mm] and `rate` [s2]; inf on straights [mm2/s2]."""
+    return over(tol, kappa * rate)
 
 
 class ChordError(Limit):
@@ -35,4 +38,4 @@ class ChordError(Limit):
     name, unit, order = "chord_error", "mm", 2
 
     def on_side(self, side: Side, machine: Machine) -> Iterator[Cap]:
-        yield Cap(self.name, feed_sq_max(side.kappa, side.tol_chord, machine.dt))
+        yield Cap(self.name, feed_sq_max(side.kappa, side.tol_chord, rate(machine)))

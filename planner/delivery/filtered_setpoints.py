@@ -28,11 +28,12 @@ from math import factorial
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.sizes import SIZES
 from planner.motion.timing import MotionInTime, sample_motion
 
 # Places of the filtered motion in a period, and in the shortest filter.
 PER_PERIOD, PER_FILTER = 4, 8
-AT_ONCE = 50_000  # setpoints that are convolved together: 5 MB with three axes
+AT_ONCE = SIZES.convolved_at_once
 Terms = tuple[tuple[int, int, float], ...]
 # Of each kind the shape of the position, and that of the velocity times dt if it counts; where the middle of both is [periods].
 SHAPES: dict[str, tuple[float, Terms, Terms]] = {
@@ -92,7 +93,7 @@ class FilteredSetpoints:
             first, kept = first + count, seen[count:]
 
     def _setpoints(self, motion: MotionInTime) -> Iterator[FloatArray]:
-        """(n, 2, A) positions and velocities of the setpoints, `AT_ONCE` at a time, at rest before and behind while that counts."""
+        """(n, 2, A) positions and velocities of the setpoints, some at a time, at rest before and behind while that counts."""
         still: FloatArray | None = None
         for chunk in sample_motion(motion, self.dt).chunks():
             both = np.stack([chunk.position, chunk.velocity], axis=1)

@@ -24,7 +24,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
-from planner.constraints import normal_limit
+from planner.constraints import chord_error, normal_limit
 from planner.fir.guide import Guide
 from planner.fir.superpose import Filtered
 from planner.machine import LINEAR_AXES, Machine
@@ -100,7 +100,7 @@ def measure(guide: Guide, motion: Filtered, machine: Machine) -> Measured:
         machine.limits("jerk", guide.axes),
         normal_limit.largest(machine) * NORMAL_SPARE,
         np.array([axis in LINEAR_AXES for axis in guide.axes]),
-        machine.dt**2 / 8,
+        chord_error.rate(machine),
     )
     line = _Line(*(getattr(guide, name) for name in _Line._fields))
     count = _measure(_Motion(motion.t, motion.ends, motion.state), line, limits, seen)

@@ -17,7 +17,17 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
+
+# By how much the way between setpoints may leave a motion whose acceleration steps from nothing to a within a period h, over a h^2: a
+# chord by 1/8, and the cubic of both ends by 1/32 (less where the acceleration changes steadily).
+CHORD_BOW, CUBIC_BOW = 1.0 / 8.0, 1.0 / 32.0
+
+
+def bow_share(machine: Machine | None = None) -> float:
+    """The bow between setpoints over a h^2 [-]; of chords without a machine."""
+    return CUBIC_BOW if machine is not None and machine.interpolation == "cubic" else CHORD_BOW
 
 
 class At(NamedTuple):

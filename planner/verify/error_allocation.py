@@ -17,7 +17,8 @@ bound cannot be smaller for all motions; and a motion that takes a corner of cur
 exceeds it as soon as kappa feed^2 > A(n).
 
 **Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are samples: over a period dt
-the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples fall. Hence no chord passes the vertex at more
+the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples fall, and from a cubic, where the machine runs
+these, by a quarter of that (between.py). Hence no chord passes the vertex at more
 than
 
     miss + kappa feed^2 dt^2 / 8  <=  eps                            (to second order in dt, as in the paper)
@@ -47,6 +48,7 @@ from planner.base.sizes import SIZES
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
+from planner.verify.between import bow_share
 from planner.verify.corners import CornerCheck
 from planner.verify.excess import Excess, Kind
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
@@ -115,7 +117,7 @@ def check_corners(
         when = near[1]["near_time"]
         reading = _joined([_nearest_point(motion, when[n], trajectory.dt, vertex[n], machine) for n in parts])
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
-        miss, chord = reading.distance, reading.normal * trajectory.dt**2 / 8.0
+        miss, chord = reading.distance, bow_share(machine) * reading.normal * trajectory.dt**2
         budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.where(reading.normal > 0, reading.feed * np.sqrt(reading.allowed / reading.normal), np.inf)
@@ -285,7 +287,7 @@ def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatAr
     linear = _linear(toolpath.axes)
     across = (toolpath.tangent_start[corner] - toolpath.tangent_end[corner - 1])[:, linear]
     eps, filters = toolpath.tolerance[corner], machine.fir.time_constants if machine.fir else ()
-    rate = machine.dt**2 / 8.0 + sum(T * T for T in filters) / 24.0
+    rate = bow_share(machine) * machine.dt**2 + sum(T * T for T in filters) / 24.0
     X = np.minimum(allowed_across(across, toolpath.axes, machine), eps / (2.0 * rate))
     speed: FloatArray = np.sqrt(1.5 * X * (eps - rate * X)) / np.tan(toolpath.theta[corner] / 2.0)
     return speed

@@ -52,7 +52,7 @@ def follow(
         if not skip:
             seen.first, seen.t_first = position[0].copy(), float(t[0])
         place = nowhere(len(t))
-        match_samples(pieces, seen.match, t, position, skip, False, anywhere, place)
+        match_samples(pieces, seen.match, t, position, skip, 1, position[:0], anywhere, place)
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, place.piece, position, ratio)

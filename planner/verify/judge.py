@@ -12,6 +12,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify import contour, error_allocation, findings, samples
+from planner.verify.between import bow_share
 from planner.verify.exact import exact_faults
 from planner.verify.excess import Kind
 from planner.verify.extruder import extruder_seen
@@ -21,7 +22,7 @@ from planner.verify.given import DERIVATIVES, Given
 from planner.verify.held import thread_checks, thread_faults
 from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import program_pieces, widened
-from planner.verify.reading import Reader
+from planner.verify.reading import CHORDS, Reader
 from planner.verify.ringing import ringing_of
 from planner.verify.stream import Limits
 from planner.verify.times import AnyMotion, cells_per_period
@@ -64,11 +65,10 @@ def verify(
     limits = _limits(machine, trajectory, given, not_limited)
     if limits.rounding.any():
         pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
-    cells = 0
-    if motion is not None:
-        acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
-        cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
-    reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed)
+    acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
+    cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
+    between = (cells, True) if machine.interpolation == "cubic" else CHORDS
+    reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed, between=between)
     looks = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
     apart = contour.apart(looks, pieces, reader.read)
     contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
@@ -140,7 +140,7 @@ def verify(
         angle_error_deg=angle_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
-        chord_error_mm=findings.largest_chord_error(looks),
+        chord_error_mm=bow_share(machine) / bow_share() * findings.largest_chord_error(looks),
         order=order,
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),

@@ -1,10 +1,10 @@
 """Matching the motion with the programmed path, in order: contour, vertices, completeness, stops and dwells.
 
-The motion is the polyline of the samples q_0 .. q_T (delivered: with the middle of every chord as a sample of its own; dense:
-the positions between the samples). It fits the program within the budget eps if and only if both can be run through from start
-to end, neither ever going back, at most eps apart all the time: the Frechet distance, decided by the free-space sweep of Alt
-and Godau (Int. J. Comput. Geom. Appl. 5, 1995, doi 10.1142/S0218195995000064) restricted to the window of pieces that can be
-reached, which makes it linear in time:
+The motion is the polyline of the samples q_0 .. q_T (delivered: with the middle of every chord as a sample of its own, or with
+places on the cubics where the machine runs these; dense: the positions between the samples). It fits the program within the budget eps
+if and only if both can be run through from start to end, neither ever going back, at most eps apart all the time: the Frechet distance,
+decided by the free-space sweep of Alt and Godau (Int. J. Comput. Geom. Appl. 5, 1995, doi 10.1142/S0218195995000064) restricted to the
+window of pieces that can be reached, which makes it linear in time:
 
     low[i]   the lowest point (fraction) of piece i that can belong to q_k, given everything before; inf if none can
     sample   piece i stays possible for the next sample if the part of it within eps of that sample reaches up to low[i]
@@ -130,7 +130,8 @@ def match_samples(
     t: FloatArray,
     position: FloatArray,
     skip: int,
-    middles: bool,
+    parts: int,
+    velocity: FloatArray,
     at_stop: AtStop,
     place: Located,
 ) -> None:
@@ -138,11 +139,11 @@ def match_samples(
     has skip = 0.
 
     t, position : (n,) [s], (n, A) [mm]
-    middles     : the middle of every chord is a sample too
+    parts       : into how many a period is divided: the places between are samples too
+    velocity    : (n, A) of the cubics between samples on which these lie [mm/s]; (0, A) if they lie on the chords
     """
     n, axes = position.shape
     before, point = match.place[BEFORE], match.place[POINT]
-    parts = 2 if middles else 1
     for k in range(skip, n):
         if k == 0:
             match.track[0]["low"] = 0.0
@@ -156,6 +157,9 @@ def match_samples(
             for axis in range(axes):
                 back = position[k, axis] - position[k - 1, axis] if k else 0.0
                 point[axis] = position[k, axis] - rest * back
+                if k and len(velocity):
+                    late, early = period * velocity[k, axis] - back, period * velocity[k - 1, axis] - back
+                    point[axis] += (1.0 - rest) * rest * (rest * early - (1.0 - rest) * late)
             first = match.tally[FIRST]
             place.piece[k], place.feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
             for i in range(first, match.tally[LAST] + 2):

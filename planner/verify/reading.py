@@ -19,6 +19,8 @@ from planner.verify.times import AnyMotion, look
 
 SIDE_BY_SIDE = SIZES.read_shared
 
+CHORDS = 2, False  # a chord is matched with its middle
+
 
 class Reader:
     """Reads a trajectory, and the motion it was taken from, from start to end, as often as it is asked to.
@@ -28,6 +30,7 @@ class Reader:
     dt, cells  : the machine's period [s], and into how many cells it is divided (times.py)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
+    between    : into how many parts the machine's way from sample to sample is divided, and whether it is a cubic
     """
 
     def __init__(
@@ -40,9 +43,10 @@ class Reader:
         dt: float,
         cells: int,
         seed: int,
+        between: tuple[int, bool] = CHORDS,
     ):
         self.trajectory, self.motion, self.limits, self.given = trajectory, motion, limits, given
-        self._times = dt, seed, cells
+        self._times, self._way = (dt, seed, cells), between
         self.delivered = self._delivered()
         self.comparison = None if motion is None else Comparison(trajectory.axes, motion.end)
 
@@ -55,7 +59,8 @@ class Reader:
     ) -> list[Look]:
         """What both show beside a path; `progress` is called with the fraction done."""
         self.delivered = self._delivered()
-        seen = Watch(pieces, self.limits, middles=True)
+        parts, cubic = self._way
+        seen = Watch(pieces, self.limits, parts=parts, cubic=cubic)
         samples = self.trajectory.chunks()
         between = None if self.motion is None else self._between(pieces, seen, samples, progress)
         for chunk in samples:
@@ -81,7 +86,7 @@ class Reader:
         number of threads."""
         assert self.motion is not None
         assert self.comparison is not None
-        between = Watch(pieces, self.limits, middles=False)
+        between = Watch(pieces, self.limits, parts=1)
         self.comparison.begin()
         parts = look(self.motion, *self._times)
         evaluated, taken = next(parts, None), None  # not read yet; read, but not compared yet

@@ -76,11 +76,12 @@ class Observed:
 class Watch:
     """What a motion shows, chunk by chunk in order. Samples not later than those already read (overlap) are left out.
 
-    middles : match the middle of every chord too
+    parts   : into how many a period is divided to be matched
+    cubic   : between samples the motion runs on cubics, not on chords
     seen    : what it has shown so far
     """
 
-    def __init__(self, pieces: ProgramPieces, limits: Limits, *, middles: bool):
+    def __init__(self, pieces: ProgramPieces, limits: Limits, *, parts: int, cubic: bool = False):
         axes = pieces.vertex.shape[1]
         rows = GROUPS * axes + ROWS_ALONE
         self.seen = Observed(
@@ -91,7 +92,7 @@ class Watch:
             match=new_match(pieces),
             own=OwnSeen(limits.own, limits.axes),
         )
-        self._pieces, self._limits, self._middles = pieces, limits, middles
+        self._pieces, self._limits, self._parts, self._cubic = pieces, limits, parts, cubic
         self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
         self._travelled = 0.0
         self._feeds = Feeds(
@@ -110,8 +111,15 @@ class Watch:
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
             data = SampleColumns(*(np.concatenate(pair) for pair in zip(self._carried, new, strict=True)))
+            velocity = data.velocity if self._cubic else data.velocity[:0]
             self._travelled = _block(
-                self.seen, data, self._feeds, self._pieces, self._limits, self._middles, self._travelled
+                self.seen,
+                data,
+                (self._parts, velocity),
+                self._feeds,
+                self._pieces,
+                self._limits,
+                self._travelled,
             )
             # copies: views would keep the whole block
             self._carried = [column[-CARRIED:].copy() for column in data]
@@ -132,13 +140,16 @@ class Watch:
 def _block(
     seen: Observed,
     data: SampleColumns,
+    way: tuple[int, FloatArray],
     feeds: Feeds,
     pieces: ProgramPieces,
     limits: Limits,
-    middles: bool,
     travelled: float,
 ) -> float:
-    """Take in one block, the carried samples first; returns the path length run so far."""
+    """Take in one block, the carried samples first; returns the path length run so far.
+
+    way : into how many parts a period is divided to be matched, and `velocity` as in `match_samples`
+    """
     t, position = data.t, data.position
     skip = min(seen.samples, CARRIED)
     if not skip:
@@ -151,7 +162,7 @@ def _block(
     piece = place.piece
     jerk = limits.per_axis[2] if limits.jerk_limited else np.full(len(limits.rounding), np.inf)
     at_stop = AtStop(limits.acceleration_at_stop, jerk, limits.rounding)
-    match_samples(pieces, seen.match, t, position, skip, middles, at_stop, place)
+    match_samples(pieces, seen.match, t, position, skip, *way, at_stop, place)
     speed = np.full(len(t), np.nan)
     if limits.judged[0]:
         speed = np.sqrt(np.einsum("na,na->n", data.velocity, data.velocity))

@@ -115,7 +115,7 @@ def test_normal_acceleration_is_used_up(kappa: float, limit: float) -> None:
 def test_chord_error_is_used_up(kappa: float, share: float, dt: float) -> None:
     """The sagitta R (1 - cos(F dt / 2R)) is within the tolerance, and equals it for tolerances small beside the radius."""
     tol = 0.2 * share / kappa
-    x = chord_error.feed_sq_max(one(kappa), one(tol), dt)[0]
+    x = chord_error.feed_sq_max(one(kappa), one(tol), dt**2 / 8.0)[0]
     half = 0.5 * np.sqrt(x) * dt * kappa
     sagitta = 2.0 * np.sin(half / 2.0) ** 2 / kappa
     assert sagitta <= tol * (1 + 1e-12)
@@ -157,7 +157,7 @@ def test_curvature_jump_is_used_up(kappa: float, angle: float, ax: float, ay: fl
 def test_straight_lines_are_not_limited() -> None:
     flat = np.zeros(3)
     assert np.isinf(normal_limit.feed_sq_within(flat, 1.0)).all()
-    assert np.isinf(chord_error.feed_sq_max(flat, np.ones(3), 1e-3)).all()
+    assert np.isinf(chord_error.feed_sq_max(flat, np.ones(3), 1e-7)).all()
     assert np.isinf(filter_error.feed_sq_max(flat, np.ones(3), (0.01,))).all()
     assert np.isinf(phase_lag.feed_sq_max(flat, 0.1, (0.01,))).all()
     assert np.isinf(

@@ -12,7 +12,8 @@ from planner.motion.trajectory import Trajectory
 
 Array = np.ndarray
 AGES = 4_001  # at which the kernel of the moving averages is taken
-FINE_PERIOD, FINE_FILTER = 8, 16  # places of a filtered signal in a period, and in the shortest filter
+# Places of a filtered signal in a period, and in the shortest filter; where setpoints jump, and each leaves a kink, and elsewhere.
+FINE_PERIOD, FINE_FILTER, FINE_HELD = 8, 16, 64
 
 
 def trajectory_of(t: Array, position: Array, velocity: Array) -> Trajectory:
@@ -69,7 +70,8 @@ def behind(setpoints: Trajectory, kind: str, lengths: tuple[float, ...], times: 
 
 def averaged(setpoints: Trajectory, kind: str, lengths: tuple[float, ...]) -> Array:
     """(n, A) the signal behind moving averages, one after the other, on a fine grid until they are empty [mm]."""
-    parts = max(FINE_PERIOD, int(np.ceil(FINE_FILTER * setpoints.dt / min(lengths, default=np.inf))))
+    places = FINE_HELD if kind == "hold" else FINE_FILTER
+    parts = max(FINE_PERIOD, int(np.ceil(places * setpoints.dt / min(lengths, default=np.inf))))
     h = setpoints.dt / parts
     t = h * np.arange(int((setpoints.t[-1] + sum(lengths)) / h) + 2)
     x = between(setpoints, kind, t)
@@ -94,7 +96,7 @@ def within(motion: Array, path: Array, distance: float) -> bool:
     distance : [mm]
     """
     q, p = motion.tolist(), path.tolist()
-    if _free(q[0], p[0], p[1], distance)[0] > 0.0:
+    if distance < 0.0 or _free(q[0], p[0], p[1], distance)[0] > 0.0:
         return False
     lowest = {0: 0.0}  # of the segments that the motion's point can belong to, the lowest place
     for before, point in pairwise(q):

@@ -31,8 +31,8 @@ from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.timing import MotionInTime, sample_motion
 
-# Places of the filtered motion in a period, and in the shortest filter.
-PER_PERIOD, PER_FILTER = 4, 8
+# Places of the filtered motion in a period, and in the shortest filter: more where every setpoint makes a kink.
+PER_PERIOD, PER_FILTER, PER_FILTER_HELD = 4, 8, 32
 AT_ONCE = SIZES.convolved_at_once
 Terms = tuple[tuple[int, int, float], ...]
 # Of each kind the shape of the position, and that of the velocity times dt if it counts; where the middle of both is [periods].
@@ -57,7 +57,8 @@ class FilteredSetpoints:
 
     def __init__(self, interpolation: str, filters: tuple[float, ...], dt: float):
         self.dt, lengths = dt, tuple(T / dt for T in filters)
-        self.phases = max(PER_PERIOD, int(np.ceil(PER_FILTER / min(lengths))))
+        places = PER_FILTER_HELD if interpolation == "hold" else PER_FILTER
+        self.phases = max(PER_PERIOD, int(np.ceil(places / min(lengths))))
         middle, place, slope = SHAPES[interpolation]
         self.middle = middle + sum(lengths) / 2.0
         self.reach = (

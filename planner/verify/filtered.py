@@ -10,10 +10,10 @@ delay Td = sum T_i after the end, and arrives exactly where the motion does.
 
 The longest filter comes first: of it the integral is exact, at any time. For the others y is known at times h apart with its
 derivative, and taken as a cubic between them; those y are the next filter's x. A cubic misses a jump a of the second derivative by at
-most h^2 a / 32, and a jump v of the first by h v / 8; a moving average leaves h / T of either, and h <= T/8. A chord that turns by the
-speed v makes a = v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and T1 is the longest filter: some
-nanometres, and with "hold" on the way of the motion (measured in tests/verify/test_filtered.py). The integrals begin anew in every
-chunk: no digit is lost in long motions.
+most h^2 a / 32, and a jump v of the first by h v / 8; a moving average leaves h / T of either, and h <= T/8 (T/32 with "hold"). A chord
+that turns by the speed v makes a = v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and T1 is the longest
+filter: some nanometres, and with "hold" on the way of the motion (measured in tests/verify/test_filtered.py). The integrals begin anew
+in every chunk: no digit is lost in long motions.
 
 The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits are judged on the setpoints:
 a mean never exceeds what it is the mean of. A full stop is a vertex like any other: the filtered motion need not rest there.
@@ -44,6 +44,8 @@ from planner.verify.verdict import AfterFilters
 
 NOTE = "after the filters"
 STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are evaluated (module text)
+# In the shortest filter, where setpoints jump: the mean has a kink for each then, which chords between times cut off.
+STEPS_OF_HELD = 32
 CHUNK = SIZES.filtered_at_once
 
 
@@ -57,7 +59,8 @@ def filtered(
     dt            : interpolation period [s]
     """
     first_of_all, *others = sorted(filters, reverse=True)
-    h = min(dt / STEPS_PER_PERIOD, min(filters) / STEPS_PER_FILTER)
+    steps = STEPS_OF_HELD if interpolation == "hold" else STEPS_PER_FILTER
+    h = min(dt / STEPS_PER_PERIOD, min(filters) / steps)
     before = sum(int(np.ceil(T / h)) for T in others)
     count = int(np.ceil((trajectory.cycle_time + sum(filters)) / h)) + 1
     signal = Signal(trajectory, interpolation)

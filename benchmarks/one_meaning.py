@@ -161,8 +161,8 @@ def row(seed: int) -> dict[str, Any]:
 
 
 def compared(motion: Array, job: Case, ratio: float) -> str:
-    """What other code says of a motion whose worst error is a ratio of the tolerance: it keeps the tolerance if that is at most 1, and it
-    keeps no smaller distance than the ratio says.
+    """What other code says of a motion whose worst error is a ratio of the tolerance: it keeps the tolerance if that is at most 1, and
+    no smaller distance than the ratio says.
 
     The verdict's number is the distance from the nearest piece that can be reached in order, which is less than that in order where
     pieces are close to each other.

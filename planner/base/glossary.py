@@ -62,6 +62,7 @@ TERMS = {
     "sensitivity": "what a change of a limit or of the tolerance does to the cycle time; printed as `10 % more saves`",
     "setpoint": "one row of the trajectory: where the axes have to be at a sample time",
     "interpolation period": "the time between two setpoints, dt",
+    "interpolation": "what the machine does within that: linear, cubic or hold (docs/files.md)",
     "profile": "feed, acceleration and jerk along the path as a solver finds them",
     "trajectory": "positions and their derivatives over time, one row per interpolation period",
     "verdict": "what the verifier says of a trajectory: every limit with its ratio, errors, faults, and whether it passed",

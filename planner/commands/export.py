@@ -88,6 +88,10 @@ def export_command(
     trajectory = read.trajectory
     if len(trajectory.extruder):
         raise InputError(_NO_EXTRUDER, source=str(plan))
+    machine = read.metadata.get("machine")
+    between = machine.get("interpolation", "linear") if isinstance(machine, dict) else "linear"
+    if for_ is For.stream and between == "cubic":
+        raise InputError(_POSITIONS_ALONE, source=str(plan))
     new = output.with_name(f".{output.name}.{os.getpid()}")
     try:
         new.mkdir(parents=True)
@@ -97,6 +101,8 @@ def export_command(
         else:
             periods, miss = write_pvt(new, trajectory, unit, WITHIN if within is None else within)
             said = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
+            if between != "cubic":
+                said += f'; the verdict is on interpolation = "{between}" between the setpoints'
         new.rename(output)
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
@@ -106,6 +112,10 @@ def export_command(
     say(f"{output}: {said}")
 
 
+_POSITIONS_ALONE = (
+    'the plan is for a machine of interpolation = "cubic", whose drives get velocities too, and a stream has positions alone: '
+    'take --for pvt, or plan with interpolation = "linear"'
+)
 _NO_EXTRUDER = (
     "this export would lose what the extruder does; planned.ngc and the trajectory file of the plan have it"
 )

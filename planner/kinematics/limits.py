@@ -63,4 +63,6 @@ def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: floa
         )
         axes = {letter: free if letter in LINEAR else axis for letter, axis in axes.items()}
     joints = [LinearJoint(letter, machine.axes[letter], found, radius) for letter in LINEAR]
-    return machine.model_copy(update={"axes": axes}).with_own([*machine.own, *joints])
+    # joints that run on cubics do not lead the tip along one: between setpoints it is taken to run along its chord
+    way = "linear" if machine.interpolation == "cubic" else machine.interpolation
+    return machine.model_copy(update={"axes": axes, "interpolation": way}).with_own([*machine.own, *joints])

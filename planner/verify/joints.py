@@ -195,7 +195,9 @@ def _of_tip(machine: Machine) -> Machine:
     linear = [machine.axes[letter] for letter in LINEAR_AXES]
     free = Axis(**{name: NOT_JUDGED * max(getattr(axis, name) for axis in linear) for name in DERIVATIVES})
     axes = {letter: free if letter in LINEAR_AXES else axis for letter, axis in machine.axes.items()}
-    return machine.model_copy(update={"axes": axes}).with_own(())
+    # cubics of the joints are not cubics of the tip: it is taken along its chord, and `gap` is added
+    way = "linear" if machine.interpolation == "cubic" else machine.interpolation
+    return machine.model_copy(update={"axes": axes, "interpolation": way}).with_own(())
 
 
 def _joint_checks(

@@ -73,6 +73,21 @@ def test_hal_puts_out_every_row(tmp_path: Path, motion: Trajectory) -> None:
     assert (position[first + len(motion) :] == rows[-1]).all()
 
 
+@pytest.mark.parametrize(("between", "refused"), [("linear", False), ("hold", False), ("cubic", True)])
+def test_a_stream_is_not_for_drives_that_need_velocities(between, refused, tmp_path, motion) -> None:
+    """Cubics of positions and velocities are what the verdict was on; a stream has the positions alone."""
+    (tmp_path / "plan").mkdir()
+    machine = load_machine("mill").model_copy(update={"interpolation": between})
+    metadata = {"machine": machine.model_dump(mode="json", exclude_none=True)}
+    write_trajectory(tmp_path / "plan" / "trajectory.parquet", motion, metadata)
+    made = run("export", tmp_path / "plan", "--for", "linuxcnc-stream", "-o", tmp_path / "stream")
+    assert made.exit_code == (2 if refused else 0)
+    assert ("--for pvt" in made.output) == refused
+    pvt = run("export", tmp_path / "plan", "--for", "pvt", "-o", tmp_path / "pvt")
+    assert pvt.exit_code == 0, pvt.output
+    assert (f'interpolation = "{between}"' in pvt.output) != refused
+
+
 def test_command_writes_new_directories_only(tmp_path: Path, motion: Trajectory) -> None:
     (tmp_path / "plan").mkdir()
     write_trajectory(tmp_path / "plan" / "trajectory.parquet", motion)

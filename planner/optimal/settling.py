@@ -23,8 +23,6 @@ from planner.motion.timing import Motion, in_chunks, inside_pieces
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import Order, solve_again
 from planner.optimal.tighten import beside_axes, fastest_inside, tightened
-from planner.verify.follow import follow
-from planner.verify.matching import Located
 
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
@@ -136,8 +134,6 @@ class Settling:
         dt = self.job.machine.dt
         if self.job.machine.normal_acceleration is not None:
             times = np.concatenate([times, *(slowest(chunk) for chunk in in_chunks(delivered, dt, times))])
-        # times at which D exceeds the feed of the block at the mean delay, and both feeds
-        fast = [np.empty((3, 0))]
         for chunk in in_chunks(delivered, dt, times):
             worst = np.ones(len(chunk))
             for order, (name, limit) in enumerate(self.limits.items(), start=1):
@@ -145,12 +141,9 @@ class Settling:
             for order, ratio in beside_axes(self.job.machine, chunk):
                 if order <= len(self.limits):
                     worst = np.maximum(worst, ratio ** (1.0 / order))
+            # D is on the block at the mean delay, as near as the shaper leaves it to the path
+            worst = np.maximum(worst, chunk.feed / self.feed[chunk.block])
             self._put(factor, motion, chunk.t, worst)
-            feeds = np.array([chunk.t, chunk.feed, self.feed[chunk.block]])
-            fast.append(feeds[:, feeds[1] > (1.0 + EXCESS) * feeds[2]])
-        time, feed, of_block = np.concatenate(fast, axis=1)
-        if len(time):
-            self._put(factor, motion, time, feed / np.maximum(of_block, self._feeds(delivered, time)))
         off = self.behind.errors(delivered)
         missed = off.near > ROOM
         # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
@@ -171,21 +164,6 @@ class Settling:
         over = worst > 1.0 + EXCESS
         for delay in self.shaper.delay:
             np.maximum.at(factor, self._piece(motion, time[over] - delay), worst[over])
-
-    def _feeds(self, delivered: ShapedMotion, time: FloatArray) -> FloatArray:
-        """(n,) the largest feed of the blocks that D can lie on at times (n,) [s], as the verifier finds it [mm/s]: near a
-        corner those are both blocks, and D may be as fast as the next one allows before it is on it in the mean."""
-        found: list[FloatArray] = []
-
-        def each(t: FloatArray, ratio: FloatArray, place: Located) -> None:
-            found.append(np.array([t, place.feed_max]))
-
-        places = np.append(np.arange(0.0, delivered.end, self.job.machine.dt / 2.0), time)
-        chunks = in_chunks(delivered, self.job.machine.dt, places)
-        follow(((chunk.t, chunk.position) for chunk in chunks), self.behind.pieces, each=each)
-        t, feed = np.concatenate(found, axis=1)
-        allowed: FloatArray = feed[np.searchsorted(t, time)]
-        return allowed
 
     def _piece(self, motion: Motion, times: FloatArray) -> Array:
         return np.clip(np.searchsorted(motion.law.t, times, side="right") - 1, 0, len(motion.law.t) - 1)

@@ -207,3 +207,12 @@ def test_a_path_that_uses_little_of_the_tolerance_leaves_more_to_the_shaper():
     assert made.verdict.passed
     assert left(made) < LEFT
     assert made.cycle_time < 2.0
+
+
+def test_a_slow_block_is_as_slow_behind_the_shaper():
+    """F holds where the delivered motion is, not where one of its copies is."""
+    text = "G21 G90 G17 G94\nG64 P0.05\nG0 X0 Y0\nG1 X10 F3000\nX20 Y4 F300\nX30 Y20 F3000\nX31 F60\nX50 F3000\nM2\n"
+    machine = problems.machine(modes=[{"frequency": 18.0, "damping": 0.05}])
+    made = plan(parse_program(text), machine, method="optimal", shaped=True)
+    assert made.require().verdict.passed, made.verdict.faults
+    assert made.verdict.limits["feed"].ratio <= 1.0 + 1e-6

@@ -41,14 +41,14 @@ SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
 # Of jobs with more axes or blocks than these only a share is planned in the ways that take tens of seconds for them.
 AXES_OF_SLOW, BLOCKS_OF_SLOW, SHARE_OF_SLOW = 4, 8, 0.1
 SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
-PERIOD_MAX = 0.002  # [s]
+PERIOD_MAX = 0.008  # [s]
 DWELL_MAX = 0.05  # [s]
 DRAWS = 60  # of a program until one has few blocks and moves; the least one counts where none has
 VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
 FIRST_SEEDS = 20  # by whose jobs the draws are known again
 DIGITS = 6  # of their numbers
-PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004)  # [s]
+PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004, 0.008)  # [s]
 QUICK: dict[str, Any] = {"effort": "quick"}
 # Methods with their settings, and how often each is drawn.
 METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (

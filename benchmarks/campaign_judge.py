@@ -7,7 +7,7 @@
                places do not go back (matched from the first sample on, and once more from the last); under G61 the samples lie on it
     vertices   every end of a block is reached within the tolerance, in order; full stops and dwells by samples that stand there
     ends       start, end, and rest at both
-    filters    the contour of the moving averages of the setpoints too
+    filters    the contour of the moving averages of the chords between the setpoints too
 
 Curves are compared as chords; by how much these are off (`Course.sag`) is allowed on top. A bound that allows too much misses a small
 fault; one that allows too little would call a right motion wrong, so every bound errs to the first side.
@@ -241,7 +241,7 @@ def _vertices(motion: Motion, course: Course) -> Iterator[str]:
 
 
 def filtered(motion: Motion) -> tuple[Array, float]:
-    """(n, A) the moving averages of the setpoints on a fine grid, and how far chords for the setpoints make them wrong [mm]."""
+    """(n, A) the moving averages of the chords between the setpoints on a fine grid, and how far that grid makes them wrong [mm]."""
     delay = sum(motion.filters)
     total = motion.t[-1] + delay
     h = max(min(motion.dt, *motion.filters) / FINE, total / FINE_MOST)
@@ -255,9 +255,8 @@ def filtered(motion: Motion) -> tuple[Array, float]:
                 np.interp(times - length, times, sums[:, axis]) + np.minimum(times - length, 0) * out[0, axis]
             )
             out[:, axis] = (sums[:, axis] - before) / length
-    bow = np.linalg.norm(np.diff(motion.q, 2, axis=0), axis=1).max(initial=0.0) / 8
     speed = np.linalg.norm(np.diff(motion.q, axis=0), axis=1).max(initial=0.0) / motion.dt
-    return out, bow + speed * h * 0.02 * len(motion.filters)
+    return out, speed * h * 0.02 * len(motion.filters)
 
 
 def _filtered(motion: Motion, course: Course) -> Iterator[str]:

@@ -46,7 +46,7 @@ WAYS: tuple[tuple[str, dict[str, Any]], ...] = (
 ARC = 1e-3  # of the tolerance, by which chords stand for arcs in the other code [-]
 # By how much the other code's answer may differ [-]: it takes straight lines between places of the filtered motion, as the judge does
 # at other places.
-CLOSE = 0.01
+CLOSE = 0.02
 LOST = 2.0  # [-] a motion that is lost has no distance from the path
 SAMPLES = 2_000  # of a program at its feed, at most
 

@@ -10,7 +10,8 @@ sharp each check is:
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
     feed.py       the feed against the F word of that block, of every chord and every delivered speed
     own.py        limits of one's own that the machine came with, by their laws
-    matching.py   contour, vertices, order, completeness, stops and dwells: an in-order matching of motion and path
+    matching.py   contour, vertices, order, completeness: an in-order matching of motion and path
+    stops.py      full stops, and how long they last
     contour.py    how far motion and path are apart, also where a motion was lost
     samples.py    periods, density and digits of the samples, their unit of time, rest at both ends
     given.py      what of a trajectory was delivered, and how exactly

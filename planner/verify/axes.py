@@ -12,7 +12,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.verify.given import DERIVATIVES, Given
-from planner.verify.matching import STILL
+from planner.verify.stops import STILL
 
 
 def fit_axes(

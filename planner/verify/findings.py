@@ -249,9 +249,14 @@ def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -
     return []
 
 
-def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
+def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits) -> list[str]:
     """Full stops that are run through, and dwells cut short."""
     joint = np.flatnonzero(pieces.joint["real"])
+    # A motion above its limits leaves a rest faster than they say: it is not called short by that, too.
+    over = np.sqrt(measured(looks, rows.ACCELERATION).max())
+    if limits.jerk_limited:
+        over = max(over, np.cbrt(measured(looks, rows.JERK).max()))
+    hurry = 2.0 * (1.0 - (1.0 - STOP_ROUNDING) / max(over, 1.0))
     said = []
     for look in looks:
         match = look.seen.match
@@ -260,11 +265,9 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) ->
         through = np.flatnonzero(
             (pieces.joint["stop"][joint] == 1) & visited & (stop_ratio > 1.0 + STOP_ROUNDING)
         )
-        resolution = 2.0 * look.seen.gap_max  # the periods in which a standstill begins and ends are not seen
-        # n periods are summed with one rounding each
-        short = toolpath.dwell - match.passed["rest"][joint] - resolution > RATIO_ROUNDING * (
-            toolpath.dwell + resolution
-        )
+        # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
+        unknown = RATIO_ROUNDING * toolpath.dwell + hurry * look.seen.gap_max + 2.0 * limits.time_rounding
+        short = toolpath.dwell - match.passed["rest"][joint] > unknown
         for i in through[:FAULTS_OF_A_KIND]:
             ratio = look.noted(
                 f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
@@ -272,7 +275,7 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) ->
             said.append(f"stop: no full stop at {_joint_name(toolpath, i)}: {ratio}")
         for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
             seen = look.noted(
-                f"{match.passed['rest'][joint[i]]:.6g} s seen, {toolpath.dwell[i]:.6g} s programmed"
+                f"{match.passed['rest'][joint[i]]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
             )
             said.append(f"dwell: too short at {_joint_name(toolpath, i)}: {seen}")
         for what, count in (("stop", len(through)), ("dwell", int(short.sum()))):

@@ -10,8 +10,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.verify import limits as rows
 from planner.verify.findings import Look
 from planner.verify.kernel import kernel
-from planner.verify.matching import SEARCH_MAX, SEARCHED, AtStop, Located, match_samples, new_match, nowhere
+from planner.verify.matching import SEARCH_MAX, SEARCHED, Located, match_samples, new_match, nowhere
 from planner.verify.pieces import ProgramPieces, reach_piece
+from planner.verify.stops import AtStop
 from planner.verify.stream import Observed
 
 Each = Callable[[FloatArray, FloatArray, Located], None]

@@ -113,7 +113,7 @@ def verify(
         (Kind.CONTOUR, [contour_check.sentence(toolpath.axes)] if contour_check.broken else []),
         (Kind.VERTEX, vertex_faults),
         (Kind.ORDER, order_faults),
-        (Kind.STOP, findings.stop_faults(looks, toolpath, pieces)),
+        (Kind.STOP, findings.stop_faults(looks, toolpath, pieces, limits)),
         (Kind.EXACT, exact_faults(trajectory, looks, toolpath, limits)),
         (Kind.THREAD, thread_faults(threads)),
         (Kind.EXTRUDER, extruder.faults),

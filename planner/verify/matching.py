@@ -31,7 +31,6 @@ no contour error, and a vertex on lost pieces that no chord was compared with ke
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -39,19 +38,18 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.verify.pieces import (
     CONTOUR_ROUNDING,
-    PLACE_ROUNDING,
     RATIO_ROUNDING,
     ProgramPieces,
     kernel,
     reach_chord,
     reach_piece,
 )
+from planner.verify.stops import AtStop, longest_rest, watch_stop
 
 NEAR_MISS = 2.0  # errors up to this multiple of the budget are matched in place; beyond, a block is left out
 BISECTIONS = 12  # of the widened budget: 1/4096 of it
 PIECES_AHEAD = 5_000  # looked through for the block at which a lost motion comes back
 SEARCH_MAX = 100_000_000  # pieces looked through in total; then a lost motion stays lost: bounds the time
-STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding of coordinates up to 1e6 mm
 
 
 TRACK = np.dtype([("low", "f8"), ("new", "f8"), ("lost", "?")])
@@ -65,8 +63,9 @@ class Match(NamedTuple):
     """State of the matching after some samples, and what it has found; all arrays are written in place.
 
     track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
-    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to
-             stop: rest = standstill there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
+    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to stop:
+             rest = the longest that it can have rested there [s], stop_ratio = how well it stops, <= 1 if within what samples can
+             show
     tally  : (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was
              possible when the motion was lost first, or NOT_LOST; 1 while it is lost; the vertex at which the motion did not fit
              into the budgets first, or NOT_LOST
@@ -96,15 +95,6 @@ def new_match(pieces: ProgramPieces) -> Match:
         place=np.zeros((3, axes)),
         worst=np.zeros(6),
     )
-
-
-class AtStop(NamedTuple):
-    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2] and jerks [mm/s3], inf where they are not
-    limited, and errors of positions by their digits [mm]."""
-
-    acceleration_max: FloatArray
-    jerk_max: FloatArray
-    rounding: FloatArray
 
 
 class Located(NamedTuple):
@@ -144,6 +134,7 @@ def match_samples(
     """
     n, axes = position.shape
     before, point = match.place[BEFORE], match.place[POINT]
+    began = 0  # the first piece that was possible when the period began
     for k in range(skip, n):
         if k == 0:
             match.track[0]["low"] = 0.0
@@ -161,12 +152,18 @@ def match_samples(
                     late, early = period * velocity[k, axis] - back, period * velocity[k - 1, axis] - back
                     point[axis] += (1.0 - rest) * rest * (rest * early - (1.0 - rest) * late)
             first = match.tally[FIRST]
+            began = first if part == 1 else began
             place.piece[k], place.feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
             for i in range(first, match.tally[LAST] + 2):
                 if k and pieces.joint[i]["stop"]:
-                    _watch_stop(pieces, match, i, period, parts, at_stop)
+                    watch_stop(pieces, match.passed, i, before, point, period, parts, at_stop)
             for axis in range(axes):
                 before[axis] = point[axis]
+        for i in range(began, match.tally[LAST] + 2):
+            if k and pieces.joint[i]["stop"]:
+                match.passed[i]["rest"] += longest_rest(
+                    pieces, i, position[k - 1], position[k], period, at_stop
+                )
         place.first[k], place.last[k] = match.tally[FIRST], match.tally[LAST]
         if match.tally[ASTRAY]:
             place.last[k] = -2
@@ -317,36 +314,6 @@ def _commit(match: Match, first: int, last: int) -> None:
     for i in range(first, last + 1):
         match.track[i]["low"] = match.track[i]["new"]
     match.tally[FIRST], match.tally[LAST] = first, last
-
-
-@kernel()
-def _watch_stop(
-    pieces: ProgramPieces, match: Match, i: int, period: float, parts: int, at_stop: AtStop
-) -> None:
-    """What the chord to the present sample, one of `parts` of a period, shows of the stop at vertex i.
-
-    If the motion rests at the vertex at some time within a period h, then with |acceleration| <= a its chord over the period
-    is at most a h^2 / 2 long, and the nearer end of the period is at most a (h/2)^2 / 2 away; where jerk is limited to j, at rest the
-    acceleration is zero too, and it is j h^3 / 6 and j (h/2)^3 / 6. Per axis, each.
-    """
-    before, point = match.place[BEFORE], match.place[POINT]
-    acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
-    slow, away_sq, still = 0.0, 0.0, True
-    for axis in range(len(point)):
-        move = abs(point[axis] - before[axis])
-        bow = acceleration_max[axis] * period * period / 8.0
-        most = 4.0 * bow
-        if math.isfinite(at_stop.jerk_max[axis]):
-            bow = min(bow, at_stop.jerk_max[axis] * period**3 / 48.0)
-            most = min(most, at_stop.jerk_max[axis] * period**3 / 6.0)
-        slow = max(slow, max(move * parts - STILL - 2.0 * rounding[axis], 0.0) / most)
-        away_sq += (bow + rounding[axis]) ** 2
-        still = still and move <= STILL
-    away = math.sqrt(away_sq) + PLACE_ROUNDING
-    _, _, apart = reach_chord(before, point, pieces, i, 0.0)
-    match.passed[i]["stop_ratio"] = min(match.passed[i]["stop_ratio"], max(slow, apart / away))
-    if still and apart <= away:
-        match.passed[i]["rest"] += period / parts
 
 
 @kernel(inline=True)

@@ -35,8 +35,8 @@ from planner.motion.trajectory import Trajectory
 from planner.verify.findings import QUANTITIES, Look, measured
 from planner.verify.given import Given
 from planner.verify.limits import ACCELERATION, JERK, ROUNDING_ULPS
-from planner.verify.matching import STILL
 from planner.verify.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
+from planner.verify.stops import STILL
 from planner.verify.stream import Limits
 
 # A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the

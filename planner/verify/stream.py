@@ -18,9 +18,10 @@ from planner.verify.axes_apart import both_apart
 from planner.verify.excess import Spans
 from planner.verify.feed import Feeds
 from planner.verify.limits import FEED, GROUPS, OVER, ROWS_ALONE, Allowed, SampleColumns, Worst, scan
-from planner.verify.matching import AtStop, Match, match_samples, new_match, nowhere
+from planner.verify.matching import Match, match_samples, new_match, nowhere
 from planner.verify.own import OwnSeen, SampleBlock
 from planner.verify.pieces import ProgramPieces
+from planner.verify.stops import AtStop
 from planner.verify.switches import Bounds, Chords
 
 BLOCK_SAMPLES = SIZES.judged_at_once

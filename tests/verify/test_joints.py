@@ -11,7 +11,7 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.kinematics import at_tip, kinematics_of
-from planner.kinematics.setpoints import joint_setpoints
+from planner.kinematics.setpoints import joint_setpoints, tip_of_setpoints
 from planner.motion.trajectory import Trajectory
 from planner.verify.joints import verify_joints
 from tests.kinematics.five_axis import table_machine, tip_program
@@ -89,3 +89,16 @@ def test_a_machine_without_kinematics_is_refused(setpoints: Trajectory, plan) ->
     without = MACHINE.model_copy(update={"kinematics": None})
     with pytest.raises(InputError, match="no table"):
         verify_joints(setpoints, plan.toolpath, without)
+
+
+def test_what_lies_between_setpoints_is_added_to_the_error_of_the_tip(plan, setpoints: Trajectory) -> None:
+    """Its middle by the planner's own chain, which the judge does not use."""
+    few = np.unique(np.append(np.arange(0, len(setpoints), 50), len(setpoints) - 1))
+    sparse = dataclasses.replace(setpoints.rows(few), dt=0.05)
+    found = verify_joints(sparse, plan.toolpath, MACHINE, not_limited=NOT_LIMITED)
+    q = sparse.position
+    between = dataclasses.replace(sparse.rows(np.arange(len(q) - 1)), position=0.5 * (q[1:] + q[:-1]))
+    tips, middle = (tip_of_setpoints(each, kinematics_of(MACHINE)).position for each in (sparse, between))
+    gap = np.linalg.norm(middle - 0.5 * (tips[1:] + tips[:-1]), axis=1).max()
+    assert gap > 0.01
+    assert found.tip_error_mm == pytest.approx(found.tip.contour_error_mm + gap, abs=1e-9)

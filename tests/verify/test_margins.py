@@ -5,10 +5,12 @@ Numbers of M: a period h of 1 ms, a = 2000 mm/s2, j = 2e5 mm/s3.
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from judging import M
-from motions import Moves, chain, polyline, sample, stay
+from motions import Moves, chain, machine, polyline, sample, stay
 from setpoints import trajectory_of
 
 from planner.nc.program import PathControl
@@ -18,9 +20,9 @@ H, A, J = M.dt, 2000.0, 2e5
 NO_COLUMNS = Given(columns=())
 
 
-def said(kind, trajectory, toolpath, machine=M, **more):
+def said(kind, trajectory, toolpath, **more):
     """The faults of a kind, by positions alone."""
-    verdict = verify(trajectory, toolpath, machine, given=NO_COLUMNS, **more)
+    verdict = verify(trajectory, toolpath, M, given=NO_COLUMNS, **more)
     return [text for text in verdict.faults if text.startswith(kind)]
 
 
@@ -101,3 +103,80 @@ def test_a_motion_above_its_jerk_is_not_called_short_by_that_too():
         fast = dwelling(0.02, phase, 3.0 * J)
         assert said("jerk", fast, toolpath)
         assert not said("dwell", fast, toolpath)
+
+
+# ---- rest at both ends: the period next to it moves by no more than j h^3 / 6, or a h^2 / 2 --------------------------------------
+
+
+@pytest.mark.parametrize(("ratio", "rests"), [(0.99, True), (1.01, False), (2.9, False)])
+@pytest.mark.parametrize("jerk_limited", [True, False])
+def test_the_periods_at_both_ends_move_by_no_more_than_they_can_beside_a_rest(ratio, rests, jerk_limited):
+    step = ratio * (J * H**3 / 6 if jerk_limited else A * H**2 / 2)
+    toolpath = Moves().line(1).toolpath(M)
+    motion = along_x(step * np.arange(20))
+    for end in ("start", "end"):
+        found = said(
+            f"{end}: not at rest: x moves", motion, toolpath, not_limited=() if jerk_limited else ("jerk",)
+        )
+        assert (found == []) == rests
+
+
+# ---- columns against the means of one period: (v0 + v1)/2 to min(A h / 4, J h^2 / 12), (a0 + a1)/2 to J h / 4 ---------------------
+
+VELOCITY_DIGITS, ACCELERATION_DIGITS = 1e-6 * 100, 1e-6 * (100 / H + A)  # 1e-6 of the limits
+
+
+@pytest.mark.parametrize(("ratio", "agrees"), [(0.99, True), (1.01, False), (1.9, False)])
+@pytest.mark.parametrize(
+    ("columns", "value", "limited"),
+    [
+        (("velocity",), VELOCITY_DIGITS + J * H**2 / 12 * 1j, ()),
+        (("velocity",), VELOCITY_DIGITS + A * H / 4 * 1j, ("jerk",)),
+        (("velocity", "acceleration"), ACCELERATION_DIGITS + J * H / 4 * 1j, ()),
+    ],
+    ids=["velocity by jerk", "velocity by acceleration", "acceleration"],
+)
+def test_columns_may_differ_from_the_mean_of_a_period_by_what_the_limits_allow(
+    columns, value, limited, ratio, agrees
+):
+    """Of axes that stand still the last column is given as one number, with its rounding as the real part."""
+    motion = along_x(np.zeros(20))
+    wrong = np.zeros((20, 3))
+    wrong[:, 0] = value.real + ratio * value.imag
+    found = verify(
+        dataclasses.replace(motion, **{columns[-1]: wrong}),
+        Moves().line(1).toolpath(M),
+        M,
+        given=Given(columns=columns),
+        not_limited=limited,
+    )
+    assert any(text.startswith(f"columns: {columns[-1]}.x") for text in found.faults) != agrees
+
+
+# ---- G61: a vertex of an arc is missed by its chord by no more than a h^2 / 8 ----------------------------------------------------
+
+
+@pytest.mark.parametrize(("ratio", "exact"), [(0.99, True), (1.02, False), (3.5, False)])
+def test_between_samples_on_an_exact_arc_its_vertices_are_missed_by_the_bow_of_the_acceleration(ratio, exact):
+    radius, turn = 1.5, np.pi / 8 / 8  # of an arc; between samples: vertices are midway between two of them
+    bow = radius * (1 - np.cos(turn / 2)) / ratio
+    strong = machine(acceleration=(bow - 1e-6) / (np.sqrt(3) * H**2 / 8))  # 1e-6 mm for digits of places
+    toolpath = Moves((radius, 0.0, 0.0)).arc((0.0, 0.0), 2 * np.pi).toolpath(strong)
+    toolpath = dataclasses.replace(toolpath, exact=np.ones(1, dtype=bool))
+    angle = np.concatenate([[0.0], turn * np.arange(0.5, 128), [2 * np.pi]])
+    place = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    found = verify(
+        trajectory_of(H * np.arange(len(angle)), place, 0 * place), toolpath, strong, given=NO_COLUMNS
+    )
+    assert any(text.startswith("exact path") for text in found.faults) != exact
+
+
+# ---- order within one chord --------------------------------------------------------------------------------------------------
+
+
+def test_vertices_of_one_chord_are_passed_in_their_order():
+    """From 5.05 to 5.1 mm in one chord: 5.06 and 5.09 are passed by a motion straight on, 5.09 and then 5.06 are not."""
+    motion, fine = along_x(0.1 * np.arange(101)), machine(tolerance=0.005)
+    for inner, in_order in (((5.06, 5.09), True), ((5.09, 5.06), False)):
+        toolpath = Moves().line(inner[0]).line(inner[1]).line(10).toolpath(fine)
+        assert verify(motion, toolpath, fine, given=NO_COLUMNS).order == in_order

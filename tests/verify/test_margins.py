@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from judging import M
 from motions import Moves, chain, machine, polyline, sample, stay
-from setpoints import trajectory_of
 
+from benchmarks.setpoints import trajectory_of
 from planner.nc.program import PathControl
 from planner.verify import Given, verify
 

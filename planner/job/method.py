@@ -12,6 +12,7 @@ import numpy as np
 from planner.base.names import KINEMATIC, OPTIMAL
 from planner.base.sizes import SIZES
 from planner.constraints.extruder import with_extruder_limit
+from planner.constraints.limits import JERK
 from planner.delivery import periods
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
@@ -187,7 +188,7 @@ class Method(ABC):
                     return None
                 own = job.motion_of[plan.trajectory]
                 parts[k] = SplicedRun(motion=own, begin=0.0, end=own.end)
-            jerk = made.verdict.limits.get("jerk." + toolpath.axes[0])
+            jerk = made.verdict.limits.get(JERK.called(toolpath.axes[0]))
             not_limited = () if jerk is None or jerk.limited else ("jerk",)
             whole = Spliced(runs=tuple(parts))
             trajectory, verdict = job.deliver(whole, not_limited)

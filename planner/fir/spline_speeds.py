@@ -115,14 +115,19 @@ def first_speeds(
     return v * _slower_corners(guide, v, most, T1, T2)
 
 
+def two_nodes(T1: FloatArray, T2: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) x [s] and (n,) w [-] of the rule of the module's text, for filters T1, T2 (n,) [s]."""
+    second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
+    return np.sqrt(fourth / second), second**2 / (2.0 * fourth)
+
+
 def _v_mean(
     guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
     """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
     run = guide.run[at]
     T1, T2 = T1[run], T2[run]
-    second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
-    x, w = np.sqrt(fourth / second), second**2 / (2.0 * fourth)
+    x, w = two_nodes(T1, T2)
     begin, end = guide.s[guide.first[run]], guide.s[guide.first[run + 1]]
     half = 0.5 * guide.length[at]
     here, middle = guide.s[at] + half, guide.point[at] + half[:, None] * guide.direction[at]

@@ -241,3 +241,14 @@ def test_pieces_between_stops_add_up():
 def test_settings_that_make_no_sense_are_refused(settings):
     with pytest.raises(ValueError, match=next(iter(settings))):
         JerkLimitedNLP(**settings)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_on_a_coarse_grid_the_feed_keeps_its_bound_between_the_points(solver):
+    """With the feed on its bound at a point and acceleration left there, the top of v(t) would be behind it."""
+    problem = problem_of(problems.polyline([[0, 0], [20, 0]]), problems.machine(), finer=0.5)
+    found = JerkLimitedNLP(solver=solver).solve(problem).require()
+    share = np.linspace(0.0, 1.0, 101)[:, None]
+    t = share * found.duration
+    v = np.sqrt(found.feed_sq) + found.acc_s * t + found.jerk_s * t**2 / 2
+    assert v.max() <= np.sqrt(problem.feed_sq_max.max()) * (1 + 1e-6)

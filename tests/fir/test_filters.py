@@ -315,3 +315,18 @@ def test_the_margin_of_an_isolated_corner_is_its_largest_axis_jerk(theta, turn, 
 def test_impossible_filters_are_refused(times):
     with pytest.raises(ValueError, match="positive and finite"):
         Filters(times)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01, 0.05, 0.2])
+@pytest.mark.parametrize("times", [(0.04,), (0.037, 0.021), (0.01, 0.03, 0.015)])
+def test_the_residue_is_what_the_kernel_excites_of_a_mode(damping, times):
+    """x'' + 2 z w x' + w^2 x = h(t) rings after Td as after an impulse at 0, times the integral of h(t) exp(-pole t)."""
+    frequency = 25.0
+    w = 2.0 * np.pi * frequency
+    step = 1e-6
+    impulse = np.zeros(round(sum(times) / step) + 1)
+    impulse[0] = 1.0
+    kernel = convolved(impulse, times, step)
+    t = step * (np.arange(len(kernel)) + len(times) / 2.0)  # a mean of n steps is of their middle
+    wanted = abs((kernel * np.exp((damping - 1j * np.sqrt(1.0 - damping**2)) * w * t)).sum())
+    assert Filters(times).residue(frequency, damping) == pytest.approx(wanted, rel=1e-4, abs=1e-4)

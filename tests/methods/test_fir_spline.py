@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from benchmarks import problems
 from planner.fir.chord_guide import ChordGuide, guide_of_curve
-from planner.fir.spline_speeds import circle_error, filter_lengths, v_eps, v_ph, v_sc
+from planner.fir.filters import Filters
+from planner.fir.spline_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
 from planner.methods.fir_spline import CHORD_FRACTION, FirSplineMethod
@@ -219,3 +220,14 @@ def test_on_varying_curvature_the_plain_mode_exceeds_and_says_so_and_the_safe_on
     safe = FirSplineMethod().plan_curve(curve, machine, 100.0)
     assert safe.verdict.passed, safe.verdict.faults
     assert max(excess(safe).values()) > 0.93  # no large margins are left
+
+
+@pytest.mark.parametrize("lengths", [(0.05, 0.05), (0.05, 0.02), (0.05, 1e-3)])
+def test_the_rule_with_two_nodes_has_the_kernels_moments(lengths):
+    """2 w x^2 = mu2 and 2 w x^4 = mu4 of the kernel about its middle."""
+    filters = Filters(lengths)
+    t = np.linspace(0.0, filters.delay, 200_001)
+    weight = filters.kernel(t) * (t[1] - t[0])
+    (x,), (w,) = two_nodes(*(np.array([T]) for T in lengths))
+    for power in (2, 4):
+        assert 2 * w * x**power == pytest.approx(weight @ (t - filters.delay / 2) ** power, rel=1e-4)

@@ -94,6 +94,13 @@ def test_parts_add_up():
         assert least <= saved <= most
 
 
+def test_a_search_made_again_ends_elsewhere_by_so_much_that_ranges_are_as_wide():
+    """2e-4 of the time on both sides, where a limit is worth next to nothing."""
+    ranges = first().prices.ranges
+    width = [most - least for least, most in ranges.values()]
+    assert min(width) == pytest.approx(2.0 * NOISE * time_of(first()), rel=1e-6)
+
+
 def test_equal_feed_and_velocity_are_worth_nothing_alone():
     """One line along x with F at the velocity of x; of all limits together it is worth the same as with F alone."""
     line = problems.polyline([[0, 0], [30, 0]], feed=100.0)

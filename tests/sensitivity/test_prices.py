@@ -23,7 +23,7 @@ from planner.nc.reader import parse_program
 from planner.optimal.geometry import corner_shape
 from planner.path.samples import sample_path
 from planner.sensitivity import prices
-from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, price_list
+from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, SitePrices, price_list
 
 MACHINE = problems.machine()
 LINES = "G21 G90 G17\nF4800\nG1 X3\nX4 Y2.5\nX9 Y3\nX9.2 Y6\nX6 Y9\nX0 Y9.5\n"
@@ -209,6 +209,17 @@ def test_the_feed_is_worth_nothing_where_an_axis_is_as_slow():
     assert priced.feed == pytest.approx(0.0, abs=1e-9)
     faster = dataclasses.replace(job, program=with_feed(job.program, 1.0 + STEP))
     assert faster.time == pytest.approx(job.time, rel=1e-6)
+
+
+def test_shapes_found_again_differ_by_so_much_that_ranges_on_splines_are_as_wide():
+    """By 1e-3 of the time on both sides, and by nothing where single corners are computed; z does not move."""
+    job = Job(parse_program(LINES))
+    site = np.array([4.0])
+    splines = SitePrices(place=site, now=np.array([-1e-6]), wider=np.array([-1e-6]))
+    for by_site, unrest in ((splines, 1e-3), (None, 0.0)):
+        told = price_list(job.samples, job.problem, job.solution, MACHINE, by_site)
+        for name in ("acceleration.z", "jerk.z"):
+            assert told.ranges[name] == pytest.approx((-unrest * job.time, unrest * job.time), abs=1e-9)
 
 
 def test_ranked_tells_what_saves_time_and_nothing_else(job):

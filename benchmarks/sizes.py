@@ -143,10 +143,10 @@ def rows_of(seeds: list[int], seconds: float, limit: float) -> Any:
 
 def summary(rows: list[Row]) -> str:
     """The table of results/sizes.md."""
+    about = provenance()
     lines = [
-        "# Campaign jobs on the ways of large jobs",
-        "",
-        f"    python -m benchmarks.sizes --count {len(rows)} --seed {min(row['seed'] for row in rows)}",
+        f"Made by `python -m benchmarks.sizes --count {len(rows)} --seed {min(row['seed'] for row in rows)}` at {about['commit']} on "
+        f"{about['date']} ({about['machine']}).",
         "",
         f"{len(rows)} jobs, each planned with the usual sizes, with those of kind `parts` small (samples on demand, chunks,",
         "threads), with those of kind `routes` (windows and ranges), and with all of them (`PLANNER_SIZES=small`). Commits: "

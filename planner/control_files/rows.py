@@ -340,7 +340,10 @@ def groups(rows: list[Row], replaced: Array) -> list[Group]:
 
 
 def breaks(rows: list[Row], replaced: Array) -> Array:
-    """(K,) the blocks before which something else than a chord stands, ascending, for the rows that chords replace (R,)."""
+    """(K,) the blocks before which something else than a chord stands, ascending.
+
+    replaced : (R,) True for rows that chords replace
+    """
     found: set[int] = set()
     for row, chords in zip(rows, replaced.tolist(), strict=True):
         if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:

@@ -51,14 +51,14 @@ class WordFeed:
         return feed
 
     def programmed(self, program: Program, block: Array) -> FloatArray:
-        """(n,) F of blocks [mm/s or deg/s]; inf for rapids."""
+        """(n,) F of the blocks `block` (n,) of a program [mm/s or deg/s]; inf for rapids."""
         feed: FloatArray = program.feed[block].copy()
         if self.mixed:
             feed[self._goes_by[self._segment(block)] == ROTARY] /= RAD_PER_DEG
         return feed
 
     def of_segments(self, feed: FloatArray) -> FloatArray:
-        """(M,) feeds along the path in all axes [mm/s] of the segments, as F words mean them."""
+        """(M,) `feed` (M,) of the segments, along the path in all axes [mm/s], as F words mean it."""
         toolpath = self._toolpath
         if not self.mixed:
             return feed

@@ -46,7 +46,7 @@ class Feeds:
         self._left: Chords | None = None
 
     def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
-        """The next samples, as for `Switches.take`."""
+        """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for `Switches.take`."""
         self._switches.take(new, skip, first, last)
         new = Chords(*(column[skip:].copy() for column in new))
         if self._left is not None:

@@ -13,7 +13,7 @@ from planner.nc.points import points_file, read_points
 from planner.report.html.saved import saved_plan
 from tests.commands.command_line import run
 
-TEXT = "G21 F3000\nG1 X20\nG3 X20 Y10 J5\nG1 X0\n"
+TEXT = "G21 F3000\nG1 X20 Y0\nG3 X20 Y10 J5\nG1 X0\n"
 
 
 def points_plan(method: str = "kinematic") -> planner.Plan:

@@ -12,6 +12,7 @@ from quick import slow_but
 from scipy.spatial import cKDTree
 
 from benchmarks import problems
+from planner.delivery import mending
 from planner.job import job as job_module
 from planner.machine import Fir
 from planner.methods.fir import FirMethod
@@ -139,6 +140,7 @@ def test_a_shorter_filter_costs_less():
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
     monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, *rest: (planned, motion))
+    monkeypatch.setattr(mending, "mended", lambda *of_motion: None)
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
     assert all("after the filters" in fault for fault in made.verdict.faults)

@@ -11,6 +11,7 @@ from quick import slow_but
 import planner
 from benchmarks import problems
 from planner.constraints import chord_error, normal_limit
+from planner.delivery import mending
 from planner.job import method as job_method
 from planner.machine import Machine
 from planner.methods.bezier import BezierMethod
@@ -138,6 +139,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     assert kept.verdict.passed, kept.verdict.faults
     assert 0.99 < kept.corners.speed_ratio.max() <= 1 + RATIO_ROUNDING
     monkeypatch.setattr(normal_limit, "feed_sq_within", lambda kappa, limit: np.full_like(kappa, np.inf))
+    monkeypatch.setattr(mending, "mended", lambda *of_motion: None)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[0]

@@ -90,7 +90,7 @@ def test_the_first_lines_of_every_command(tmp_path: Path) -> None:
         ["what-if", job, *how, "--set", "x.jerk=+10%"],
         ["sweep", job, *how, "--vary", "tolerance=0.01,0.02", "-o", tmp_path / "sweep"],
         ["export", out, "--for", "pvt", "-o", tmp_path / "pvt"],
-        ["export", out, "--for", "grbl", "-o", tmp_path / "grbl"],
+        ["export", out, "--for", "linuxcnc", "-o", tmp_path / "linuxcnc"],
     ):
         result = CliRunner().invoke(app, [str(word) for word in command])
         assert result.stdout.splitlines()[:2] == first, (command, result.output)

@@ -110,7 +110,9 @@ class Codes(Definitions):
         self, block: ConversationalBlock, column: int
     ) -> tuple[list[Statement], list[Statement]]:
         given = items(block, column)
-        if given.axes or given.polar or given.turn or given.feed is not None or given.side is not None:
+        # M128 F: the largest feed of what the axes do to follow the tool, which the limits of the joints are for
+        feed = given.feed is not None and not any(code in TOOL_POINT_ON for code, _ in given.codes)
+        if given.axes or given.polar or given.turn or feed or given.side is not None:
             raise block.fault("only M codes are read here; write the move and its feed with L", column)
         before, after, _ = self._codes(block, given)
         return before, after

@@ -67,6 +67,32 @@ def test_judge_and_planner_find_the_mean_of_the_last_delay(kind, lengths, dt):
         np.testing.assert_allclose(p[-1], setpoints.position[-1], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("dt", "long", "short"),
+    [(0.002, 0.0203, 0.0107), (0.004, 0.0203, 0.0203), (0.009, 0.0251, 0.0073), (0.01, 0.0203, 0.0107)],
+)
+def test_a_kink_of_the_chords_is_filtered_to_what_steps_of_a_quarter_period_and_an_eighth_filter_leave(
+    dt, long, short
+):
+    """Two means of a ramp are differences of its double integral, v t^3/6. A jump v/T1 of the second derivative is missed by
+    h^2/32 of it, and h/T2 of that is left."""
+    speed, count = 100.0, round(0.1 / dt)
+    t = dt * np.arange(2 * count + 1)
+    begin, end = t[count // 3], t[count]
+
+    def ramps(t, power):
+        return speed * (np.maximum(t - begin, 0.0) ** power - np.maximum(t - end, 0.0) ** power)
+
+    place = ramps(t, 1)[:, None]
+    at, found = joined(filtered(trajectory_of(t, place, 0 * place), "linear", (short, long), dt))
+    exact = sum(
+        sign * ramps(at - back, 3) / 6 for sign, back in ((1, 0), (-1, long), (-1, short), (1, long + short))
+    )
+    h = min(dt / 4, short / 8)
+    left = h**2 / 32 * speed / long * h / short
+    assert np.abs(found[:, 0] - exact / (long * short)).max() <= left
+
+
 def test_the_cubic_is_that_of_both_ends():
     """A motion of constant jerk is its own cubic; by chords it is off by a dt^2 / 8."""
     t = np.arange(0.0, 0.0501, 0.005)

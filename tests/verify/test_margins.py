@@ -90,6 +90,40 @@ def test_a_dwell_may_not_be_short_by_a_period(asked):
         assert f"{asked:g} s programmed" in found[0]
 
 
+@pytest.mark.parametrize("share", [0.4, 0.5, 0.6])
+def test_samples_beside_a_rest_tell_when_it_began_and_ended(share):
+    """It begins so many periods behind a sample and ends so many behind another: places of 1e-6 mm are 0.11 ms there."""
+    before = polyline([(0, 0, 0), (1, 0, 0)], acceleration=A, jerk=J)[0]
+    judged = dwelling(0.02, (share - before / H) % 1.0)
+    for asked, long_enough in ((0.02, True), (0.02015, False)):
+        toolpath = Moves().line(1).dwell(asked).line(2).toolpath(M)
+        assert (not said("dwell", judged, toolpath)) == long_enough
+
+
+def test_digits_of_the_times_are_allowed_at_both_ends_of_a_dwell():
+    toolpath = Moves().line(1).dwell(0.02).line(2).toolpath(M)
+    for digits, allowed in ((0.4 * H, True), (0.2 * H, False)):
+        given = Given(columns=(), time_rounding=digits)
+        found = [
+            verify(dwelling(0.02 - 0.79 * H, phase), toolpath, M, given=given).faults for phase in PHASES
+        ]
+        short = [any(text.startswith("dwell") for text in faults) for faults in found]
+        assert not any(short) if allowed else any(short)
+
+
+@pytest.mark.parametrize(("digits", "long_enough"), [(0.0, False), (0.1 * H, True)])
+def test_digits_of_the_last_time_are_allowed_to_a_dwell_at_the_end(digits, long_enough):
+    toolpath = Moves().line(1).dwell(0.02).toolpath(M)
+    leg = polyline([(0, 0, 0), (1, 0, 0)], jerk=J)
+    first = stay((0, 0, 0), (0.6 - leg[0] / H) % 1.0 * H)  # the rest begins 0.6 periods behind a sample
+    motion = sample(chain(first, leg, stay((1, 0, 0), 0.02)), H)
+    t = motion.t.copy()
+    t[-1] -= 0.1 * H
+    given = Given(columns=(), end_rounding=digits)
+    found = verify(dataclasses.replace(motion, t=t), toolpath, M, given=given).faults
+    assert (not any(text.startswith("dwell") for text in found)) == long_enough
+
+
 def test_a_dwell_of_axes_without_limits_of_jerk_may_not_be_short_by_a_period():
     """The same by (2 d / a)^(1/2)."""
     toolpath = Moves().line(1).dwell(0.02).line(2).toolpath(M)

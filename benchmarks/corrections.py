@@ -4,7 +4,7 @@
 
 DIR is a checkout of the earlier commit, for example of `git worktree add ../before ecff72b5`. Each case of corrections.toml is a few
 small files and the commands that are given them; what is shown are the places of the output, or of a file that was written, that its
-pattern finds, or else the exit code and the last line.
+pattern finds, or else the exit code and the last line. corrections.md, what tests show, is put behind the table.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 from benchmarks.record import ROOT, markdown, write_results
 
 CASES = Path(__file__).with_suffix(".toml")
+MORE = Path(__file__).with_suffix(".md")  # what tests show, written by hand
 TIMEOUT = 600.0  # of a command [s]
 SHOWN = 230  # characters of what came out
 
@@ -114,7 +115,7 @@ def main() -> None:
             check=True,
         ).stdout.strip()
         table = markdown(["what", f"at {commit}", "now", "right"], rows)
-        write_results("round3-corrections", {"rows": rows}, table)
+        write_results("round3-corrections", {"rows": rows}, f"{table}\n{MORE.read_text(encoding='utf-8')}")
 
 
 if __name__ == "__main__":

@@ -69,14 +69,15 @@ def job_of_run(job: Job, first: int, last: int) -> Job:
     def part(toolpath: Toolpath) -> Toolpath:
         kept = np.zeros(len(toolpath), bool)
         kept[first:last] = True
+        # before the part is made: a joint that is a full stop of the job need not be one of the path that its plan is judged by
+        of_run = toolpath.with_joints(np.array([first, last]), Joint.STOP)
         columns = {
-            name: getattr(toolpath, name)[first : last + 1].copy()
+            name: getattr(of_run, name)[first : last + 1].copy()
             for name in ("joint", "theta", "tolerance", "dwell")
         }
-        columns["joint"][[0, -1]] = Joint.STOP
         if last < len(toolpath):  # what stands there belongs to the next run
             columns["dwell"][-1] = 0.0
-        return dataclasses.replace(toolpath.part(kept), **columns)
+        return dataclasses.replace(of_run.part(kept), **columns)
 
     machine, judged_by = job.real
     judged = None if job.judged is None else (machine, part(judged_by))

@@ -72,7 +72,8 @@ class OnGrid(Method):
         motion = planned.motion()
         if self.kept:
             planned, motion = within_limits(planned, order, job.toolpath, machine)
-        return plan_of_solution(job, planned, job.deliver(motion), method="optimal", corner="spline")
+        made = job.deliver(motion, as_it_is=not self.kept)
+        return plan_of_solution(job, planned, made, method="optimal", corner="spline")
 
 
 def name_of(kept: bool, finer: float) -> str:

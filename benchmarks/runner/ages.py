@@ -88,7 +88,7 @@ def has_history() -> bool:
 def commits_since(commit: str) -> int | None:
     """Commits since then that changed the planner; None where the commit is not one of this history."""
     try:
-        _git("merge-base", "--is-ancestor", commit, "HEAD")  # a branch that was rebased leaves its old commits behind
+        _git("merge-base", "--is-ancestor", commit, "HEAD")  # what a rebase left behind is none
         return int(_git("rev-list", "--count", f"{commit}..HEAD", "--", "planner"))
     except (OSError, subprocess.CalledProcessError):
         return None

@@ -76,19 +76,31 @@ def test_every_file_that_is_named_exists(page: str) -> None:
         assert ((ROOT / page).parent / name).exists(), f"{page}: {name}"
 
 
+def anchors(text: str) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_heading_that_is_linked_exists(page: str) -> None:
+    for name, anchor in re.findall(r"\]\(([^)#:]*)#([\w-]+)\)", PAGES[page]):
+        target = (ROOT / page).parent / name if name else ROOT / page
+        assert anchor in anchors(target.read_text(encoding="utf-8")), f"{page}: {name}#{anchor}"
+
+
 def test_modules_in_the_pictures_exist() -> None:
-    """`optimal/reshape.py` and the like, and folders, in README's picture and on the algorithm's page."""
-    for page in ("README.md", "docs/algorithm.md"):
-        blocks = re.findall(r"^```(\w*)\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL)
-        drawn = "".join(text for language, text in blocks if not language)
-        assert "/" in drawn
-        for name in re.findall(r"(?<![\w/])([a-z]+/(?:\w+/)*(?:\w+\.py)?)", drawn):
-            assert (ROOT / "planner" / name).exists(), f"{page}: {name}"
+    """`optimal/reshape.py` and the like, and folders, in the pictures of the algorithm's page."""
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```", PAGES["docs/algorithm.md"], re.MULTILINE | re.DOTALL)
+    drawn = "".join(text for language, text in blocks if not language)
+    assert "/" in drawn
+    for name in re.findall(r"(?<![\w/])([a-z]+/(?:\w+/)*(?:\w+\.py)?)", drawn):
+        assert (ROOT / "planner" / name).exists(), name
 
 
-def test_every_folder_of_the_package_is_in_the_readme() -> None:
+def test_every_folder_of_the_package_is_on_the_page_of_the_algorithm() -> None:
     folders = {place.parent.name for place in (ROOT / "planner").glob("*/__init__.py")}
-    assert not {name for name in folders if f"{name}/" not in README}
+    assert not {name for name in folders if f"{name}/" not in PAGES["docs/algorithm.md"]}
 
 
 def test_lines_of_the_output_are_those_of_plan() -> None:

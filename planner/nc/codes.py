@@ -28,7 +28,7 @@ class Refusal:
 @dataclass(frozen=True, slots=True)
 class Assumption:
     """Something counted and said once: its name for one and for many, what is assumed of it, and whether that may change geometry or
-    time (docs/reading.md)."""
+    time (docs/language.md)."""
 
     one: str
     many: str

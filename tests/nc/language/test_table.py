@@ -150,14 +150,14 @@ OTHER_FILE = "a call to another file"
 
 def rows() -> list[str]:
     """The first columns of the table."""
-    text = PAGE.read_text(encoding="utf-8").partition("## What is read")[2]
+    text = (
+        PAGE.read_text(encoding="utf-8")
+        .partition("## What is read")[2]
+        .partition("\n## ")[0]
+        .partition("\n### ")[0]
+    )
     table = [line for line in text.splitlines() if line.startswith("|")]
-    found = []
-    for line in table[2:]:
-        if line.startswith("| cycle"):
-            break
-        found.append(re.split(r"(?<!\\) \| ", line[2:])[0])
-    return found
+    return [re.split(r"(?<!\\) \| ", line[2:])[0] for line in table[2:]]
 
 
 def read(text: str, settings: dict, tmp_path: Path):

@@ -1,6 +1,6 @@
 """The feed that F words mean, for everything that is shown or written.
 
-Inside, the feed is ds/dt of the path in all axes, an angle counting as a length at a radius (docs/language.md). F is the speed of x, y, z
+Inside, the feed is ds/dt of the path in all axes, an angle counting as a length at a radius (docs/language.md). F is that of x, y, z
 together, which is that of the tool's tip where the tool centre point is on; where they stand, that of u, v, w; where these stand too,
 that of the rotary axes in degrees. That is what a picture, a table and a trajectory file have as feed, beside F itself.
 """

@@ -4,8 +4,9 @@
     python -m benchmarks.golden_net FILE --against OTHER                   compare FILE with OTHER, plan nothing
 
 The jobs: suite `quick` by all its methods (98 plans), suite `random` by `optimal` (100 plans), and jobs of the campaign as they come. A
-row has what the planner did: outcome, cycle time, method, solver, sentence, a hash of the setpoints, and the prices. All plans are made
-on one thread. Recorded: results/golden-net.jsonl.gz. A plan that takes longer than the limit is no row to compare.
+row has what the planner did: outcome, cycle time, method, solver, sentence, a hash of the setpoints, the prices, and how often it took
+each step of the trace. All plans are made on one thread. Recorded: results/golden-net.jsonl.gz. A plan that takes longer than the limit
+is no row to compare.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -28,10 +30,10 @@ import numpy as np
 from benchmarks import campaign_jobs
 from benchmarks.record import planner_state
 from benchmarks.runner.suites import SUITES
-from benchmarks.runner.ways import way_of
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
 from planner.job.plan import Plan
+from planner.job.trace import Trace
 from planner.methods.registry import plan
 
 FIRST = 2_000_000  # seed of the first campaign job
@@ -44,37 +46,40 @@ class TooLong(BaseException):
     """The plan has used its processor time."""
 
 
-def jobs(campaign: int) -> Iterator[tuple[str, Callable[[], Plan | str]]]:
+def jobs(campaign: int) -> Iterator[tuple[str, Callable[[Trace], Plan | str]]]:
     """Name of a job, and what plans it; a sentence where the job is refused before."""
     for suite in ("quick", "random"):
         for job in SUITES[suite].jobs():
             for way in SUITES[suite].ways if suite == "quick" else ("optimal",):
-                yield f"{suite} {job.name} {way}", lambda job=job, way=way: _of_suite(job, way)
+                yield f"{suite} {job.name} {way}", lambda log, job=job, way=way: _of_suite(job, way, log)
     for seed in range(FIRST, FIRST + campaign):
-        yield f"campaign {seed}", lambda seed=seed: _of_campaign(seed)
+        yield f"campaign {seed}", lambda log, seed=seed: _of_campaign(seed, log)
 
 
-def _of_suite(job: Any, way: str) -> Plan:
+def _of_suite(job: Any, way: str, log: Trace) -> Plan:
     machine = job.machine()
-    made = way_of(way).plan(job.program(machine), machine, job.tolerance)
-    assert isinstance(made, Plan)
-    return made
+    method, _, effort = way.partition(":")
+    return plan(
+        job.program(machine), machine, method=method, effort=effort or None, tolerance=job.tolerance, log=log
+    )
 
 
-def _of_campaign(seed: int) -> Plan | str:
+def _of_campaign(seed: int, log: Trace) -> Plan | str:
     made = campaign_jobs.job(seed)
     if made.program is None:
         return made.refusal
-    return plan(made.program, made.machine, method=made.method, tolerance=made.tolerance, **made.settings)
+    return plan(
+        made.program, made.machine, method=made.method, tolerance=made.tolerance, log=log, **made.settings
+    )
 
 
-def row_of(name: str, planned: Callable[[], Plan | str], limit: float) -> Row:
+def row_of(name: str, planned: Callable[[Trace], Plan | str], limit: float) -> Row:
     """What the planner does with a job; nothing that it raises is raised here."""
-    began = time.process_time()
+    began, trace = time.process_time(), Trace()
     signal.signal(signal.SIGPROF, _stop)
     signal.setitimer(signal.ITIMER_PROF, limit, 1.0)
     try:
-        row = _about(planned())
+        row = _about(planned(trace))
     except TooLong:
         row = {"outcome": "too long"}
     except PlannerError as fault:
@@ -84,7 +89,11 @@ def row_of(name: str, planned: Callable[[], Plan | str], limit: float) -> Row:
     finally:
         with suppress(TooLong):
             signal.setitimer(signal.ITIMER_PROF, 0.0)
-    return {"name": name} | row | {"cpu": round(time.process_time() - began, 3)}
+    steps = Counter(
+        " ".join([step.name, *(str(step.facts[k]) for k in ("method", "corner") if k in step.facts)])
+        for step in trace.steps
+    )
+    return {"name": name} | row | {"steps": dict(steps), "cpu": round(time.process_time() - began, 3)}
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

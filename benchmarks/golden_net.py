@@ -77,7 +77,7 @@ def row_of(name: str, planned: Callable[[Trace], Plan | str], limit: float) -> R
     """What the planner does with a job; nothing that it raises is raised here."""
     began, trace = time.process_time(), Trace()
     signal.signal(signal.SIGPROF, _stop)
-    signal.setitimer(signal.ITIMER_PROF, limit, 1.0)
+    signal.setitimer(signal.ITIMER_PROF, limit)
     try:
         row = _about(planned(trace))
     except TooLong:
@@ -97,6 +97,7 @@ def row_of(name: str, planned: Callable[[Trace], Plan | str], limit: float) -> R
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
     raise TooLong
 
 

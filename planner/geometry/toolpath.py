@@ -63,6 +63,12 @@ class Arcs:
         return len(self.radius)
 
 
+def _rows(table: Arcs | Curves, at: Array) -> Arcs | Curves:
+    """Some rows of a table."""
+    columns = {field.name: getattr(table, field.name)[at] for field in dataclasses.fields(table)}
+    return dataclasses.replace(table, **columns)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Toolpath:
     """The programmed path: M segments over A axes, and M+1 joints.
@@ -201,6 +207,13 @@ class Toolpath:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and field.name != "zero_length":
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
+        for row, table in (
+            ("arc", "arcs"),
+            ("curve", "curves"),
+        ):  # of which each segment has a row of its own, in order
+            of_kept = columns[row] >= 0
+            columns[table] = _rows(getattr(self, table), columns[row][of_kept])
+            columns[row] = np.where(of_kept, np.cumsum(of_kept) - 1, -1)
         if self.extrusion is not None:
             columns["extrusion"] = extruding_part(self.extrusion, kept)
         return dataclasses.replace(self, **columns)

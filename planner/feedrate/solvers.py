@@ -11,7 +11,7 @@ A solver is its settings; wherever a name is taken, a solver with settings of on
 
     solve(problem, progress) -> FeedrateSolution      a profile with multipliers, or a status and a sentence that says what to do
 
-Sizes up to which each is sensible: docs/solvers.md.
+Sizes up to which each is sensible: docs/methods.md.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ nu_v of v's gap and nu_s of the row of ds_i
     pi = dT/de = (nu_s h/(2 ds) - nu_v) / (2 vm).
 
 Costs 1-5 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface grows with the square of
-the points and costs more than it saves above a few hundred (docs/solvers.md has the numbers).
+the points and costs more than it saves above a few hundred (docs/methods.md has the numbers).
 References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023, arXiv 2303.16746 (fatrop).
 """
 

@@ -1,12 +1,12 @@
 """Campaign jobs on the ways of large jobs: the same verdicts and setpoints?
 
-    python -m benchmarks.sizes [--count N] [--seed S] [--seconds T] [--limit C] [--summary]
+    python -m benchmarks.sizes [--count N] [--seed S] [--seconds T] [--limit C] [--ways small] [--summary]
 
-Each job of the campaign (campaign_jobs.py) is planned four times, in processes of their own: with the usual sizes, with those of kind
-`parts` small, with those of kind `routes`, and with all of them small (planner/base/sizes.py). In parts verdict and setpoints have to
-be the same to rounding, on other routes verdict and time, with all sizes small the verdict; how much longer less effort makes a motion
-is told. Rows go to results/sizes.jsonl, --summary writes results/sizes.md from them. A job that takes more than C processor seconds on
-one of the ways is not compared there.
+Each job of the campaign (campaign_jobs.py) is planned in processes of their own: with the usual sizes, with those of kind `parts`
+small, with those of kind `routes`, and with all of them small (planner/base/sizes.py), or with the usual and the named ones only. In
+parts verdict and setpoints have to be the same to rounding, on other routes verdict and time, with all sizes small the verdict; how
+much longer less effort makes a motion is told. Rows go to results/sizes.jsonl, --summary writes results/sizes.md from them. A job that
+takes more than C processor seconds on one of the ways is not compared there, nor tried on those after it.
 """
 
 from __future__ import annotations
@@ -117,64 +117,64 @@ def started(kinds: str) -> Worker:
     return Worker(process, here)
 
 
-def rows_of(seeds: list[int], seconds: float, limit: float) -> Any:
-    """A row for each job as it is done on all ways; no job is begun after so many seconds."""
+def rows_of(seeds: list[int], ways: list[str], seconds: float, limit: float) -> Any:
+    """A row for each job as it is done on these ways; no job is begun after so many seconds."""
     end = time.monotonic() + seconds
     workers: dict[str, Worker] = {}
     for seed in seeds:
         if time.monotonic() > end:
             return
         made: dict[str, Row] = {}
-        for way, kinds in WAYS.items():
+        for way in ways:
             if way not in workers or not workers[way].process.is_alive():
-                workers[way] = started(kinds)
+                workers[way] = started(WAYS[way])
             workers[way].give(seed)
             row = None
             while row is None:
                 workers[way].ends.poll(0.5)
                 row = workers[way].result(limit)
             made[way] = row
+            if row["outcome"] == TOO_LONG:
+                break
         row = {"seed": seed} | {
             way: {k: v for k, v in one.items() if k != "columns"} for way, one in made.items()
         }
-        row["differs"] = {way: compared(made[USUAL], made[way], way) for way in OTHERS}
+        row["differs"] = {way: compared(made[USUAL], one, way) for way, one in made.items() if way != USUAL}
         yield row
 
 
 def summary(rows: list[Row]) -> str:
     """The table of results/sizes.md."""
     about = provenance()
+    begun = min(row["seed"] for row in rows)
     lines = [
-        f"Made by `python -m benchmarks.sizes --count {len(rows)} --seed {min(row['seed'] for row in rows)}` at {about['commit']} on "
+        f"Made by `python -m benchmarks.sizes --count {len(rows)} --seed {begun}` at {about['commit']} on "
         f"{about['date']} ({about['machine']}).",
         "",
-        f"{len(rows)} jobs, each planned with the usual sizes, with those of kind `parts` small (samples on demand, chunks,",
-        "threads), with those of kind `routes` (windows and ranges), and with all of them (`PLANNER_SIZES=small`). Commits: "
+        f"{len(rows)} jobs, each planned with the usual sizes and with others: those of kind `parts` small (samples on demand, chunks,",
+        "threads), those of kind `routes` (windows and ranges), all of them (`PLANNER_SIZES=small`). Commits: "
         f"{', '.join(sorted({row['commit'][:8] for row in rows}))}.",
         "",
         "| | " + " | ".join(WAYS) + " |",
         "|---|" + "---:|" * len(WAYS),
     ]
-    outcomes = {way: Counter(row[way]["outcome"] for row in rows) for way in WAYS}
+    outcomes = {way: Counter(row[way]["outcome"] for row in rows if way in row) for way in WAYS}
     for name in sorted(set().union(*outcomes.values())):
         lines.append(f"| {name} | " + " | ".join(str(outcomes[way][name]) for way in WAYS) + " |")
     differ = {way: sum(bool(row["differs"].get(way)) for row in rows) for way in WAYS}
     lines.append("| not as it should be | | " + " | ".join(str(differ[way]) for way in OTHERS) + " |")
-    both = [row for row in rows if all("time" in row[way] for way in WAYS)]
     for share in (0.5, 0.9, 1.0):
         more = {
-            way: np.quantile([row[way]["time"] / row[USUAL]["time"] - 1.0 for row in both], share)
-            for way in WAYS
+            way: f"{np.quantile(_longer(rows, way), share):+.1e}" if _longer(rows, way) else ""
+            for way in OTHERS
         }
-        lines.append(
-            f"| time, quantile {share:g} | | " + " | ".join(f"{more[way]:+.1e}" for way in OTHERS) + " |"
-        )
+        lines.append(f"| time, quantile {share:g} | | " + " | ".join(more.values()) + " |")
     lines += [
         "",
         "Not as it should be: another outcome; in parts setpoints that differ by more than rounding; on other routes a time that",
         f"differs by more than {ANOTHER_ROUTE:g}. Splines that no search of geometry and feed follows are what their windows make of",
         "them, up to some 1e-3 of the time. With all sizes small the time is that of less effort, which the quantiles show. Jobs",
-        "that took more than their share of processor time on a way (`too long`) are not compared there.",
+        "that took more than their share of processor time on a way (`too long`) are not compared there, nor tried on those after it.",
         "",
         "What differs:",
         "",
@@ -185,6 +185,12 @@ def summary(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _longer(rows: list[Row], way: str) -> list[float]:
+    """By how much the jobs that were planned both ways take longer [-]."""
+    both = [row for row in rows if way in row and "time" in row[way] and "time" in row[USUAL]]
+    return [row[way]["time"] / row[USUAL]["time"] - 1.0 for row in both]
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run what is not there; the exit code is 0, whatever was found."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.sizes", description=__doc__.split("\n")[0])
@@ -192,6 +198,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the first job")
     parser.add_argument("--seconds", type=float, default=np.inf, help="begin no job after so many")
     parser.add_argument("--limit", type=float, default=LIMIT, help="CPU s of a job on one way")
+    parser.add_argument("--ways", nargs="+", choices=OTHERS, default=OTHERS, help="beside the usual one")
     parser.add_argument("--summary", action="store_true", help="write the table of the rows that are there")
     options = parser.parse_args(argv)
     kept = (
@@ -204,7 +211,7 @@ def main(argv: list[str] | None = None) -> int:
     commit = provenance()["commit"]
     seeds = [seed for seed in range(options.seed, options.seed + options.count) if seed not in known]
     with ROWS.open("a", encoding="utf-8") as file:
-        for row in rows_of(seeds, options.seconds, options.limit):
+        for row in rows_of(seeds, [USUAL, *options.ways], options.seconds, options.limit):
             file.write(json.dumps(row | {"commit": commit}) + "\n")
             file.flush()
             if any(row["differs"].values()):

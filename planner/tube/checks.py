@@ -208,18 +208,24 @@ def worst_shares(keeps, leg, h, state, jerk, place):
 
 def switches_kept(run: TubeRun, leg: Array, state: FloatArray) -> bool:
     """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end: where the feed falls the way
-    to the vertex comes nearer up to its node, where it rises the way from there on goes away.
+    to the vertex comes nearer up to its node, where it rises the way from there on goes away. That is looked at next to the node, on
+    the nodes within the budget of the vertex: what is farther than that from the vertex is not nearest to it, and on an arc of more
+    than half a turn the way to its end goes away from there at first.
 
     leg (N,), state (N+1, 3, A)
     """
     begins = np.flatnonzero(np.diff(leg)) + 1  # the nodes at vertices
     edges = np.concatenate([[0], begins, [len(leg)]])
     for k, node in enumerate(begins):
-        way = run.switch[leg[node]]
+        way, budget = run.switch[leg[node]], run.vertex_budget[leg[node]]
         if way == 0.0:
             continue
-        part = slice(edges[k], node + 1) if way > 0 else slice(node, edges[k + 2] + 1)
-        away = ((state[part, 0] - run.vertex[leg[node]]) * state[part, 1]).sum(axis=1)
-        if (way * away > AWAY * run.vertex_budget[leg[node]] * np.linalg.norm(run.velocity)).any():
+        # from the vertex on, backwards where the feed falls
+        part = np.arange(node, edges[k] - 1, -1) if way > 0 else np.arange(node, edges[k + 2] + 1)
+        off = state[part, 0] - run.vertex[leg[node]]
+        far = np.linalg.norm(off[1:], axis=1) > budget
+        beside = 1 + (int(np.argmax(far)) if far.any() else len(far))
+        away = (off * state[part, 1]).sum(axis=1)[:beside]
+        if (way * away > AWAY * budget * np.linalg.norm(run.velocity)).any():
             return False
     return True

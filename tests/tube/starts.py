@@ -10,6 +10,7 @@ from benchmarks import problems
 from planner.geometry.build import toolpath_from_program
 from planner.methods.optimal import OptimalMethod
 from planner.motion.vertex_times import passing_times
+from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.tube.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.tube.run import TubeRun, tube_runs_of
@@ -25,9 +26,14 @@ PROGRAMS = {
 @cache
 def begun(name: str, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
     """A run, and its motion on Bezier corners cut into steps."""
-    toolpath = toolpath_from_program(PROGRAMS[name], MACHINE)
+    return begun_on(PROGRAMS[name], cut)
+
+
+def begun_on(program: Program, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
+    """The same of a program of one run."""
+    toolpath = toolpath_from_program(program, MACHINE)
     (run,) = tube_runs_of(toolpath, MACHINE)
-    seen = OptimalMethod(corner="bezier").plan(PROGRAMS[name], MACHINE).require().trajectory
+    seen = OptimalMethod(corner="bezier").plan(program, MACHINE).require().trajectory
     times = np.maximum.accumulate(passing_times(seen, toolpath))
     times[-1] = seen.t[-1]
     return run, guess_from(run, seen, times[run.first], cut)

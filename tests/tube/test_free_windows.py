@@ -37,7 +37,7 @@ def linear_of(window, x, u):
     lin = rows.Linear(
         g=np.zeros((steps, kinds)),
         n=np.zeros((steps, kinds, axes)),
-        node=np.zeros((steps, 2, axes)),
+        node=np.zeros((steps, 3, axes)),
         alpha=np.zeros((steps, rows.VECTORS, 4)),
         e=np.zeros((steps, rows.VECTORS, axes)),
         tangent=np.zeros((steps, 3, axes)),

@@ -138,17 +138,18 @@ def _from_plans(job: Job, settings: Settings, once: Plan | None) -> Plan:
     dial = settings.effort.search
     if not dial.again:
         return fastest_plan(job.afresh(), settings)
-    quick = fastest_plan(job.afresh(), dataclasses.replace(settings, effort=EFFORTS[QUICK]))
-    if once is None and job.machine.normal_acceleration is None:
-        again = job.afresh()
-        on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0)
-        on_these = freed(again, fastest_plan(again, on_first), dial)
-        once = on_these.plan
-        if on_these.kept <= dial.kept:
-            return faster(once, quick)
+    best = once
+    if best is None:  # a search in longer steps may pass its verdict where shorter ones do not
+        best = _freed_plan(job.afresh(), dataclasses.replace(settings, effort=EFFORTS[QUICK]))
+        if job.machine.normal_acceleration is None:
+            again = job.afresh()
+            on_first = dataclasses.replace(settings, effort=EFFORTS[QUICK], rounds=0)
+            on_these = freed(again, fastest_plan(again, on_first), dial)
+            best = faster(on_these.plan, best)
+            if on_these.kept <= dial.kept:
+                return best
     again = job.afresh()
-    reshaped = faster(freed(again, fastest_plan(again, settings), dial).plan, quick)
-    return reshaped if once is None else faster(reshaped, once)
+    return faster(freed(again, fastest_plan(again, settings), dial).plan, best)
 
 
 def _doubles_back(job: Job) -> bool:

@@ -89,8 +89,9 @@ class FilteredSetpoints:
         for places in self._setpoints(motion):
             seen = places if kept is None else np.concatenate([kept, places])
             count = max(len(seen) - self.reach - 1, 0)  # 0 while there are fewer than count for one time
-            place = np.arange(first * self.phases, (first + count) * self.phases, dtype=np.float64)
-            yield place * (self.dt / self.phases), self._convolved(seen)
+            if count:
+                place = np.arange(first * self.phases, (first + count) * self.phases, dtype=np.float64)
+                yield place * (self.dt / self.phases), self._convolved(seen)
             first, kept = first + count, seen[count:]
 
     def _setpoints(self, motion: MotionInTime) -> Iterator[FloatArray]:
@@ -108,11 +109,9 @@ class FilteredSetpoints:
             yield np.repeat(still, self.reach + 1, axis=0)
 
     def _convolved(self, setpoints: FloatArray) -> FloatArray:
-        """(P (n - reach - 1), A) positions behind the filters, of setpoints (n, 2, A)."""
-        count, axes = max(len(setpoints) - self.reach - 1, 0), setpoints.shape[2]
+        """(P (n - reach - 1), A) positions behind the filters, of setpoints (n, 2, A), n > reach + 1."""
+        count, axes = len(setpoints) - self.reach - 1, setpoints.shape[2]
         out = np.empty((count, self.phases, axes))
-        if not count:
-            return out.reshape(0, axes)
         for axis in range(axes):
             origin = setpoints[0, 0, axis]
             for phase in range(self.phases):

@@ -12,6 +12,7 @@ with the control points
                |v_i|, |v_i + a_i h/2| <= F                                             in the norm
                |c_k - q_k| <= room,    s3 - s0 <= step_max (arcs)                      the tolerance, both sides, in order
                |a - u v| <= a_n                                                        for some u, at places of a step, if limited
+               m (p - V).v <= 0         at a vertex V, with m = 1 where the feed falls and -1 where it rises (rows.py)
                node at a vertex: s = the vertex;     v = a = 0, p = the vertex at both ends.
 
 The smallest |a - u v| over u is the normal acceleration; rows of this kind have good derivatives down to rest, |v x a| <= a_n |v| has
@@ -172,6 +173,7 @@ class TubeNLP:
             return ca.sumsqr(point - base - drift * x - radius * (cos * e1 + sin * e2) - ahead * tangent)
 
         ordinate = v + a * h / 2
+        vertex, switch = ca.SX.sym("vertex", axes), ca.SX.sym("switch")
         rows: list[tuple[Any, float, float]] = [
             (apart(p + h * v / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
             (apart(p1 - h * v1 / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
@@ -185,6 +187,8 @@ class TubeNLP:
             rows.append(
                 (ca.vertcat(*(row / feed**2 for row in inner), ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
             )
+        if run.switch.any():
+            rows.append((switch * ca.dot(p1 - vertex, v1), -np.inf, 0.0))
         if (run.curvature > 0).any():
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
         along = ca.SX.sym("along", watched)  # u of the places that are watched, times the pace
@@ -196,7 +200,7 @@ class TubeNLP:
         # ---- constraints of all steps, stage by stage: gaps first -----------------------------------------------------------
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
         numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
-        numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, mean_next)
+        numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, mean_next)
         of_step = ca.Function(
             "step", [*of_stage, numbers], [following, ca.vertcat(*(row for row, _, _ in rows))]
         )

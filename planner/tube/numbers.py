@@ -15,7 +15,8 @@ ROUNDING = 1e-4
 def step_numbers(
     run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
-    """(N, 4 A + 11) what each of N steps needs to know: its leg, how far it may be from it inside and at its end, its limits.
+    """(N, 5 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its end, its limits; the
+    vertex at the leg's end, and what the feed does where the step ends there (`TubeRun.switch`, over tolerance and pace).
 
     mean_step          : (N,) mean length of a step on each step's leg [mm]
     length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
@@ -28,6 +29,8 @@ def step_numbers(
     feed_end[last] = np.minimum(feed[last], feed[last + 1])
     fastest = np.linalg.norm(run.velocity)  # instead of inf, where nothing else limits
     strongest = 2.0 * np.linalg.norm(run.acceleration)
+    own_pace, switch = pace(guess.state[:, 1]), np.zeros(len(leg))
+    switch[last] = run.switch[leg[last + 1]] * length * speed / (room_end[last] * own_pace[last + 1])
     return np.column_stack(
         [
             run.base[leg] / length,
@@ -44,7 +47,9 @@ def step_numbers(
             np.minimum(feed_end, fastest) / speed,
             np.minimum(run.across_max[leg], strongest) / acc,
             mean_step / length,
-            pace(guess.state[:, 1]) / speed,
+            own_pace / speed,
+            run.vertex[leg + 1] / length,
+            switch,
         ]
     )
 

@@ -157,6 +157,17 @@ def test_a_lower_feed_holds_on_its_block():
     assert made.trajectory.feed.max() > 30.0
 
 
+@pytest.mark.slow
+def test_the_solvers_agree_where_the_feed_changes():
+    """Each has the row of a vertex between two feeds: without it what ipopt finds breaks the lower one, and the start stays."""
+    job = problems.polyline([[0, 0], [2, 0], [3, 0], [3, 2]], feed=np.array([100.0, 20.0, 100.0]))
+    starts = (OptimalMethod(corner="bezier", effort="quick"),)
+    made = [TubeMethod(starts=starts, solver=name).plan(job, MACHINE) for name in ("own", "ipopt", "fatrop")]
+    assert all(plan.verdict.passed for plan in made)
+    assert all(plan.cycle_time < 0.99 * starts[0].plan(job, MACHINE).cycle_time for plan in made)
+    assert [plan.cycle_time for plan in made[1:]] == pytest.approx([made[0].cycle_time] * 2, rel=SAME)
+
+
 # --- refusals and failures ---------------------------------------------------------------------------------------------------
 
 

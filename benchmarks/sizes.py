@@ -146,10 +146,14 @@ def rows_of(seeds: list[int], ways: list[str], seconds: float, limit: float) -> 
 def summary(rows: list[Row]) -> str:
     """The table of results/sizes.md."""
     about = provenance()
-    begun = min(row["seed"] for row in rows)
+    seeds = sorted(row["seed"] for row in rows)
+    begins = [seed for seed in seeds if seed - 1 not in seeds]
+    ranges = ", ".join(
+        f"{begin} to {end}"
+        for begin, end in zip(begins, [seed for seed in seeds if seed + 1 not in seeds], strict=True)
+    )
     lines = [
-        f"Made by `python -m benchmarks.sizes --count {len(rows)} --seed {begun}` at {about['commit']} on "
-        f"{about['date']} ({about['machine']}).",
+        f"Made by `python -m benchmarks.sizes --summary` at {about['commit']} on {about['date']} ({about['machine']}). Seeds {ranges}.",
         "",
         f"{len(rows)} jobs, each planned with the usual sizes and with others: those of kind `parts` small (samples on demand, chunks,",
         "threads), those of kind `routes` (windows and ranges), all of them (`PLANNER_SIZES=small`). Commits: "

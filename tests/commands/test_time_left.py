@@ -121,6 +121,7 @@ def test_a_search_tells_its_share() -> None:
     assert left.left(now + 1e3) > 0.0  # type: ignore[operator]
 
 
+@pytest.mark.usual_sizes
 def test_a_search_that_leaves_something_comes_once_more() -> None:
     """8 s for 80 % of it, and then a plan: 3 s took as much as that needs, and the search 10 s; quick makes no other one."""
     left, now = searched()

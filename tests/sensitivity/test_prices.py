@@ -130,6 +130,7 @@ def test_the_feed_costs_what_plans_made_again_say(job):
     assert job.prices().feed == pytest.approx(slope, rel=0.05, abs=NOTHING * job.time)
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 def test_the_tolerance_costs_what_plans_made_again_say(job):
     priced, tolerance = job.prices(), job.machine.tolerance
     slope = job.slope(lambda factor: {"machine": with_tolerance(job.machine, factor)})
@@ -168,6 +169,7 @@ def test_corners_that_share_a_leg_count_what_they_take_from_each_other():
     assert_corners(job, dear, rel=0.2)
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 def test_without_the_corners_growth_accelerations_would_be_priced_wrong():
     """With long periods the chord error counts: more acceleration takes from the rounding what corners need for their speed."""
     machine = problems.machine(dt=0.004)

@@ -60,6 +60,7 @@ def named(limits):
     return tuple(f"{q}.{limit.name}" for limit in limits for q in ("velocity", "acceleration", "jerk"))
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 @pytest.mark.parametrize("limits", [[Table()], pytest.param([Soft(), Table()], marks=pytest.mark.slow)])
 def test_ten_per_cent_more_saves_what_was_foretold(program, limits):
     """Within 15 %, through whole plans on single corners."""

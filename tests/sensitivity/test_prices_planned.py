@@ -78,6 +78,7 @@ def test_a_tenth_more_of_anything_saves_no_more_than_everything_a_tenth_faster(o
                 assert row["found_s"] <= (MOST + HINT_LEAST) * result["cycle_time_s"]
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 @pytest.mark.parametrize("corner", ["bezier", "auto"])
 def test_at_a_crawl_the_feed_saves_all_that_can_be_saved_and_nothing_else_saves_anything(corner):
     program = parse_program(LINES.replace("F4800", "F240"), MACHINE)
@@ -145,6 +146,7 @@ def test_windows_of_a_grid_foretell_what_the_whole_grid_foretells(solved, monkey
         assert sampled.saved[name] == pytest.approx(whole.saved[name], rel=0.15)
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 def test_a_thinned_grid_keeps_ends_slow_places_and_elements(solved):
     samples, problem, solution, machine = solved
     part = savings.thinned(samples, problem, solution, machine, rows=3)
@@ -191,6 +193,7 @@ def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_an
     assert savings.windows_of_grid(piece, kept, 9_000)[2] is False
 
 
+@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 def test_a_grid_that_fits_in_one_window_is_taken_whole():
     """Many limits leave each of their problems fewer points than a window has."""
     kept = np.arange(0, 1_800, 2)

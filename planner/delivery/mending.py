@@ -4,6 +4,9 @@ A limit that is exceeded, a feed, a corner passed too fast, and an error of the 
 the motion is slower (verify/excess.py says by what power), so that each says by how much it has to be. What does not get less, a path
 that leaves the tolerance by itself, is not mended here; nor is a motion that takes more than `MOST_SLOWER` times as long anywhere,
 which is a mistake to be seen.
+
+All of the motion is judged again in each round: behind the first place that is slower everything comes later by no whole number of
+periods, so that other setpoints are delivered there.
 """
 
 from __future__ import annotations

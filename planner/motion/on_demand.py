@@ -52,9 +52,6 @@ class TrajectoryOnDemand(Trajectory):
         count: int = self._count
         return count
 
-    def __repr__(self) -> str:
-        return f"TrajectoryOnDemand({len(self)} samples, axes {self.axes}, dt {self.dt} s)"
-
     @property
     def cycle_time(self) -> float:
         """Duration of the motion [s]."""

@@ -45,6 +45,7 @@ def test_the_samples_are_the_same_by_chunks_by_rows_and_as_a_whole(both):
         kept.axes,
         kept.dt,
     )
+    assert repr(asked) == repr(kept)
     chunks = list(asked.chunks())
     assert [len(chunk) for chunk in chunks[:-1]] == [77] * (len(chunks) - 1)
     k = np.unique(np.random.default_rng(1).integers(0, len(kept), 40))

@@ -43,7 +43,6 @@ TERMS = {
     "feed": "speed along the path [mm/s]; the programmed feed is the F word",
     "cycle time": "duration of the whole motion [s]",
     "look-ahead": "speeds at the joints that leave enough room to brake for everything that follows",
-    "braking distance": "the length that a motion needs to come to a lower speed, or to rest",
     "full stop": "a place at which the feed is zero",
     "dwell": "a full stop whose duration the program sets (G4)",
     "standstill": "a full stop whose duration the planner sets, so that filters settle or a sample falls on the vertex",
@@ -52,7 +51,6 @@ TERMS = {
     "vertex error": "distance of a vertex from the motion",
     "chord error": "how far the machine's chord between two samples cuts off the curve, kappa feed^2 dt^2 / 8",
     "error budget": "the tolerance, divided among rounding, chord error and the filters behind the setpoints",
-    "fraction": "a number between 0 and 1 that says how much of something is used",
     "ratio": "a value divided by its limit: 1 is at the limit",
     "limit": "the largest value that the machine or the program allows",
     "active limit": "a limit that the motion has reached; `held by` in the output tells for how much of the time, "
@@ -77,7 +75,7 @@ def markdown() -> str:
     text = "# Glossary\n\nOne word for one thing. This page is made from `planner/base/glossary.py`.\n"
     for title, words in (
         ("Parts of a path", PARTS),
-        ("Words beside them", BESIDE),
+        ("Related words", BESIDE),
         ("Terms of the field", TERMS),
     ):
         text += f"\n## {title}\n\n| word | meaning |\n|---|---|\n"

@@ -1,34 +1,27 @@
 """Output files that take their place when all of them are written, `summary.json` last.
 
-The files of a run are written into a hidden directory inside the output directory and forced to disk. Then each is renamed into
-its place: the trajectory first, the rest, and `summary.json` last; files of the run before that the new one lacks (another format,
-no pictures) go in between. The output directory itself stays what it is: owner, group, mode, mount point.
+The files of a run are written into a hidden directory inside the output directory and forced to disk. Then each is renamed into its
+place, in the order of `OUTPUTS`; files of the run before that the new one lacks (another format, no pictures) go in between. A kill
+before the renames leaves the old set, after them the new one. A kill between two renames leaves whole files of two runs, and that can
+be seen: the `run_id` of the trajectory is then not that of `summary.json`, or one of the two is missing.
 
-A kill before the renames leaves the old set, after them the new one. A kill between two renames, which take a fraction of a
-millisecond, leaves files of two runs, each of them whole. That can be seen: the `run_id` of the trajectory is then not that of
-`summary.json`, or one of the two is missing.
-
-Nothing is replaced or removed that a run did not write. `summary.json` names its files with their SHA-256; a file under one of the
-names of `OUTPUTS` whose content it vouches for is ours. Anything else stands in the way, unless the user says `--force`.
-
-A lock on the output directory, which the kernel releases with the process, makes a second run into the same directory wait; a hidden
-directory found under the lock is the leftover of a killed run, and removed. Its `summary.json` vouches for files too: some of them may
-be in place already. Windows and file systems without such locks do without.
+Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their SHA-256, and so does that of a
+killed run. A lock on the output directory makes a second run wait, and what is hidden there under the lock is the leftover of a killed
+run. Windows and file systems without such locks do without.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import shutil
-import stat
 import sys
 import uuid
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from planner.base.errors import InputError
 
@@ -52,26 +45,40 @@ OUTPUTS = (
 )  # every name that a run may write, in the order in which they take their places
 HIDDEN = ".planner-" + 12 * "[0-9a-f]"  # pattern of the names of temporaries
 
-_undo: list[Callable[[], object]] = []  # what removes the temporaries of this process
+_temporaries: dict[
+    int, list[Path]
+] = {}  # of this process, and directories that go unless something is in them
 
 
 def remove_temporaries() -> None:
     """Remove files that are only partly written, before the process ends without unwinding."""
-    for step in reversed(_undo):
+    for places in [*_temporaries.values()]:
+        _remove(places)
+
+
+def _remove(places: Iterable[Path]) -> None:
+    for place in reversed([*places]):
         with contextlib.suppress(OSError):
-            step()
+            if not place.is_dir():
+                place.unlink()
+            elif place.match(HIDDEN):
+                shutil.rmtree(place)
+            else:
+                place.rmdir()
 
 
 @contextlib.contextmanager
-def _undone(step: Callable[[], object]) -> Iterator[None]:
-    """Run `step` when the block ends, however it ends; an OSError of the step is passed over."""
-    _undo.append(step)
+def _writing(place: Path) -> Iterator[list[Path]]:
+    """A list whose places are removed at the end, however it ends; an OSError is raised as an InputError about `place`."""
+    temporaries: list[Path] = []
+    _temporaries[id(temporaries)] = temporaries
     try:
-        yield
+        yield temporaries
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror or fault}", source=str(place)) from fault
     finally:
-        with contextlib.suppress(OSError):
-            step()
-        _undo.remove(step)
+        _remove(temporaries)
+        del _temporaries[id(temporaries)]
 
 
 @contextlib.contextmanager
@@ -81,39 +88,35 @@ def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False
     kept  : names of files of the earlier run that stay although the new run lacks them
     force : replace files that no run wrote, too
 
-    One of the files is `summary.json`, with `checksums` of the others. After an exception `directory` is as before.
+    One of the files is `summary.json`, with `checksums` of the others. After an exception `directory` is as before, unless the system
+    refused one of the renames: then, as after a kill there, it has files of two runs.
 
     Raises InputError if `directory` cannot be written, or if a file is in the way that no run wrote.
     """
-    with contextlib.ExitStack() as stack:
-        try:
-            check_output(directory, (), force=force)
-            for missing in _missing(directory):
-                missing.mkdir(exist_ok=True)
-                stack.enter_context(_undone(missing.rmdir))  # goes only if it is empty
-            stack.enter_context(_locked(directory))
+    check_output(directory, (), force=force)
+    with _writing(directory) as temporaries:
+        for missing in _missing(directory):
+            temporaries.append(missing)
+            missing.mkdir(exist_ok=True)
+        with _locked(directory):
             vouched = _vouched(directory)
-            for leftover in directory.glob(HIDDEN + "/"):
-                shutil.rmtree(leftover, ignore_errors=True)
+            _remove(directory.glob(HIDDEN + "/"))
             new = directory / _hidden_name()
-            stack.enter_context(_undone(lambda: shutil.rmtree(new, ignore_errors=True)))
+            temporaries.append(new)
             new.mkdir()
-        except OSError as fault:
-            raise _cannot_be_written(directory, fault) from fault
-        try:
             yield new
-            for file in new.iterdir():
-                _sync(file)
-        except OSError as fault:
-            raise _cannot_be_written(directory, fault, "; what was there stays") from fault
-        names = sorted(os.listdir(new), key=OUTPUTS.index)
-        _refuse_foreign(directory, names, vouched, force)
-        stale = [
-            name
-            for name in OUTPUTS
-            if name not in names and name not in kept and _is_ours(directory / name, vouched)
-        ]
-        _take_places(new, directory, names, stale)
+            names = os.listdir(new)
+            for name in names:
+                _sync(new / name)
+            _refuse_foreign(directory, names, vouched, force)
+            for name in OUTPUTS:
+                if name == SUMMARY:
+                    _sync(directory)
+                if name in names:
+                    os.replace(new / name, directory / name)
+                elif name not in kept and _is_ours(directory / name, vouched):
+                    (directory / name).unlink()
+            _sync(directory)
 
 
 @contextlib.contextmanager
@@ -122,20 +125,17 @@ def replacing_file(path: Path) -> Iterator[Path]:
 
     After an exception `path` is as before. Raises InputError if it cannot be written.
     """
-    new = path.with_name(_hidden_name() + path.suffix)
-    try:
+    with _writing(path) as temporaries:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with _undone(new.unlink):
-            yield new
-            _sync(new)
-            os.replace(new, path)
-    except OSError as fault:
-        raise _cannot_be_written(path, fault) from fault
+        temporaries.append(path.with_name(_hidden_name() + path.suffix))
+        yield temporaries[0]
+        _sync(temporaries[0])
+        os.replace(temporaries[0], path)
 
 
 def check_output(directory: Path, names: Iterable[str], *, force: bool = False) -> None:
     """Raise InputError if a directory cannot be written, or if one of `names` in it exists, no run wrote it, and `force` is not set."""
-    try:
+    with _writing(directory):
         if directory.exists() and not directory.is_dir():
             raise InputError("cannot be written: is a file, not a directory", source=str(directory))
         missing = _missing(directory)
@@ -143,8 +143,6 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
         if not os.access(there, os.W_OK):
             raise InputError(f"cannot be written: no permission to write in {there}", source=str(directory))
         _refuse_foreign(directory, names, _vouched(directory), force)
-    except OSError as fault:
-        raise _cannot_be_written(directory, fault) from fault
 
 
 def check_file(
@@ -154,7 +152,7 @@ def check_file(
 
     written_by_us : says whether a file is of the kind that is to be written
     """
-    try:
+    with _writing(path):
         if path.is_dir():
             raise InputError("cannot be written: is a directory", source=str(path))
         if path.parent.exists() and not path.parent.is_dir():
@@ -165,8 +163,6 @@ def check_file(
                 "was not written by planner, and is not overwritten; give another name, or --force",
                 source=str(path),
             )
-    except OSError as fault:
-        raise _cannot_be_written(path, fault) from fault
 
 
 def starts_with(path: Path, line: str) -> bool:
@@ -178,13 +174,12 @@ def starts_with(path: Path, line: str) -> bool:
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise InputError if one of the files to write is among the files that are read."""
-    for output in outputs:
-        for given in inputs:
-            with contextlib.suppress(OSError):
-                if output.samefile(given):
-                    raise InputError(
-                        "is read as input and would be overwritten; write elsewhere", source=str(output)
-                    )
+    for output, given in itertools.product(outputs, [*inputs]):
+        with contextlib.suppress(OSError):
+            if output.samefile(given):
+                raise InputError(
+                    "is read as input and would be overwritten; write elsewhere", source=str(output)
+                )
 
 
 def checksums(directory: Path) -> dict[str, str]:
@@ -198,42 +193,28 @@ def _hidden_name() -> str:
 
 def _missing(directory: Path) -> list[Path]:
     """The directories to make for `directory` to exist, the outermost first."""
-    missing: list[Path] = []
     place = directory.resolve()
-    while not place.exists():
-        missing.insert(0, place)
-        place = place.parent
-    return missing
+    return [one for one in (*reversed(place.parents), place) if not one.exists()]
 
 
-def _vouched(directory: Path) -> dict[str, set[str]]:
-    """The checksums of what runs wrote into `directory`, by name, as their summaries say."""
-    vouched: dict[str, set[str]] = {}
+def _vouched(directory: Path) -> set[tuple[str, str]]:
+    """Names and checksums of what runs wrote into `directory`, as their summaries say, themselves included."""
+    vouched: set[tuple[str, str]] = set()
     for file in (directory / SUMMARY, *directory.glob(f"{HIDDEN}/{SUMMARY}")):
-        for name, checksum in _recorded(file).items():
-            vouched.setdefault(name, set()).add(str(checksum))
+        with contextlib.suppress(OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
+            said = json.loads(file.read_bytes())
+            if isinstance(said["run_id"], str):
+                vouched |= {*said["sha256"].items(), (SUMMARY, _sha256(file))}
     return vouched
 
 
-def _recorded(summary: Path) -> dict[str, Any]:
-    """The checksums in a summary, with its own; none if it is not one that a run wrote."""
-    try:
-        said = json.loads(summary.read_bytes())
-        if isinstance(said["run_id"], str) and isinstance(said["sha256"], dict):
-            return {**said["sha256"], SUMMARY: _sha256(summary)}
-    except (OSError, ValueError, RecursionError, KeyError, TypeError):
-        pass
-    return {}
+def _is_ours(file: Path, vouched: set[tuple[str, str]]) -> bool:
+    return file.is_file() and not file.is_symlink() and (file.name, _sha256(file)) in vouched
 
 
-def _is_ours(file: Path, vouched: dict[str, set[str]]) -> bool:
-    try:
-        return stat.S_ISREG(file.lstat().st_mode) and _sha256(file) in vouched.get(file.name, ())
-    except OSError:
-        return False
-
-
-def _refuse_foreign(directory: Path, names: Iterable[str], vouched: dict[str, set[str]], force: bool) -> None:
+def _refuse_foreign(
+    directory: Path, names: Iterable[str], vouched: set[tuple[str, str]], force: bool
+) -> None:
     for name in names:
         file = directory / name
         if file.is_dir() and not file.is_symlink():
@@ -243,27 +224,6 @@ def _refuse_foreign(directory: Path, names: Iterable[str], vouched: dict[str, se
                 "was not written by planner, or changed since, and is not overwritten; give another directory, or --force",
                 source=str(file),
             )
-
-
-def _take_places(new: Path, directory: Path, names: list[str], stale: list[str]) -> None:
-    changed = False
-    try:
-        for name in sorted({*names, *stale}, key=OUTPUTS.index):
-            if name == SUMMARY:
-                _sync_directory(directory)
-            if name in names:
-                os.replace(new / name, directory / name)
-            else:
-                (directory / name).unlink()
-            changed = True
-        _sync_directory(directory)
-    except OSError as fault:
-        said = "; it holds files of two runs now, which their run_id tells apart" if changed else ""
-        raise _cannot_be_written(directory, fault, said) from fault
-
-
-def _cannot_be_written(place: Path, fault: OSError, more: str = "") -> InputError:
-    return InputError(f"cannot be written: {fault.strerror or fault}{more}", source=str(place))
 
 
 def _sha256(file: Path) -> str:
@@ -286,19 +246,13 @@ def _locked(directory: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def _sync(file: Path) -> None:
-    """Force a file to disk. Windows does so through handles that may write only."""
-    with file.open("r+b") as stream:
-        os.fsync(stream.fileno())
-
-
-def _sync_directory(directory: Path) -> None:
-    """Force the names in a directory to disk, where the system can."""
-    if sys.platform == "win32":
-        return
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):  # file systems without fsync on directories
+def _sync(place: Path) -> None:
+    """Force a file, or the names in a directory, to disk; a directory where the system can. Windows does so through handles that may
+    write only."""
+    names = place.is_dir()
+    with contextlib.suppress(*[OSError] * names):
+        handle = os.open(place, os.O_RDONLY if names else os.O_RDWR)
+        try:
             os.fsync(handle)
-    finally:
-        os.close(handle)
+        finally:
+            os.close(handle)

@@ -10,6 +10,8 @@ COLOURS = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#0000F0", "#901818", "#6060F0", "#30D878",
 )  # fmt: skip
 GREY, LIGHT = "#606060", "#c4c4c4"
+INK, DIM = "#1d2430", "#667085"  # of text, and of what is beside it, on light ground
+PRICES = (0.02, "#f6c667"), (0.5, "#e8743b"), (1.0, "#7a1f5c")  # share of the dearest [-], and its colour
 # Cividis, from low to high, at ten equal steps.
 CIVIDIS = (
     "#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838",

@@ -1,12 +1,12 @@
 """Feed, acceleration and jerk over time against their limits, and which constraint limits when.
 
-Colours are those of Okabe and Ito ("Color universal design", 2008). A job of an hour has millions of samples and a picture some 1500
+A job of an hour has millions of samples and a picture some 1500
 columns: a profile keeps the least and the largest value of each column, so that no peak is lost.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -16,36 +16,39 @@ from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
 from planner.job.records import WORDS
-from planner.machine import ROTARY_AXES
+from planner.report.colours import COLOURS, GREY, LIGHT, limit_colours
+from planner.report.figure import MotionColumns, profile_panels
+from planner.report.html.data import used_limits
 from planner.report.optimum import held_by_rows
-from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
 
 COLUMNS = 1500  # about the width of a profile in pixels
 FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit
-BLUE, VERMILION = "#0072B2", "#D55E00"
-# Okabe and Ito without black (limits) and grey (others)
-BANDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
-OTHERS = "#d0d0d0"
+BLUE, VERMILION = COLOURS[0], COLOURS[5]
+HELD = 7  # limits with the largest shares of the time, which the legend has
+QUANTITIES = ("acceleration", "jerk")
 
 
 def profiles_figure(plan: Plan) -> Figure:
     """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits, over time."""
-    trajectory = plan.trajectory if plan.joints is None else plan.joints
+    trajectory = plan.trajectory
     assert trajectory is not None
-    moving = [k for k in range(len(trajectory.axes)) if np.ptp(trajectory.position[:, k]) > 0]
+    motion = MotionColumns(plan, trajectory, plan.joints)
+    position, axes = motion.joints.position, motion.joints.axes
+    moving = [axis for k, axis in enumerate(axes) if np.ptp(position[:, k]) > 0]
+    below = profile_panels(plan.machine, moving, QUANTITIES)[1:]
     band = plan.grid is not None and len(plan.grid.t) > 1
-    heights = [2.4, *([0.28] if band else []), *([1.0] * 2 * len(moving))]
+    heights = [2.4, *([0.28] if band else []), *([1.0] * len(below) * len(moving))]
     figure = Figure(figsize=(6.8, 0.55 + 0.85 * sum(heights)), layout="constrained")
     layout: Any = figure.get_layout_engine()
     layout.set(h_pad=0.03, hspace=0.02)
-    rows = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
+    rows = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0])
     scale, unit = _time_unit(trajectory.cycle_time)
-    t = trajectory.t * scale
+    t = motion["t"] * scale
 
-    _feed_row(rows[0], plan, t)
+    _feed_row(rows[0], motion, t)
     if band:
         handles = _band_row(rows[1], plan, scale)
         figure.legend(
@@ -59,22 +62,16 @@ def profiles_figure(plan: Plan) -> Figure:
         )
     free = _free_quantities(plan)
     row = iter(rows[2 if band else 1 :])
-    quantities: tuple[tuple[Literal["acceleration", "jerk"], str, str], ...]
-    quantities = (("acceleration", "a", "²"), ("jerk", "j", "³"))
-    for quantity, symbol, power in quantities:
-        values = getattr(trajectory, quantity)
-        limits = plan.machine.limits(quantity, trajectory.axes)
-        for k in moving:
-            axis = trajectory.axes[k]
-            rotary = axis in ROTARY_AXES
-            per = float(trajectory.in_degrees[k]) if rotary else 1e-3
+    for quantity in below:
+        for one in quantity.series:
             panel = next(row)
-            draw_profile(panel, t, values[:, k] * per, BLUE)
-            length = "°" if rotary else "m"
-            panel.set_ylabel(f"{symbol}$_{{\\rm {axis.upper()}}}$\n[{length}/s{power}]")
-            _limit_lines(panel, values[:, k] * per, limits[k] * per)
-            if k == moving[0] and quantity in free:
-                said = f"{quantity} is not limited by this method"
+            per, length = (1e-3, one.unit[1:]) if one.unit.startswith("mm") else (1.0, one.unit)
+            values = motion[one.column] * per
+            draw_profile(panel, t, values, BLUE)
+            panel.set_ylabel(f"{one.column[0]}$_{{\\rm {one.name.upper()}}}$\n[{length}]")
+            _limit_lines(panel, values, one.limit * per)
+            if one.name == moving[0] and quantity.title in free:
+                said = f"{quantity.title} is not limited by this method"
                 panel.set_title(said, loc="right", fontsize=7.5, color=VERMILION, pad=2)
     rows[-1].set_xlabel(f"time [{unit}]")
     rows[-1].set_xlim(t[0], t[-1])
@@ -82,54 +79,45 @@ def profiles_figure(plan: Plan) -> Figure:
     return figure
 
 
-def _feed_row(panel: Axes, plan: Plan, t: FloatArray) -> None:
-    trajectory = plan.trajectory
-    assert trajectory is not None
-    word = WordFeed(plan.toolpath)
-    feed, programmed = word.of(trajectory), word.programmed(plan.program, np.clip(trajectory.block, 0, None))
-    finite = np.isfinite(programmed)
-    if finite.any():
-        edges = np.flatnonzero(programmed[1:] != programmed[:-1])
-        if len(edges) < COLUMNS:  # a feed for each block says nothing at this size
-            panel.plot(
-                t,
-                np.where(finite, programmed, np.nan),
-                color="black",
-                linestyle=(0, (4, 3)),
-                linewidth=0.7,
-                zorder=1,
-            )
+def _feed_row(panel: Axes, motion: MotionColumns, t: FloatArray) -> None:
+    feed, programmed = motion["feed"], motion["programmed"]
+    asked = programmed[np.isfinite(programmed)]
+    if np.count_nonzero(np.diff(asked)) < COLUMNS:  # a feed for each block says nothing at this size
+        panel.plot(t, programmed, color="black", linestyle=(0, (4, 3)), linewidth=0.7, zorder=1)
     draw_profile(panel, t, feed, BLUE)
-    panel.set_ylim(0.0, 1.08 * max(float(feed.max()), 1e-9))
-    top = panel.get_ylim()[1]
-    if finite.any() and programmed[finite].min() > top:
-        said = f"programmed feed {programmed[finite].min():.4g} mm/s is never reached"
+    top = 1.08 * max(float(feed.max()), 1e-9)
+    panel.set_ylim(0.0, top)
+    if asked.min(initial=np.inf) > top and len(asked):
+        said = f"programmed feed {asked.min():.4g} mm/s is never reached"
         panel.text(0.995, 0.96, said, transform=panel.transAxes, ha="right", va="top", fontsize=7.5)
     panel.set_ylabel("feed\n[mm/s]")
 
 
 def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     """A strip whose colour names what is active, of several the dearest; returns the legend, the largest share first."""
-    grid = plan.grid
+    grid, trajectory = plan.grid, plan.trajectory
     assert grid is not None
-    assert plan.trajectory is not None
-    t = np.asarray(grid.t, dtype=float)
-    held = held_by_rows(grid, plan.prices)[: len(BANDS)]
-    place = {name: k for k, (name, _, _) in enumerate(held)}
-    colour_of = np.array([place.get(WORDS.get(name, name), len(held)) for name in grid.active_names])
-    winner = majority(t, colour_of[grid.active[:-1]], len(held) + 1, plan.trajectory.cycle_time)
-    colours = [matplotlib.colors.to_rgb(c) for c in (*BANDS[: len(held)], OTHERS)]
+    assert trajectory is not None
+    names, active = used_limits(grid.active_names, grid.active)
+    held = held_by_rows(grid, plan.prices)[:HELD]
+    colour = {WORDS.get(name, name): one for name, one in zip(names, limit_colours(names), strict=True)}
+    told = {name for name, _, _ in held}
+    colours = [matplotlib.colors.to_rgb(one if name in told else LIGHT) for name, one in colour.items()]
+    end = trajectory.cycle_time
+    winner = majority(np.asarray(grid.t, dtype=float), active[:-1], len(names), end)
     panel.imshow(
         np.array(colours)[winner][None],
         aspect="auto",
         interpolation="nearest",
-        extent=(0.0, plan.trajectory.cycle_time * scale, 0.0, 1.0),
+        extent=(0.0, end * scale, 0.0, 1.0),
     )
     panel.set_yticks([])
     panel.spines[:].set_visible(False)
     panel.tick_params(bottom=False)
-    labels = [f"{name} {percent} %" + (f" ({saves})" if saves else "") for name, percent, saves in held]
-    return [Patch(color=colour, label=label) for label, colour in zip(labels, BANDS, strict=False)]
+    return [
+        Patch(color=colour.get(name, GREY), label=f"{name} {percent} %" + (f" ({saves})" if saves else ""))
+        for name, percent, saves in held
+    ]
 
 
 def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:

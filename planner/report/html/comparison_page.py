@@ -10,16 +10,20 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.base.sizes import SIZES
+from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
 from planner.report.export import json_ready
+from planner.report.figure import AGAINST, Panel, Series, three
 from planner.report.html.page import is_report
 from planner.report.html.parts import page_of
+from planner.report.plotly_figure import fitted_scene, panel_figure
 from planner.report.replace import check_file, replacing_file
 
 if TYPE_CHECKING:
     from planner.nc.program import Program
+    from planner.report.html.data import Samples
 
 SAMPLES_MAX = SIZES.compared_samples
 
@@ -46,15 +50,40 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
     """
     best = best_of(rows)
     columns: dict[str, Array] = {}
-    for k, row in enumerate(rows):
-        columns |= _columns(row, f"m{k}_", program)
+    colours = [COLOURS[k % len(COLOURS)] for k in range(len(rows))]
+    shown = {k: row.shown for k, row in enumerate(rows) if row.shown is not None}
+    for k, samples in shown.items():
+        columns |= _columns(samples, f"m{k}_")
+    panels = [
+        Panel(
+            title=title,
+            series=tuple(
+                Series(
+                    name=rows[k].method,
+                    column=name,
+                    unit=unit,
+                    scale=scale,
+                    colour=colours[k],
+                    before=f"m{k}_",
+                )
+                for k in shown
+            ),
+        )
+        for name, title, unit, scale in (
+            ("feed", "feed", "mm/s", 1.0),
+            ("deviation", "distance", "µm", 1.0 / MICROMETRE),
+        )
+    ]
+    paths = [three(samples.shown) for samples in shown.values()]
     about = {
-        "source": source,
         "machine": machine.name,
         "blocks": len(program),
         "best": None if best is None else best.method,
-        "colours": [COLOURS[k % len(COLOURS)] for k in range(len(rows))],
+        "colours": colours,
         "rows": json_ready([_said(row, best) for row in rows]),
+        "against": AGAINST,
+        "profile": panel_figure(panels, "t") if paths else None,
+        "view": fitted_scene(np.concatenate(paths)) if paths else None,
     }
     return page_of("comparison", "methods side by side", source, about, columns)
 
@@ -77,20 +106,10 @@ def _said(row: Row, best: Row | None) -> dict[str, Any]:
     }
 
 
-def _columns(row: Row, prefix: str, program: Program) -> dict[str, Array]:
-    """The samples of a row's motion: time, length, feed, distance from the path, line, and x, y, z."""
-    if row.shown is None:
-        return {}
-    shown = row.shown.shown
-    columns: dict[str, Array] = {
-        "t": shown.t.astype(np.float32),
-        "s": shown.s.astype(np.float32),
-        "feed": row.shown.feed.astype(np.float32),
-        "deviation": row.shown.deviation.astype(np.float32),
-        "line": shown.line.astype(np.int32),
-        "programmed": np.nan_to_num(row.shown.programmed, posinf=np.nan).astype(np.float32),
-    }
-    for axis in LINEAR_AXES:
-        at = shown.position[:, shown.axes.index(axis)] if axis in shown.axes else np.zeros(len(shown))
-        columns[axis] = at.astype(np.float32)
-    return {prefix + name: column for name, column in columns.items()}
+def _columns(samples: Samples, prefix: str) -> dict[str, Array]:
+    """The samples of a motion: time, length, feed, distance from the path, line, and x, y, z."""
+    shown = samples.shown
+    columns = {"t": shown.t, "s": shown.s, "feed": samples.feed, "deviation": samples.deviation}
+    columns |= dict(zip(LINEAR_AXES, three(shown).T, strict=True))
+    floats = {prefix + name: column.astype(np.float32) for name, column in columns.items()}
+    return {**floats, prefix + "line": shown.line.astype(np.int32)}

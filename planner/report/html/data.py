@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 SAMPLES_MAX = SIZES.page_samples
 PROGRAMMED_MAX = SIZES.page_programmed
-ARC_POINTS = 24  # of every arc and curve that are shown
+ARC_POINTS = 48  # of every arc and curve that are shown
 NO_LIMIT = "none"
 # Around a joint its price is shown within so many tolerances, a rounded corner reaches back some ten of them, and at least within this
 # share of the path's extent, some ten pixels of the picture.
@@ -140,7 +140,7 @@ def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
     """Names of the limits, and which holds each sample: that of the solution, or where there is none the one closest to its limit."""
     if plan.grid is not None and len(plan.grid.t):
         at = np.clip(np.searchsorted(plan.grid.t, shown.t, side="right") - 1, 0, None)
-        return _used(plan.grid.active_names, plan.grid.active[at])
+        return used_limits(plan.grid.active_names, plan.grid.active[at])
     axes = of_axes(plan, shown)
     names, ratios = [NO_LIMIT], [np.full(len(shown), 0.99)]
     for quantity in ("velocity", "acceleration", "jerk"):
@@ -150,10 +150,10 @@ def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
     names.append("feed")
     word = WordFeed(plan.toolpath)
     ratios.append(word.of(shown) / word.programmed(plan.program, shown.block))
-    return _used(tuple(names), np.argmax(np.stack(ratios), axis=0))
+    return used_limits(tuple(names), np.argmax(np.stack(ratios), axis=0))
 
 
-def _used(names: tuple[str, ...], index: Array) -> tuple[tuple[str, ...], Array]:
+def used_limits(names: tuple[str, ...], index: Array) -> tuple[tuple[str, ...], Array]:
     """The names that occur, `NO_LIMIT` last, and the indices among them."""
     used = sorted(set(np.unique(index).tolist()), key=lambda k: (names[k] == NO_LIMIT, k))
     place = np.zeros(len(names), np.int64)

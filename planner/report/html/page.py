@@ -9,6 +9,7 @@ megabytes, is run and the columns are unpacked.
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +17,14 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.base.sizes import SIZES
-from planner.job.at_tip import of_axes
-from planner.machine import LINEAR_AXES, ROTARY_AXES
-from planner.motion.trajectory import in_degrees
+from planner.machine import LINEAR_AXES
 from planner.report.colours import LOW_TO_HIGH, limit_colours
 from planner.report.export import json_ready, summary
+from planner.report.figure import AGAINST, MotionColumns, colourings, profile_panels, three
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.html.picture import path_picture
+from planner.report.plotly_figure import PROGRAMMED, colour_line, fitted_scene, panel_figure
 from planner.report.replace import check_file
 from planner.report.rows import plan_rows
 
@@ -35,7 +36,6 @@ PICTURE = 900.0  # longer side of the picture that stands there until the path c
 CORNERS_MAX = SIZES.page_corners
 CALLS_MAX = SIZES.page_calls
 MARK = '<meta name="generator" content="feedrate-planner">'
-MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 
 
 def check_report_place(path: Path, *, force: bool = False) -> None:
@@ -67,55 +67,46 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
     )
 
 
+# Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start apart.
+TYPES = {"t": "f8", "line": "i4", "frame": "i4", "limit": "u1", "line_line": "i4", "line_limit": "u1"}
+
+
 def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
     """Columns of numbers by name, and what the page has to know of them."""
     samples = samples_of(plan)
-    shown, axes = samples.shown, samples.shown.axes
-    lines, joints = lines_of(plan, samples), of_axes(plan, shown)
-    scale = in_degrees(axes, plan.toolpath.radius)
-    columns: dict[str, Array] = {
-        "t": shown.t,
-        "s": shown.s.astype(np.float32),
-        "feed": samples.feed.astype(np.float32),
-        "line": shown.line.astype(np.int32),
-        "limit": samples.limit.astype(np.uint8),
-        "deviation": samples.deviation.astype(np.float32),
-        "programmed": np.nan_to_num(samples.programmed, posinf=np.nan).astype(np.float32),
-        "path": programmed_path(plan.toolpath).astype(np.float32).ravel(),
-        "line_number": lines.line.astype(np.int32),
-        "line_planned": lines.planned.astype(np.float32),
-        "line_programmed": lines.programmed.astype(np.float32),
-        "line_highest": lines.highest.astype(np.float32),
-        "line_limit": lines.limit.astype(np.uint8),
-        "line_deviation": lines.deviation.astype(np.float32),
-    }
-    program = plan.program
-    if program.frames:
-        columns["frame"] = program.frame[shown.block].astype(np.int32)
-    for k, axis in enumerate(axes):
-        columns[axis] = (shown.position[:, k] * scale[k]).astype(np.float32)
-        columns[f"a{axis}"] = (joints.acceleration[:, k] * scale[k]).astype(np.float32)
-        columns[f"j{axis}"] = (joints.jerk[:, k] * scale[k]).astype(np.float32)
+    shown, program, machine = samples.shown, plan.program, plan.machine
+    motion = MotionColumns(plan, shown)
+    panels = profile_panels(machine, motion.joints.axes, ["acceleration", "jerk"])
+    figure, path = panel_figure(panels, "t"), programmed_path(plan.toolpath)
+    names = {"t", "s", "line", *shown.axes, *(of["y"] for of in figure["columns"])}
+    columns: dict[str, Array] = {name: motion[name] for name in sorted(names)}
+    columns |= {"limit": samples.limit, "deviation": samples.deviation, "path": path.ravel()}
     if samples.price is not None:
-        columns["price"] = (samples.price * MICROSECONDS_PER_MICROMETRE).astype(np.float32)
-    if lines.more_feed is not None and lines.more is not None:
-        columns["line_more_feed"] = lines.more_feed.astype(np.float32)
-        columns["line_more"] = lines.more.astype(np.float32)
-    machine = plan.machine
+        columns["price"] = samples.price
+    lines = lines_of(plan, samples)
+    fields = ((field.name, getattr(lines, field.name)) for field in dataclasses.fields(lines))
+    columns |= {f"line_{name}": column for name, column in fields if column is not None}
+    if program.frames:
+        columns["frame"] = program.frame[shown.block]
     about = {
-        "axes": [*axes],
-        "linear": [axis for axis in axes if axis in LINEAR_AXES],
-        "rotary": [axis for axis in axes if axis in ROTARY_AXES],
+        "linear": [axis for axis in shown.axes if axis in LINEAR_AXES],
         "limits": list(samples.limits),
         "colours": limit_colours(samples.limits),
-        "scales": {ground: list(colours) for ground, colours in LOW_TO_HIGH.items()},
+        "colourings": {
+            name: {"column": how.column, "scale": how.scale}
+            | {ground: colour_line(how, ground) for ground in LOW_TO_HIGH}
+            for name, how in colourings(samples).items()
+        },
+        "programmed": PROGRAMMED,
+        "profile": figure,
+        "against": AGAINST,
+        "view": fitted_scene(np.concatenate([three(shown), path])),
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
-        "machine": {axis: machine.axes[axis].model_dump() for axis in axes},
         "corners": json_ready(_corners(plan)),
         "calls": [program.called(frame) for frame in range(min(len(program.frames), CALLS_MAX))],
     }
-    return columns, about
+    return {name: column.astype(TYPES.get(name, "f4")) for name, column in columns.items()}, about
 
 
 def _corners(plan: Plan) -> dict[str, list[Any]]:

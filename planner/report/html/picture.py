@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.machine import LINEAR_AXES
 from planner.report.colours import CIVIDIS
+from planner.report.figure import MotionColumns, highest_feed, three
 from planner.report.tool_lines import TOOL, tool_lines
-from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.job.plan import Plan
@@ -29,7 +28,7 @@ def path_picture(plan: Plan, size: float) -> str:
     assert trajectory is not None
     rows = np.unique(np.linspace(0, len(trajectory) - 1, min(POINTS, len(trajectory))).astype(np.int64))
     shown = trajectory.rows(rows)
-    position = shown.position[:, [k for k, axis in enumerate(shown.axes) if axis in LINEAR_AXES]]
+    position = three(shown)
     across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
     points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
     tools = tool_lines(plan, TOOLS)
@@ -39,11 +38,9 @@ def path_picture(plan: Plan, size: float) -> str:
     scale = size / max(float(extent.max()), 1e-9)
     points, ends = ((place - low) * scale + 4.0 for place in (points, ends))
     width, height = extent * scale + 8.0
-    asked = np.isfinite(
-        plan.program.feed[shown.block]
-    )  # rapids have the colour of the fastest move with a feed
-    feed = WordFeed(plan.toolpath).of(shown)
-    highest = float(feed[asked].max() if asked.any() else feed.max())
+    columns = MotionColumns(plan, shown)
+    feed = columns["feed"]
+    highest = highest_feed(feed, columns["programmed"])
     colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends

@@ -1,10 +1,7 @@
 // Everything of the page works on columns of numbers (see page.py): c.t, c.feed, c.x ... of the samples, c.line_... of the NC lines.
 (async () => {
   const summary = about.summary;
-  // Okabe and Ito's colours, told apart with red-green blindness too; axes take them in order, limits have theirs from colours.py.
-  const COLOURS = [dark ? "#56B4E9" : "#0072B2", "#E69F00", dark ? "#2fc49a" : "#009E73", "#CC79A7", dark ? "#0072B2" : "#56B4E9", "#D55E00", "#F0E442", "#8c8c8c"];
-  const LOW_TO_HIGH = about.scales[dark ? "dark" : "light"].map((colour, k, all) => [k / (all.length - 1), colour]);
-  const POINTS_OF_PATH = 20000, BUCKETS = 1200;
+  const POINTS_OF_PATH = 20000;
   const mark = (name) => performance.mark(name);
 
   // Header, verdict, prices, notes
@@ -66,35 +63,16 @@
   mark("plotly");
   await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
   mark("columns");
-  const N = c.t.length, axes = about.axes, linear = about.linear;
-  const unit = (axis) => (about.rotary.includes(axis) ? "deg" : "mm");
+  const N = c.t.length, linear = about.linear;
   const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
   const limits = about.limits.map(escaped);
   const text = new TextDecoder().decode(c.program);
   const programLines = text.length ? text.split(/\r\n|\n|\r/) : [];
 
   // The path
-  const colourings = {
-    feed: { column: c.feed, title: "feed [mm/s]", scale: LOW_TO_HIGH },
-    deviation: { column: c.deviation.map((v) => 1000 * v), title: "deviation [µm]", scale: LOW_TO_HIGH },
-    limit: { column: c.limit, title: "", limits: true },
-  };
-  const button = (colour) => document.querySelector(`#colours [data-colour=${colour}]`);
-  if (c.price) colourings.price = { column: c.price, title: "saved [µs per µm]",
-    scale: [[0, rule], [0.02, rule], [0.02, "#f6c667"], [0.5, "#e8743b"], [1, "#7a1f5c"]] };
-  else button("price").remove();
-  const highest = (column, counts) => column.reduce((most, v, k) => (counts(k) && v > most ? v : most), 1e-9);
-  // Rapids would leave one colour for all the rest: the scale is that of the moves with a feed, if there are any.
-  const feeds = c.programmed.some(Number.isFinite) ? (k) => Number.isFinite(c.programmed[k]) : () => true;
-  colourings.feed.highest = highest(c.feed, feeds);
-  for (const name of ["deviation", "price"]) if (colourings[name]) colourings[name].highest = highest(colourings[name].column, () => true);
+  const colourings = about.colourings;
+  if (!colourings.price) document.querySelector("#colours [data-colour=price]").remove();
   let colouring = "feed", range = [0, N - 1], against = "t", now = 0;
-  const limitColour = (k) => about.colours[k];
-  function stepScale() {
-    const scale = [], n = limits.length;
-    limits.forEach((_, k) => scale.push([k / n, limitColour(k)], [(k + 1) / n, limitColour(k)]));
-    return scale;
-  }
   // Samples that are drawn: all that are in sight, or every so many where these are too many; farther away a tenth as many.
   let sight = () => true;
   function pathRows() {
@@ -113,23 +91,11 @@
   const calls = (k) => (c.frame && about.calls[c.frame[k]]) || ""; // that led to the line, in an expanded program
   const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] : 0));
   function pathTrace() {
-    const rows = pathRows(), how = colourings[colouring], line = { width: 5, color: pick(how.column, rows), showscale: true };
-    line.colorbar = { title: { text: how.title, font: { color: ink } }, thickness: 12, len: 0.8, outlinewidth: 0, tickfont: { color: ink } };
-    if (how.limits) {
-      line.colorscale = stepScale();
-      line.cmin = -0.5;
-      line.cmax = limits.length - 0.5;
-      line.colorbar.tickvals = limits.map((_, k) => k);
-      line.colorbar.ticktext = limits;
-    } else {
-      line.colorscale = how.scale;
-      line.cmin = 0;
-      line.cmax = how.highest;
-    }
+    const rows = pathRows(), how = colourings[colouring], line = { ...how[dark ? "dark" : "light"], color: rows.map((k) => how.scale * c[how.column][k]) };
     const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
-      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? c.price[k] : 0]),
+      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? colourings.price.scale * c.price[k] : 0]),
       hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
         "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm" +
         (c.price ? "<br>saved per µm %{customdata[5]:.3g} µs" : "") + "<extra></extra>",
@@ -145,20 +111,15 @@
     const [x, y, z] = place(now);
     return { x: [[x]], y: [[y]], z: [[z]] };
   };
-  const extents = [0, 1, 2].map((a) => [a < linear.length ? c[linear[a]] : [0], Object.values(programmed)[a]].reduce(
-    (found, column) => column.reduce(([low, high], v) => (v === null || Number.isNaN(v) ? [low, high] : [Math.min(low, v), Math.max(high, v)]), found), [Infinity, -Infinity]));
-  const axis3d = (title, visible) => ({ title: { text: title }, color: dim, gridcolor: rule, zerolinecolor: rule, showbackground: false, tickangle: 0, visible });
-  const bare = { displaylogo: false, responsive: true };
-  const modebar = { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink };
   const pathPlot = element("path"), profilePlot = element("profile");
   element("first").remove();
-  const view = fittedScene(extents, pathPlot, axis3d, linear), fitted = view.aspectratio.x;
+  const view = pathLayout(about.view, pathPlot), fitted = view.scene.aspectratio.x;
   await Plotly.newPlot(pathPlot, [
-    { type: "scatter3d", mode: "lines", ...programmed, line: { width: 2, color: dim }, opacity: 0.45, hoverinfo: "skip", name: "programmed" },
+    { ...about.programmed, ...programmed },
     pathTrace(),
     { type: "scatter3d", mode: "markers", x: [place(0)[0]], y: [place(0)[1]], z: [place(0)[2]], hoverinfo: "skip",
       marker: { size: 7, color: dark ? "#ffffff" : "#000000" }, name: "here" },
-  ], { scene: view, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, modebar, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, uirevision: "keep" }, bare);
+  ], view, bare);
   mark("path");
   // Zoomed in, the part in sight is drawn finer: the samples near the axis of sight. The scene's own lengths are those of its aspect ratio.
   let waiting = null;
@@ -185,69 +146,18 @@
     const trace = pathTrace();
     return Plotly.react(pathPlot, [pathPlot.data[0], trace, pathPlot.data[2]], pathPlot.layout, bare);
   }
-  for (const button of element("colours").children) {
-    button.onclick = () => {
-      colouring = button.dataset.colour;
-      for (const other of element("colours").children) other.classList.toggle("on", other === button);
-      redrawPath();
-    };
-  }
+  choice("colours", "colour", (name) => { colouring = name; redrawPath(); });
 
-  // The profiles: of every bucket of samples the least and the greatest value, so that no peak is lost.
-  function bucketed(column, scale = 1) {
-    const [first, last] = range, size = Math.max(1, Math.ceil((last - first + 1) / BUCKETS)), base = c[against], x = [], y = [];
-    for (let from = first; from <= last; from += size) {
-      let low = from, high = from;
-      for (let k = from; k < Math.min(from + size, last + 1); k++) {
-        if (column[k] < column[low]) low = k;
-        if (column[k] > column[high]) high = k;
-      }
-      for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
-        x.push(base[k]);
-        y.push(column[k] * scale);
-      }
-    }
-    return { x, y };
+  // The profiles
+  function drawProfile() {
+    const [data, layout] = panels(about.profile, against, range), base = c[against];
+    layout.xaxis.range = range.map((k) => base[k]);
+    for (const name of ["yaxis", "yaxis2", "yaxis3"]) layout[name] = { ...layout[name], fixedrange: true };
+    layout.shapes = [{ type: "line", xref: "x", yref: "paper", x0: base[now], x1: base[now], y0: 0, y1: 1, line: { color: "#D55E00", width: 1.5 } }, ...layout.shapes];
+    return Plotly.react(profilePlot, data, { ...layout, hovermode: "closest", legend: { orientation: "h", y: 1.06 } }, bare);
   }
-  function profileTraces() {
-    const line = (color, dash) => ({ color, width: dash ? 1 : 1.4, dash });
-    const traces = [
-      { ...bucketed(c.programmed), name: "programmed", line: line(dim, "dash"), yaxis: "y", hoverinfo: "skip" },
-      { ...bucketed(c.feed), name: "feed", line: line(ink), yaxis: "y" },
-    ];
-    axes.forEach((axis, k) => {
-      for (const [kind, place, quantity] of [["a", "y2", "acceleration"], ["j", "y3", "jerk"]]) {
-        const limit = about.machine[axis][quantity];
-        traces.push({ ...bucketed(c[kind + axis], 100 / limit), name: axis, legendgroup: axis, showlegend: kind === "a", line: line(COLOURS[k % 7]),
-          yaxis: place, hovertemplate: `${axis}: %{y:.4g} % of ${digits(limit)} ${unit(axis)}/s${kind === "a" ? "²" : "³"}<extra></extra>` });
-      }
-    });
-    return traces.map((trace) => ({ type: "scatter", mode: "lines", ...trace }));
-  }
-  const yAxis = (title, domain, more) => ({ title: { text: title }, domain, gridcolor: rule, zerolinecolor: rule, fixedrange: true, ...more });
-  function profileLayout() {
-    const bound = (at, place) => ({ type: "line", xref: "paper", x0: 0, x1: 1, yref: place, y0: at, y1: at, line: { color: dim, width: 1, dash: "dot" } });
-    const base = c[against];
-    return {
-      margin: { l: 62, r: 14, t: 8, b: 42 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
-      hovermode: "closest", modebar, legend: { orientation: "h", y: 1.06 },
-      xaxis: { title: { text: against === "t" ? "time [s]" : "length along the path [mm]" }, range: [base[range[0]], base[range[1]]], gridcolor: rule, anchor: "y3" },
-      yaxis: yAxis("feed [mm/s]", [0.7, 1], { rangemode: "tozero" }),
-      yaxis2: yAxis("acceleration<br>[% of the limit]", [0.36, 0.64], { range: [-112, 112], tickvals: [-100, -50, 0, 50, 100] }),
-      yaxis3: yAxis("jerk<br>[% of the limit]", [0, 0.29], { range: [-112, 112], tickvals: [-100, -50, 0, 50, 100] }),
-      shapes: [bound(100, "y2"), bound(-100, "y2"), bound(100, "y3"), bound(-100, "y3"),
-        { type: "line", xref: "x", yref: "paper", x0: base[now], x1: base[now], y0: 0, y1: 1, line: { color: COLOURS[5], width: 1.5 } }],
-    };
-  }
-  const drawProfile = () => Plotly.react(profilePlot, profileTraces(), profileLayout(), bare);
   await drawProfile();
-  for (const button of element("against").children) {
-    button.onclick = () => {
-      against = button.dataset.against;
-      for (const other of element("against").children) other.classList.toggle("on", other === button);
-      drawProfile();
-    };
-  }
+  choice("against", "against", (name) => { against = name; drawProfile(); });
   const find = (column, value) => {
     let low = 0, high = N - 1;
     while (low < high) {
@@ -340,10 +250,10 @@
     { name: "highest feed [mm/s]" }, { name: "held by", text: true }, { name: "deviation [µm]" },
     ...(c.line_more ? [{ name: "10 % more F saves [ms]" }, { name: "10 % more of all limits saves [ms]" }] : []),
   ], [
-    (k) => c.line_number[k], (k) => (programLines[c.line_number[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
+    (k) => c.line_line[k], (k) => (programLines[c.line_line[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
     (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
     ...(c.line_more ? [c.line_more_feed, c.line_more].map((saved) => (k) => Math.round(1e6 * saved[k]) / 1e3) : []),
-  ], c.line_number, c.line_more ? "cells ten" : "cells");
+  ], c.line_line, c.line_more ? "cells ten" : "cells");
   const corner = about.corners;
   if (corner.line && corner.line.length) {
     table("corners", [
@@ -357,14 +267,12 @@
   {
     const word = { none: "nothing", rest: "dwells" };
     const held = Object.entries(summary.held_by || {}).filter(([, share]) => Math.floor(100 * share + 0.5) > 0).reverse();
-    const named = about.limits;
-    const colour = (name) => (named.includes(name) ? limitColour(named.indexOf(name)) : "#606060");
+    const colour = (name) => about.colours[about.limits.indexOf(name)] || "#606060";
     if (held.length) {
       await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(word[name] || name)), x: held.map(([, share]) => 100 * share),
         marker: { color: held.map(([name]) => colour(name)) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
         hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
-      { margin: { l: 110, r: 14, t: 6, b: 40 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
-        xaxis: { title: { text: "share of the cycle time, each in full [%]" }, gridcolor: rule }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
+      { ...look, margin: { l: 110, r: 14, t: 6, b: 40 }, xaxis: { title: { text: "share of the cycle time, each in full [%]" } }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
     } else element("share").remove();
   }
 
@@ -375,7 +283,7 @@
     element("where").textContent = `line ${c.line[k]}${calls(k)}, ${digits(c.feed[k])} mm/s, ${about.limits[c.limit[k]]}`;
     programList.mark(c.line[k] - 1, scroll);
     Plotly.restyle(pathPlot, marker(), [2]);
-    Plotly.relayout(profilePlot, { "shapes[4].x0": c[against][k], "shapes[4].x1": c[against][k] });
+    Plotly.relayout(profilePlot, { "shapes[0].x0": c[against][k], "shapes[0].x1": c[against][k] });
   }
   const sampleOf = (event) => {
     const point = event.points.find((one) => one.data.rows);

@@ -1,34 +1,54 @@
-// The first view of a path in 3-D, for both pages: along its thinnest direction if it is flat, and as large as the box allows.
-// plotly's orthographic camera shows two units of its scene to the height of the box, from any distance; zooming scales the scene.
-const FLAT = 0.12, MARGIN = 1.08, COLOURBAR = 120, FILLED = 0.8, DISTANCE = 2;
-const crossed = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const named = ([x, y, z]) => ({ x, y, z });
+// What the pages draw alike: figures in plotly's words (plotly_figure.py), whose traces name columns instead of numbers.
+const BUCKETS = 1200, COLOURBAR = 120, FILLED = 0.8;
+// Okabe and Ito's colours, told apart with red-green blindness too, and those of text, where the ground is dark.
+const ON_DARK = { "#0072B2": "#56B4E9", "#56B4E9": "#0072B2", "#009E73": "#2fc49a", "#1d2430": ink, "#667085": dim };
+const shade = (colour) => (dark && ON_DARK[colour]) || colour;
+const grid = { gridcolor: rule, zerolinecolor: rule }, inSpace = { ...grid, color: dim, showbackground: false, tickangle: 0 };
+const bare = { displaylogo: false, responsive: true };
+const look = {
+  paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, modebar: { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink },
+  template: { layout: { xaxis: grid, yaxis: grid, scene: { xaxis: inSpace, yaxis: inSpace, zaxis: inSpace } } },
+};
 
-// extents: [low, high] of x, y and z [mm]; box: the element; axis3d: title, shown -> how an axis looks; titles: of the axes
-function fittedScene(extents, box, axis3d, titles) {
-  const lengths = extents.map(([a, b]) => (b > a ? b - a : 0)), size = Math.max(...lengths, 1e-9);
-  const thin = lengths.indexOf(Math.min(...lengths)), flat = lengths[thin] < FLAT * size;
-  // Rows of [right, up]: seen from above, from the front, from the side. What is longer along z than along x, a turned part, lies down.
-  const views = [[[0, 1, 0], [0, 0, 1]], lengths[2] > lengths[0] ? [[0, 0, 1], [1, 0, 0]] : [[1, 0, 0], [0, 0, 1]], [[1, 0, 0], [0, 1, 0]]];
-  let eye, up, right;
-  if (flat) {
-    [right, up] = views[thin];
-    eye = crossed(right, up);
-  } else {
-    const way = [1.2, -1.3, 0.9], far = Math.hypot(...way);
-    eye = way.map((v) => v / far);
-    const across = crossed([0, 0, 1], eye), wide = Math.hypot(...across);
-    right = across.map((v) => v / wide);
-    up = crossed(eye, right);
-  }
-  const ratio = lengths.map((v) => Math.max(v, FLAT / 4 * size) / size); // of a range of MARGIN times as much
-  const seen = (way) => ratio.reduce((sum, v, a) => sum + v * Math.abs(way[a]), 0);
+// A path in 3-D as large as its box allows; wide, high: what it measures on the screen, in units of the scene
+function pathLayout([scene, wide, high], box) {
   const room = Math.max(box.clientWidth - COLOURBAR, 100), height = Math.max(box.clientHeight, 100);
-  const zoom = FILLED * Math.min(2 * room / height / Math.max(seen(right), 1e-9), 2 / Math.max(seen(up), 1e-9));
-  const axis = (a) => {
-    const [low, high] = extents[a][1] >= extents[a][0] ? extents[a] : [0, 0], middle = 0.5 * (low + high), half = 0.5 * MARGIN * ratio[a] * size;
-    return { ...axis3d(titles[a] || "", !(flat && a === thin)), range: [middle - half, middle + half] };
+  const zoom = 2 * FILLED * Math.min(room / height / wide, 1 / high);
+  const aspectratio = Object.fromEntries(Object.entries(scene.aspectratio).map(([axis, ratio]) => [axis, ratio * zoom]));
+  return { ...look, scene: { ...scene, aspectratio }, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, uirevision: "keep" };
+}
+
+// Of every bucket of samples the least and the greatest value, so that no peak is lost.
+function bucketed(base, column, scale, [first, last]) {
+  const size = Math.max(1, Math.ceil((last - first + 1) / BUCKETS)), x = [], y = [];
+  for (let from = first; from <= last; from += size) {
+    let low = from, high = from;
+    for (let k = from; k < Math.min(from + size, last + 1); k++) {
+      if (column[k] < column[low]) low = k;
+      if (column[k] > column[high]) high = k;
+    }
+    for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
+      x.push(base[k]);
+      y.push(column[k] * scale);
+    }
+  }
+  return { x, y };
+}
+
+// Traces and layout of panels over a column; range: of the samples that are shown, all of them where it is not given
+function panels(figure, against, range) {
+  const data = figure.data.map((trace, k) => {
+    const { before, y, scale } = figure.columns[k], base = c[before + against];
+    return { ...trace, line: { ...trace.line, color: shade(trace.line.color) }, ...bucketed(base, c[y], scale, range || [0, base.length - 1]) };
+  });
+  const xaxis = { ...figure.layout.xaxis, title: { text: about.against[against] } };
+  return [data, { ...look, ...figure.layout, xaxis, margin: { l: 62, r: 14, t: 8, b: 42 } }];
+}
+
+// Buttons of which one is on; name: of their choice in the page
+function choice(id, name, chosen) {
+  for (const button of element(id).children) button.onclick = () => {
+    for (const other of element(id).children) other.classList.toggle("on", other === button);
+    chosen(button.dataset[name]);
   };
-  return { aspectmode: "manual", aspectratio: named(ratio.map((v) => v * MARGIN * zoom)), xaxis: axis(0), yaxis: axis(1), zaxis: axis(2),
-    camera: { projection: { type: "orthographic" }, eye: named(eye.map((v) => v * DISTANCE)), up: named(flat ? up : [0, 0, 1]) } };
 }

@@ -69,7 +69,8 @@ def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
     assert browser.execute_script("return comparison.state().hidden") == [1]
     browser.find_element(By.CSS_SELECTOR, "[data-against=line]").click()
     assert (
-        browser.execute_script("return document.getElementById('feed').layout.xaxis.title.text") == "NC line"
+        browser.execute_script("return document.getElementById('profile').layout.xaxis.title.text")
+        == "NC line"
     )
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
     next(pages, None)

@@ -281,7 +281,7 @@ def test_lines_and_places_have_their_prices(page: str, plan: Plan) -> None:
     assert np.array_equal(column(page, "line_more", "<f4"), lines.more.astype(np.float32))
     assert places.tolerance is not None
     price = column(page, "price", "<f4")
-    assert price.max() == pytest.approx(-1e3 * places.tolerance.min(), rel=1e-6)
+    assert price.max() == pytest.approx(-places.tolerance.min(), rel=1e-6)
     assert (price == 0).any(), "far from joints there is none"
 
 

@@ -1,0 +1,175 @@
+"""What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py, toolpath_figure.py), plotly in
+notebooks (interactive/figures.py) and in pages (html/), for which plotly_figure.py puts it into plotly's words.
+
+A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of numbers. A path is
+coloured by a column, too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.units import MICROMETRE
+from planner.job.at_tip import of_axes
+from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.report.colours import COLOURS, DIM, INK
+from planner.report.word_feed import WordFeed
+
+if TYPE_CHECKING:
+    from planner.job.plan import Plan
+    from planner.machine import Machine
+    from planner.motion.trajectory import Trajectory
+    from planner.report.html.data import Samples
+
+AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
+QUANTITIES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
+MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
+FLAT = 0.12  # third extent over the largest below which a path is seen along it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """A line of a panel.
+
+    column : its numbers, in `unit` once times `scale`
+    limit  : what they are held against in that unit; NaN where there is none
+    before : of the column that it is drawn over, before its name in `AGAINST`
+    """
+
+    name: str
+    column: str
+    unit: str
+    colour: str
+    dashed: bool = False
+    scale: float = 1.0
+    limit: float = math.nan
+    before: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """Series over one axis. Those with limits are shown in per cent of them where they share a panel."""
+
+    title: str
+    series: tuple[Series, ...]
+
+    @property
+    def limited(self) -> bool:
+        """Whether all series have limits."""
+        return all(math.isfinite(one.limit) for one in self.series)
+
+
+FEED = Panel(
+    title="feed",
+    series=(
+        Series(name="programmed", column="programmed", unit="mm/s", colour=DIM, dashed=True),
+        Series(name="feed", column="feed", unit="mm/s", colour=INK),
+    ),
+)
+
+
+def profile_panels(machine: Machine, axes: Sequence[str], quantities: Sequence[str]) -> list[Panel]:
+    """The feed, and below it `quantities` of the axes against the machine's limits."""
+    return [FEED] + [
+        Panel(
+            title=quantity,
+            series=tuple(
+                Series(
+                    name=axis,
+                    column=quantity[0] + axis,
+                    unit=("°" if axis in ROTARY_AXES else "mm") + QUANTITIES[quantity],
+                    colour=COLOURS[k % len(COLOURS)],
+                    limit=float(getattr(machine.axes[axis], quantity)),
+                )
+                for k, axis in enumerate(axes)
+            ),
+        )
+        for quantity in quantities
+    ]
+
+
+class MotionColumns:
+    """Columns of N samples of a plan's motion, each (N,), made when they are asked for: t [s], s [mm], line; feed and programmed as F
+    means them, programmed NaN for rapids; x, y ... the place, and vx, ax, jx ... of the axes as the machine gets them [mm, deg, s]."""
+
+    def __init__(self, plan: Plan, shown: Trajectory, joints: Trajectory | None = None):
+        """joints : the samples as the machine gets them, where they are known"""
+        self.shown, self.joints = shown, of_axes(plan, shown) if joints is None else joints
+        self._program, self._word = plan.program, WordFeed(plan.toolpath)
+
+    def __getitem__(self, name: str) -> Array:
+        if name in AGAINST:
+            return np.asarray(getattr(self.shown, name))
+        if name == "feed":
+            return self._word.of(self.shown)
+        if name == "programmed":
+            asked = self._word.programmed(self._program, np.clip(self.shown.block, 0, None))
+            return np.where(np.isfinite(asked), asked, np.nan)
+        if name in self.shown.axes:
+            return _in_degrees(self.shown, "position", name)
+        (quantity,) = (one for one in QUANTITIES if one[0] == name[0])
+        return _in_degrees(self.joints, quantity, name[1:])
+
+
+def _in_degrees(motion: Trajectory, quantity: str, axis: str) -> FloatArray:
+    k = motion.axes.index(axis)
+    return np.asarray(getattr(motion, quantity)[:, k] * motion.in_degrees[k])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Colouring:
+    """How a path is coloured by a field of its `Samples`.
+
+    scale   : from its unit to that of the title [-]
+    highest : the value with the last colour, times `scale`; the first is that of 0
+    names   : of values 0, 1, ... that are no amounts
+    """
+
+    column: str
+    title: str
+    highest: float
+    scale: float = 1.0
+    names: tuple[str, ...] = ()
+
+
+def colourings(samples: Samples) -> dict[str, Colouring]:
+    """The colourings of a motion: "feed", "limit" (which holds it), "deviation", and "price" of the tolerance where it is known."""
+    found = {
+        "feed": Colouring(
+            column="feed", title="feed [mm/s]", highest=highest_feed(samples.feed, samples.programmed)
+        ),
+        "limit": Colouring(column="limit", title="", highest=len(samples.limits) - 0.5, names=samples.limits),
+    }
+    known = [("deviation", "deviation [µm]", samples.deviation, 1.0 / MICROMETRE)]
+    if samples.price is not None:
+        known += [("price", "saved [µs per µm]", samples.price, MICROSECONDS_PER_MICROMETRE)]
+    for name, title, values, scale in known:
+        most = scale * float(values.max(initial=0.0))
+        found[name] = Colouring(column=name, title=title, highest=most, scale=scale)
+    return found
+
+
+def highest_feed(feed: FloatArray, programmed: FloatArray) -> float:
+    """The highest feed (n,) of moves with a programmed one (n,): rapids have its colour, and leave the others theirs."""
+    asked = np.isfinite(programmed)
+    return float(feed[asked].max() if asked.any() else feed.max(initial=0.0))
+
+
+def flat_view(extent: FloatArray) -> list[int] | None:
+    """The two axes that show a nearly flat path of an `extent` (2 or 3,) best; None for a path that needs three."""
+    if len(extent) == 2:
+        return [0, 1]
+    thin = int(extent.argmin())
+    return None if extent[thin] > FLAT * extent.max() else [k for k in range(len(extent)) if k != thin]
+
+
+def three(shown: Trajectory) -> FloatArray:
+    """(N, 3) x, y, z of samples [mm]; 0 for those that are not among the axes."""
+    places = dict(zip(shown.axes, shown.position.T, strict=True))
+    return np.stack([places.get(axis, np.zeros(len(shown))) for axis in LINEAR_AXES], axis=1)

@@ -1,0 +1,142 @@
+"""Figures (figure.py) in plotly's words, without its package: traces and layouts, which a notebook fills with numbers and a page in
+the browser does (html/view.js).
+
+The first view of a path in 3-D is along its thinnest direction if it is flat, and as large as the box allows. plotly's orthographic
+camera shows two units of its scene to the height of the box, from any distance; what a scene measures in those units is its aspect
+ratio.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.machine import LINEAR_AXES
+from planner.report.colours import DIM, LIGHT, LOW_TO_HIGH, PRICES, limit_colours
+from planner.report.figure import AGAINST, FLAT, Colouring, Panel
+
+GAP = 0.07  # between panels, of the height of the figure [-]
+BEYOND = 112  # what is seen of an axis in per cent of limits [%]
+MARGIN = 1.08  # of the axes of a scene over the path [-]
+THIN = FLAT / 4  # an axis is as long as this share of the longest at least [-], so that a line has a scene
+FILLED = 0.8  # share of the box that the path fills [-]; titles of axes stand in the rest
+DISTANCE = 2.0  # of the eye, in units of the scene [-]; it changes nothing in an orthographic view
+AWAY = np.array([1.2, -1.3, 0.9])  # where a path that is not flat is seen from
+BARE = {"l": 0, "r": 0, "t": 0, "b": 0}
+PROGRAMMED = {
+    "type": "scatter3d", "mode": "lines", "name": "programmed", "hoverinfo": "skip", "opacity": 0.5,
+    "line": {"width": 2, "color": DIM},
+}  # fmt: skip
+
+
+def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
+    """`data` and `layout` of panels over an axis of `AGAINST`, and in `columns` of each trace what it lacks: `y`, the name of its
+    column of numbers, what these are multiplied with, and what is `before` the name of the axis for its x."""
+    data, columns, shapes, height = [], [], [], (1.0 + GAP) / len(panels)
+    layout: dict[str, Any] = {"xaxis": {"title": {"text": AGAINST[against]}, "anchor": f"y{len(panels)}"}}
+    named: set[str] = set()
+    for k, panel in enumerate(panels):
+        y, top = "y" if k == 0 else f"y{k + 1}", 1.0 - k * height
+        axis: dict[str, Any] = {"domain": [max(top - height + GAP, 0.0), top], "title": {}}
+        if panel.limited:
+            axis |= {"range": [-BEYOND, BEYOND], "tickvals": [-100, -50, 0, 50, 100]}
+            axis["title"]["text"] = f"{panel.title}<br>[% of limit]"
+            shapes += [
+                {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": y, "y0": at, "y1": at}
+                | {"line": {"color": DIM, "width": 1, "dash": "dot"}}
+                for at in (100, -100)
+            ]
+        else:
+            axis |= {"rangemode": "tozero"}
+            axis["title"]["text"] = f"{panel.title} [{panel.series[0].unit}]"
+        layout["yaxis" + y[1:]] = axis
+        for one in panel.series:
+            line: dict[str, Any] = {"color": one.colour, "width": 1 if one.dashed else 1.4}
+            line["dash"] = "dash" if one.dashed else "solid"
+            trace: dict[str, Any] = {"type": "scatter", "mode": "lines", "name": one.name, "line": line}
+            trace |= {"legendgroup": one.name, "yaxis": y, "showlegend": one.name not in named}
+            scale = one.scale
+            if one.dashed:
+                trace["hoverinfo"] = "skip"
+            if panel.limited:
+                scale *= 100.0 / one.limit
+                said = f"{one.name}: %{{y:.4g}} % of {one.limit:.4g} {one.unit}"
+                trace["hovertemplate"] = f"{said}<extra></extra>"
+            named.add(one.name)
+            data.append(trace)
+            columns.append({"before": one.before, "y": one.before + one.column, "scale": scale})
+    return {"data": data, "layout": layout | {"shapes": shapes}, "columns": columns}
+
+
+def colour_line(colouring: Colouring, ground: str = "light") -> dict[str, Any]:
+    """The `line` of a trace coloured by numbers, on a "light" or a "dark" ground; it lacks these, its `color`."""
+    bar: dict[str, Any] = {"title": {"text": colouring.title}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
+    line = {"width": 5, "showscale": True, "colorbar": bar, "cmin": 0.0, "cmax": colouring.highest}
+    if names := colouring.names:
+        many = len(names)
+        bar |= {"tickvals": list(range(many)), "ticktext": [html.escape(name, quote=False) for name in names]}
+        steps = enumerate(limit_colours(names))
+        scale = [[(k + end) / many, shade] for k, shade in steps for end in (0, 1)]
+        return line | {"cmin": -0.5, "colorscale": scale}
+    if colouring.column == "price":  # nothing is saved far from joints
+        return line | {"colorscale": [[0, LIGHT], [PRICES[0][0], LIGHT], *map(list, PRICES)]}
+    colours = LOW_TO_HIGH[ground]
+    return line | {"colorscale": [[k / (len(colours) - 1), shade] for k, shade in enumerate(colours)]}
+
+
+def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
+    """plotly's `scene` of a path (n, 3) x, y, z [mm] without a zoom, and how wide and high the path then is on the screen, in units of
+    the scene: `aspectratio`, `camera`, and the ranges of the axes."""
+    low, end = points.min(axis=0), points.max(axis=0)
+    length = end - low
+    size = max(float(length.max()), 1e-9)
+    thin = int(length.argmin())
+    flat = bool(length[thin] < FLAT * size)
+    right, up = _flat_view(thin, length) if flat else _view_of_a_body()
+    ratio = np.maximum(length / size, THIN)
+    middle, half = 0.5 * (low + end), 0.5 * MARGIN * ratio * size
+    scene: dict[str, Any] = {
+        f"{letter}axis": {
+            "title": {"text": f"{letter} [mm]"},
+            "range": [float(middle[k] - half[k]), float(middle[k] + half[k])],
+            "visible": not (flat and k == thin),
+        }
+        for k, letter in enumerate(LINEAR_AXES)
+    }
+    scene["camera"] = {
+        "projection": {"type": "orthographic"},
+        "eye": _named(np.cross(right, up) * DISTANCE),
+        "up": _named(up if flat else np.array([0.0, 0.0, 1.0])),
+    }
+    scene |= {"aspectmode": "manual", "aspectratio": _named(MARGIN * ratio)}
+    return scene, float(ratio @ np.abs(right)), float(ratio @ np.abs(up))
+
+
+def scene_in_box(points: FloatArray, room: float) -> dict[str, Any]:
+    """The scene of a path (n, 3) [mm] that fills a box; `room` is the width of that, but for the colour bar, over its height [-]."""
+    scene, wide, high = fitted_scene(points)
+    zoom = FILLED * 2.0 * min(room / wide, 1.0 / high)
+    return scene | {"aspectratio": {axis: zoom * ratio for axis, ratio in scene["aspectratio"].items()}}
+
+
+def _flat_view(thin: int, length: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Right and up of a view along axis `thin`; what is longer along z than along x, a turned part, lies down."""
+    x, y, z = np.eye(3)
+    if thin == 1:
+        return (z, x) if length[2] > length[0] else (x, z)
+    return (y, z) if thin == 0 else (x, y)
+
+
+def _view_of_a_body() -> tuple[FloatArray, FloatArray]:
+    eye = AWAY / np.linalg.norm(AWAY)
+    right = np.cross([0.0, 0.0, 1.0], eye)
+    right /= np.linalg.norm(right)
+    return right, np.cross(eye, right)
+
+
+def _named(values: FloatArray) -> dict[str, float]:
+    return dict(zip("xyz", values.tolist(), strict=True))

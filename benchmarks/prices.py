@@ -28,7 +28,8 @@ from planner.job.plan import Plan
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE, WORTH
+from planner.sensitivity.path_prices import WORTH
+from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE
 from planner.sensitivity.savings import more_of
 
 CORNERS = ("bezier", "auto")

@@ -105,9 +105,7 @@ class Sizes:
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
     # points: beyond, only where it is worth solving again (optimal/tighten.py)
     tightened_everywhere: int = _size(EFFORT, 50_000, 10)
-    # points of all thinned problems together that are no fewer and no more than these
-    priced: tuple[int, int] = _size(EFFORT, (25_000, 200_000), (200, 2_000))
-    priced_window: int = _size(EFFORT, 1_000, 100)  # points of a window, where the thinned grid is too large
+    priced: int = _size(EFFORT, 200_000, 60_000)  # points of all problems solved again for prices: a second
 
     # Pages, pictures and tables.
     page_samples: int = _size(SHOWN, 150_000, 500)  # the page of 250,000 blocks then has less than 20 MB

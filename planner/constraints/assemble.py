@@ -21,15 +21,11 @@ from planner.path.samples import PathSamples
 CURVATURE_MARGIN = 5e-4
 
 
-def feedrate_problem(
-    samples: PathSamples, machine: Machine, *, measured: bool = False, between: bool = True
-) -> FeedrateProblem:
+def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
     measured : the error of the machine's filters is measured afterwards (optimal/behind_filters.py), and bounded here on programmed
         arcs only
-    between  : limits of one's own are looked at between the points, too; False where the points of a grid were thinned out, and an
-        interval may lie on several elements
 
     Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.
     """
@@ -62,7 +58,7 @@ def feedrate_problem(
         feed_sq_start=np.zeros(pieces),
         feed_sq_end=np.zeros(pieces),
     )
-    return with_own_axes(problem, samples, machine, between=between) if machine.own else problem
+    return with_own_axes(problem, samples, machine) if machine.own else problem
 
 
 def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:

@@ -15,21 +15,17 @@ from planner.base.errors import NotSolvedError
 from planner.constraints.limits import VELOCITY
 from planner.constraints.problem import FeedrateProblem
 from planner.machine import Machine
-from planner.path.own_rows import own_rows, own_rows_at_points
+from planner.path.own_rows import own_rows
 from planner.path.samples import PathSamples
 
 
-def with_own_axes(
-    problem: FeedrateProblem, samples: PathSamples, machine: Machine, *, between: bool = True
-) -> FeedrateProblem:
-    """The problem with the machine's own limits as further axes.
-
-    between : they are looked at between the points, too, and the margin says what that finds
+def with_own_axes(problem: FeedrateProblem, samples: PathSamples, machine: Machine) -> FeedrateProblem:
+    """The problem with the machine's own limits as further axes; the margin says what is found between the points.
 
     Raises NotSolvedError where a limit changes faster than the grid follows, InputError for a bound that is not positive and for a
     joint without derivatives.
     """
-    rows = own_rows(samples, machine) if between else own_rows_at_points(samples, machine)
+    rows = own_rows(samples, machine)
     if rows.margin.max() >= 1.0:
         line = int(samples.path.toolpath.line[samples.segment[int(rows.margin.argmax())]])
         all_names = ", ".join(rows.names)

@@ -21,12 +21,11 @@ from planner.report.figure import (
     QUANTITIES,
     MotionColumns,
     Panel,
-    colourings,
     profile_panels,
     three,
 )
 from planner.report.html.data import Samples, programmed_path, samples_of
-from planner.report.plotly_figure import BARE, PROGRAMMED, colour_line, panel_figure, scene_in_box
+from planner.report.plotly_figure import BARE, PROGRAMMED, colourings, panel_figure, scene_in_box
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -67,7 +66,7 @@ class PlanFigures:
         motion = {
             **{"type": "scatter3d", "mode": "lines", "name": "motion"},
             **dict(zip(LINEAR_AXES, xyz.T, strict=True)),
-            "line": colour_line(how) | {"color": how.scale * getattr(samples, how.column)},
+            "line": how["light"] | {"color": how["scale"] * getattr(samples, how["column"])},
             "customdata": np.stack(
                 [samples.shown.line, samples.feed, named, samples.shown.t], axis=1
             ).tolist(),

@@ -39,7 +39,6 @@ from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
 
 BOUND = 0.98  # of what bounds the square of the feed: from there on it does [-]
-DEAR = 0.95  # of what the tolerance costs: the runs on which a wider one is solved for [-]
 PRICED = SIZES.prices_at_once
 FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
@@ -133,38 +132,15 @@ def _bounds(planned: OnPath, on: Array) -> FloatArray:
     return np.stack([feed, np.minimum(across[on], across[on + 1])], axis=1)
 
 
-Bands = tuple[FloatArray, FloatArray]
-
-
-def dear_runs(planned: OnPath, price: FloatArray) -> Array:
-    """(Q,) True for the runs, the dearest first, that together have `DEAR` of what the tolerance costs.
-
-    price : (J,) at every site, from `corridor_prices` [s/mm]
-    """
-    first = _shape(planned).splines.site_first
-    of_run = np.bincount(np.repeat(np.arange(len(first) - 1), np.diff(first)), -price, len(first) - 1)
-    order = np.argsort(-of_run, kind="stable")
-    before = np.cumsum(of_run[order]) - of_run[order]
-    dear = np.zeros(len(of_run), dtype=bool)
-    dear[order[before < DEAR * of_run.sum()]] = True
-    return dear
-
-
-def corridor_prices(planned: OnPath, bands: Bands, more: float = 0.0, on: Array | None = None) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of a corridor wider by `more` [mm], in a round from the present
-    shape, with its `price_bands`; only on some of the runs (Q,), where `on` says which, and 0 on the others."""
-    shape, (H, Q) = _shape(planned), bands
-    if on is not None:
-        fits = shape.splines.fits & on
-        shape = dataclasses.replace(shape, splines=shape.splines._replace(fits=fits))
-    corridor = shape.corridor
-    corridor = corridor._replace(tol=corridor.tol + more, tol_chord=corridor.tol_chord + more)
+def corridor_prices(planned: OnPath) -> FloatArray:
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the corridor in a round from the present shape."""
+    shape, (H, Q) = _shape(planned), price_bands(planned)
     goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
-    relaxed = relax(corridor, shape.splines, shape.runs, shape.used + more, shape.left + more, goal)
+    relaxed = relax(shape.corridor, shape.splines, shape.runs, shape.used, shape.left, goal)
     return np.asarray(-relaxed.multiplier / relaxed.used, dtype=np.float64)
 
 
-def price_bands(planned: OnPath) -> Bands:
+def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
     """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
     (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
     problem, splines = planned.problem, _shape(planned).splines

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 from functools import partial
 
-import numpy as np
-
 from planner.corners.smooth import CornerShape
 from planner.job.job import Delivered, Job
 from planner.job.plan import Plan
@@ -16,10 +14,10 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
 from planner.optimal.notes import path_notes
 from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import corridor_prices, dear_runs, price_bands
+from planner.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
-from planner.sensitivity.prices import MORE_TOLERANCE, WORTH, SitePrices, price_list
+from planner.sensitivity.path_prices import SitePrices, path_prices
 
 
 def plan_of_solution(
@@ -67,12 +65,5 @@ def _prices(best: OnPath, machine: Machine) -> PriceList | None:
     by_site = None
     # what the corridor of the splines costs
     if best.shape is not None and len(best.path.spline) and not machine.own:
-        bands = price_bands(best)
-        now = corridor_prices(best, bands)
-        # where even this slope all along would save next to nothing, the least is nothing
-        worth = -now.sum() * MORE_TOLERANCE >= WORTH * best.solution.cycle_time
-        wider = np.zeros(len(now))
-        if worth:  # on cheap runs, too, the least is nothing
-            wider = corridor_prices(best, bands, MORE_TOLERANCE, dear_runs(best, now))
-        by_site = SitePrices(place=best.shape.splines.sites.place, now=now, wider=wider)
-    return price_list(best.samples, best.problem, best.solution, machine, by_site)
+        by_site = SitePrices(place=best.shape.splines.sites.place, price=corridor_prices(best))
+    return path_prices(best.samples, best.problem, best.solution, machine, by_site)

@@ -117,45 +117,6 @@ def own_rows(samples: PathSamples, machine: Machine, resolution: float = np.inf)
     )
 
 
-def own_rows_at_points(samples: PathSamples, machine: Machine) -> OwnRows:
-    """The rows of the machine's own limits at the points alone, nothing looked at between them: for grids that were thinned out, whose
-    intervals may lie on several elements."""
-    axes, points = samples.path.toolpath.axes, len(samples)
-    left = (samples.position, samples.d1, samples.d2_left, samples.d3_left)
-    right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
-    here = Place(axes, list(samples.position.T), samples.d1, _block(samples))
-    real = _real_bounds(samples, machine, np.arange(points), np.stack(right, axis=1))
-    v = np.sqrt(real.feed_sq)
-    columns: list[dict[str, FloatArray]] = []
-    for limit in machine.own:
-        before, after = _along(limit, axes, left, here), _along(limit, axes, right, here)
-        bound, size = bounds_at(limit, here, points), np.abs(after[0])
-        second = size * real.acceleration + np.abs(after[1]) * real.feed_sq
-        third = size * real.jerk + 3.0 * np.abs(after[1]) * v * real.acceleration + np.abs(after[2]) * v**3
-        with np.errstate(divide="ignore"):
-            feed_sq = (bound[:, 0] / size) ** 2
-        columns.append(
-            {
-                "d1": after[0],
-                "d2_left": before[1],
-                "d2_right": after[1],
-                "d3_left": before[2],
-                "d3_right": after[2],
-                "least": bound.min(axis=0),
-                "acceleration": np.minimum(bound[:, 1], BEYOND * second.max(initial=1.0)),
-                "jerk": np.minimum(bound[:, 2], BEYOND * third.max(initial=1.0)),
-                "feed_sq_max": feed_sq,
-            }
-        )
-    stacked = {name: np.stack([column[name] for column in columns], axis=1) for name in columns[0]}
-    return OwnRows(
-        names=tuple(limit.name for limit in machine.own),
-        error=np.zeros(points),
-        coarse=np.zeros(points, dtype=bool),
-        **stacked,
-    )
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Real:
     """What the machine's axes allow on each interval (n,): feed^2, acceleration along the path, and jerk."""

@@ -1,8 +1,7 @@
 """What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py, toolpath_figure.py), plotly in
 notebooks (interactive/figures.py) and in pages (html/), for which plotly_figure.py puts it into plotly's words.
 
-A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of numbers. A path is
-coloured by a column, too.
+A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.units import MICROMETRE
 from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.report.colours import COLOURS, DIM, INK
@@ -25,11 +23,9 @@ if TYPE_CHECKING:
     from planner.job.plan import Plan
     from planner.machine import Machine
     from planner.motion.trajectory import Trajectory
-    from planner.report.html.data import Samples
 
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
 QUANTITIES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
-MICROSECONDS_PER_MICROMETRE = 1e3  # of a price [s/mm]
 FLAT = 0.12  # third extent over the largest below which a path is seen along it
 
 
@@ -120,39 +116,6 @@ class MotionColumns:
 def _in_degrees(motion: Trajectory, quantity: str, axis: str) -> FloatArray:
     k = motion.axes.index(axis)
     return np.asarray(getattr(motion, quantity)[:, k] * motion.in_degrees[k])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Colouring:
-    """How a path is coloured by a field of its `Samples`.
-
-    scale   : from its unit to that of the title [-]
-    highest : the value with the last colour, times `scale`; the first is that of 0
-    names   : of values 0, 1, ... that are no amounts
-    """
-
-    column: str
-    title: str
-    highest: float
-    scale: float = 1.0
-    names: tuple[str, ...] = ()
-
-
-def colourings(samples: Samples) -> dict[str, Colouring]:
-    """The colourings of a motion: "feed", "limit" (which holds it), "deviation", and "price" of the tolerance where it is known."""
-    found = {
-        "feed": Colouring(
-            column="feed", title="feed [mm/s]", highest=highest_feed(samples.feed, samples.programmed)
-        ),
-        "limit": Colouring(column="limit", title="", highest=len(samples.limits) - 0.5, names=samples.limits),
-    }
-    known = [("deviation", "deviation [µm]", samples.deviation, 1.0 / MICROMETRE)]
-    if samples.price is not None:
-        known += [("price", "saved [µs per µm]", samples.price, MICROSECONDS_PER_MICROMETRE)]
-    for name, title, values, scale in known:
-        most = scale * float(values.max(initial=0.0))
-        found[name] = Colouring(column=name, title=title, highest=most, scale=scale)
-    return found
 
 
 def highest_feed(feed: FloatArray, programmed: FloatArray) -> float:

@@ -10,14 +10,18 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES
 from planner.report.colours import DIM, LIGHT, LOW_TO_HIGH, PRICES, limit_colours
-from planner.report.figure import AGAINST, FLAT, Colouring, Panel
+from planner.report.figure import AGAINST, FLAT, Panel, highest_feed
+
+if TYPE_CHECKING:
+    from planner.report.html.data import Samples
 
 GAP = 0.07  # between panels, of the height of the figure [-]
 BEYOND = 112  # what is seen of an axis in per cent of limits [%]
@@ -72,20 +76,46 @@ def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
     return {"data": data, "layout": layout | {"shapes": shapes}, "columns": columns}
 
 
-def colour_line(colouring: Colouring, ground: str = "light") -> dict[str, Any]:
-    """The `line` of a trace coloured by numbers, on a "light" or a "dark" ground; it lacks these, its `color`."""
-    bar: dict[str, Any] = {"title": {"text": colouring.title}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
-    line = {"width": 5, "showscale": True, "colorbar": bar, "cmin": 0.0, "cmax": colouring.highest}
-    if names := colouring.names:
-        many = len(names)
-        bar |= {"tickvals": list(range(many)), "ticktext": [html.escape(name, quote=False) for name in names]}
-        steps = enumerate(limit_colours(names))
-        scale = [[(k + end) / many, shade] for k, shade in steps for end in (0, 1)]
-        return line | {"cmin": -0.5, "colorscale": scale}
-    if colouring.column == "price":  # nothing is saved far from joints
-        return line | {"colorscale": [[0, LIGHT], [PRICES[0][0], LIGHT], *map(list, PRICES)]}
-    colours = LOW_TO_HIGH[ground]
-    return line | {"colorscale": [[k / (len(colours) - 1), shade] for k, shade in enumerate(colours)]}
+def colourings(samples: Samples) -> dict[str, dict[str, Any]]:
+    """How a path is coloured, by name: "feed", "limit" (which holds it), "deviation", and "price" of the
+    tolerance where it is known. Each has its `column` of the samples, what that is multiplied with (`scale`),
+    and on a "light" and a "dark" ground the `line` of a trace, but for its numbers."""
+    many, shades = len(samples.limits), limit_colours(samples.limits)
+    steps = [[(k + end) / many, shade] for k, shade in enumerate(shades) for end in (0, 1)]
+    ticks = {
+        "tickvals": list(range(many)),
+        "ticktext": [html.escape(one, quote=False) for one in samples.limits],
+    }
+    dear = [[0, LIGHT], [PRICES[0][0], LIGHT], *map(list, PRICES)]  # nothing is saved far from joints
+    even = {
+        ground: [[k / (len(shades) - 1), shade] for k, shade in enumerate(shades)]
+        for ground, shades in LOW_TO_HIGH.items()
+    }
+    feed, price = highest_feed(samples.feed, samples.programmed), samples.price
+    found = {}
+    for column, title, scale, most, scales in (
+        ("feed", "feed [mm/s]", 1.0, feed, even),
+        ("limit", "", 1.0, many - 0.5, dict.fromkeys(even, steps)),
+        ("deviation", "deviation [µm]", 1.0 / MICROMETRE, samples.deviation.max(initial=0.0), even),
+        (
+            "price",
+            "saved [µs per µm]",
+            1e3,
+            0.0 if price is None else price.max(initial=0.0),
+            dict.fromkeys(even, dear),
+        ),
+    ):
+        if getattr(samples, column) is None:
+            continue
+        bar = {"title": {"text": title}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
+        line: dict[str, Any] = {"width": 5, "showscale": True, "cmin": 0.0, "cmax": scale * float(most)}
+        line["colorbar"] = bar
+        if column == "limit":
+            line |= {"cmin": -0.5, "colorbar": bar | ticks}
+        found[column] = {"column": column, "scale": scale} | {
+            ground: line | {"colorscale": colours} for ground, colours in scales.items()
+        }
+    return found
 
 
 def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:

@@ -33,16 +33,14 @@ from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import lesser_end
-from planner.job.records import SAVED_MIN, DearCorners
+from planner.job.records import DearCorners
 from planner.machine import Machine
 from planner.path.rows import FREE_PART_MIN
 from planner.path.samples import PathSamples, moved_grid
+from planner.sensitivity.prices import MORE_TOLERANCE, STEP, dearest_of
 from planner.sensitivity.savings import more_of
 
-MORE_TOLERANCE = 0.01  # what is saved is told for so much more tolerance [mm]
-DEAREST = 10  # corners that are listed
-STEP = 1e-4  # relative steps of differences [-]: far above rounding, far below what bends a curve ...
-STEP_OF_LEG = 1e-2  # ... and at most this share of the free part of a leg [-]
+STEP_OF_LEG = 1e-2  # of differences, at most: a share of the free part of a leg [-]
 CANDIDATES = 30  # corners whose own price is looked at
 # Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round (corners/sharing.py).
 REACH = 12
@@ -104,16 +102,7 @@ class CornerPrices:
                 near = slice(max(joint[k] - REACH, 0), joint[k] + REACH + 1)
                 price[k] = change[near].sum() / step[joint[k]]
         saved = np.asarray(_saved(price, self.path.tol[joint]))
-        best = np.argsort(-saved, kind="stable")[:DEAREST]
-        best = best[saved[best] >= SAVED_MIN]
-        joint = joint[best]
-        return DearCorners(
-            line=toolpath.line[at[joint] - 1],
-            position=toolpath.end[at[joint] - 1],
-            theta=self.path.theta[joint],
-            price=price[best],
-            saved=saved[best],
-        )
+        return dearest_of(toolpath, at[joint], price, saved)
 
     def _shares_leg(self) -> Array:
         """(R+1,) True for the corners that can take something from a neighbour: a leg beside them has next to nothing free."""

@@ -5,50 +5,34 @@ limit acts at every step through its price there; the tolerance, and acceleratio
 
     dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
 
-**Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3), one that acceleration lets
-through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln limit) foretells for r times the limit
+Finite changes are foretold as prices.py says.
 
-    T(r) - T(1)  =  p/n (1 - r^-n),      n = 1/3 for jerk and tolerance, 1/2 for accelerations, 1 for velocities and the feed,
-
-and the range is by `WITHIN` of it narrower and wider, and by `UNREST` of the time, by which a motion searched for again ends elsewhere.
-
-Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as in sensitivity/prices.py; where an
-axis can follow only a part of ten per cent more feed, in the direction that the motion has, that part is what counts, and the least is
-twice as far below it: accelerations behind it hold the motion back, too. Where the start's motion stays nothing is priced.
+Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as on a path (path_prices.py); where
+an axis can follow only a part of ten per cent more feed, in the direction that the motion has, that part is what counts. Where the
+start's motion stays nothing is priced.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from math import fsum  # `sum` rounds otherwise from Python 3.12 on
-from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
+from planner.job.records import PlacePrices, PriceList
 from planner.machine import Machine
-from planner.sensitivity.corner_prices import DEAREST, MORE_TOLERANCE, STEP
-from planner.sensitivity.places import MORE_LIMIT
-from planner.sensitivity.prices import Saving
+from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, price_list
 from planner.sensitivity.savings import more_of
 from planner.tube import price
 from planner.tube.parts import FoundRun
 from planner.tube.run import budgets_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of tube/price.py
-TOLERANCE = "tolerance"
-# T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with acceleration, with jerk.
-POWER = {
-    **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
-    **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},
-}
-# How far a change foretold to 10 % more of a limit may be off [-], and by how much a plan made again is faster or slower for no other
-# reason [share of the time] (benchmarks/found_prices.py).
-WITHIN, UNREST = 0.1, 2e-4
-ROUNDING = 1e-9  # of sums over steps [-]
+# By how much a plan made again is faster or slower for no other reason [share of the time] (benchmarks/found_prices.py).
+UNREST = 2e-4
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
 TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5
 
@@ -110,26 +94,6 @@ class RunPrices:
         return np.clip(nearer, 1, legs - 1) if legs > 1 else nearer
 
 
-class Priced(NamedTuple):
-    """dT/d(ln) of a limit or of the tolerance [s], and the share of it that what is saved is told for."""
-
-    kind: str
-    slope: float
-    ratio: float
-
-    def saved(self) -> float:
-        """What the power law of its kind foretells [s]."""
-        n = POWER[self.kind]
-        return -self.slope / n * (1.0 - self.ratio**-n)
-
-    def saving(self, bound: float) -> Saving:
-        """The least and the most of it, where it is at most `bound` [s]."""
-        saved = min(self.saved(), bound)
-        partly = bound < (1.0 - ROUNDING) * self.saved()
-        least = 1.0 - (2.0 if partly else 1.0) * WITHIN
-        return Saving(*sorted((least * saved, (1.0 + WITHIN) * saved)))
-
-
 def found_prices(
     toolpath: Toolpath, machine: Machine, found: list[FoundRun], cycle_time: float
 ) -> PriceList | None:
@@ -143,27 +107,16 @@ def found_prices(
         return None
     limit, slope = _of_limits(toolpath, machine, runs)
     of_tolerance = _OfTolerance(toolpath, machine, runs)
-    tolerance, present = float(of_tolerance.together.sum()), _present(toolpath)
-    more = {name: Priced(name.partition(".")[0], slope[name], 1.0 + MORE_LIMIT) for name in slope}
-    more[TOLERANCE] = Priced(TOLERANCE, tolerance * present, 1.0 + MORE_TOLERANCE / present)
-    # Slower by 1.1, a motion with 1.1 of one limit keeps all the old ones.
-    most = cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-    at_feed = fsum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)
-    ranges = {
-        name: priced.saving(at_feed if name == FEED.name else np.inf).widened(UNREST * cycle_time)
-        for name, priced in more.items()
-    }
-    bound = {name: cycle_time if name == TOLERANCE else most for name in ranges}
-    saved = {name: min(saving.middle, bound[name]) for name, saving in ranges.items()}
-    ranges = {name: saving.below(bound[name]) for name, saving in ranges.items()}
-    return PriceList(
-        limits={name: slope[name] / limit[name] for name in limit},
-        feed=slope[FEED.name],
-        tolerance=tolerance,
-        saved=saved,
-        corners=_dearest(toolpath, of_tolerance.alone),
-        ranges={name: (saving.least, saving.most) for name, saving in ranges.items()},
-        hints=tuple(name for name, saving in ranges.items() if saving.vague(cycle_time)),
+    return price_list(
+        limit,
+        slope,
+        float(of_tolerance.together.sum()),
+        toolpath,
+        cycle_time,
+        bounds={FEED.name: fsum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)},
+        solved={},
+        unrest=UNREST,
+        corners=dearest(toolpath, of_tolerance.alone),
         places=_by_place(toolpath, runs, of_tolerance.together),
     )
 
@@ -224,28 +177,6 @@ class _OfTolerance:
         grows_behind = np.append(tolerance[:-1] >= tolerance[1:], False)
         beside = grows_before * np.append(0.0, segment) + grows_behind * np.append(segment, 0.0)
         self.alone = np.where(toolpath.joint == Joint.STOP, 0.0, (vertex + beside) / tolerance)
-
-
-def _present(toolpath: Toolpath) -> float:
-    """The tolerance of most joints between blocks [mm]."""
-    inner = toolpath.tolerance[toolpath.joint != Joint.STOP]
-    return float(np.median(inner if len(inner) else toolpath.tolerance))
-
-
-def _dearest(toolpath: Toolpath, alone: FloatArray) -> DearCorners:
-    """The joints where more tolerance saves most, of prices (M+1,)."""
-    tolerance = toolpath.tolerance
-    n = POWER[TOLERANCE]
-    saved = -alone * tolerance / n * (1.0 - (1.0 + MORE_TOLERANCE / tolerance) ** -n)
-    best = np.argsort(-saved, kind="stable")[:DEAREST]
-    best = best[saved[best] >= SAVED_MIN]
-    return DearCorners(
-        line=toolpath.line[best - 1],
-        position=toolpath.end[best - 1],
-        theta=toolpath.theta[best],
-        price=alone[best],
-        saved=saved[best],
-    )
 
 
 def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -> PlacePrices:

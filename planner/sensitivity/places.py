@@ -2,7 +2,7 @@
 
 The Lagrangian is a sum over the intervals of the grid (feedrate/lagrangian.py), so what changes on one segment alone, an F word or the
 limits there, is priced by the multipliers of its own points and intervals. For a finite change, straight lines in one over the limit
-are taken, as for the limits of the whole program (sensitivity/prices.py):
+are taken, as for the limits of the whole program (sensitivity/path_prices.py):
 
     feed    -2 sum mu_i (1 - sqrt(X_i / X'_i))             X, X' the bounds of feed^2 without and with more of the programmed feed
     limits  (sum lam g + 2 sum mu_i) (1 - 1/(1 + more))     all bounds at once: of feed, velocity, acceleration and jerk
@@ -25,10 +25,10 @@ from planner.feedrate.lagrangian import Lagrangian
 from planner.job.records import PlacePrices
 from planner.machine import Machine
 from planner.path.samples import PathSamples
+from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.savings import Change
 
 SPEEDS = (FEED, VELOCITY)
-MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-]
 
 
 def by_place(

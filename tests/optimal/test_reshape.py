@@ -28,7 +28,7 @@ from planner.optimal.corner_times import CornerBounds, corner_times
 from planner.optimal.effort import COARSE, Grids
 from planner.optimal.on_path import OnPath
 from planner.optimal.order import second_order
-from planner.optimal.reshape import DEAR, corridor_prices, dear_runs, price_bands
+from planner.optimal.reshape import price_bands
 from planner.path.samples import RESOLUTION, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
@@ -191,25 +191,6 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     assert not order.paths
     assert list(left) == [0]
     assert best is splines
-
-
-def test_a_wider_tolerance_is_priced_on_the_dear_runs_alone():
-    """Two bends with a long leg between them, and a slight one: the runs that cost least are left out, and cost nothing then."""
-    program = parse_program(
-        "G21 G90 G17 G64 P0.05 F6000\nG1 X60 Y0\nG1 X60 Y60\nG4 P0.1\nG1 X0 Y60\nG1 X-60 Y60.5\nM2\n"
-    )
-    rounded, shape = shaped(program)
-    planned = planned_on(with_spline(rounded, shape), shape=shape)
-    bands = price_bands(planned)
-    price = corridor_prices(planned, bands)
-    dear = dear_runs(planned, price)
-    of_run = np.add.reduceat(price, shape.splines.site_first[:-1])
-    assert len(of_run) == 2
-    assert 0 < dear.sum() < len(dear)
-    assert of_run[dear].sum() <= DEAR * of_run.sum()
-    only = corridor_prices(planned, bands, on=dear)
-    of_site = np.repeat(dear, np.diff(shape.splines.site_first))
-    np.testing.assert_array_equal(only, np.where(of_site, price, 0.0))
 
 
 def test_bands_are_the_same_in_parts_of_any_size(monkeypatch):

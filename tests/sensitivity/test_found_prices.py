@@ -16,7 +16,7 @@ from planner.methods.optimal import OptimalMethod
 from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
 from planner.sensitivity.found_prices import found_prices
-from planner.sensitivity.places import MORE_LIMIT
+from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.savings import more_of
 from planner.study.forecast import forecast
 from planner.study.settings import Setting

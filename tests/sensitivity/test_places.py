@@ -16,7 +16,8 @@ from planner.job.plan import Plan
 from planner.job.records import PlacePrices
 from planner.machine import load_machine
 from planner.path.samples import sample_path
-from planner.sensitivity.places import MORE_LIMIT, bounds_but_speeds, bounds_with
+from planner.sensitivity.places import bounds_but_speeds, bounds_with
+from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.savings import Change, more_of
 
 MILL = load_machine("mill")

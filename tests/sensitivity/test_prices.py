@@ -23,7 +23,8 @@ from planner.nc.reader import parse_program
 from planner.optimal.geometry import corner_shape
 from planner.path.samples import sample_path
 from planner.sensitivity import prices
-from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, SitePrices, price_list
+from planner.sensitivity.path_prices import SitePrices, path_prices
+from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 
 MACHINE = problems.machine()
 LINES = "G21 G90 G17\nF4800\nG1 X3\nX4 Y2.5\nX9 Y3\nX9.2 Y6\nX6 Y9\nX0 Y9.5\n"
@@ -69,7 +70,7 @@ class Job:
         return self.solution.cycle_time
 
     def prices(self):
-        return price_list(self.samples, self.problem, self.solution, self.machine)
+        return path_prices(self.samples, self.problem, self.solution, self.machine)
 
     def slope(self, changed) -> float:
         """dT/d(ln of something) from two more plans; `changed(factor)` gives what differs."""
@@ -217,9 +218,9 @@ def test_shapes_found_again_differ_by_so_much_that_ranges_on_splines_are_as_wide
     """By 1e-3 of the time on both sides, and by nothing where single corners are computed; z does not move."""
     job = Job(parse_program(LINES))
     site = np.array([4.0])
-    splines = SitePrices(place=site, now=np.array([-1e-6]), wider=np.array([-1e-6]))
+    splines = SitePrices(place=site, price=np.array([-1e-6]))
     for by_site, unrest in ((splines, 1e-3), (None, 0.0)):
-        told = price_list(job.samples, job.problem, job.solution, MACHINE, by_site)
+        told = path_prices(job.samples, job.problem, job.solution, MACHINE, by_site)
         for name in ("acceleration.z", "jerk.z"):
             assert told.ranges[name] == pytest.approx((-unrest * job.time, unrest * job.time), abs=1e-9)
 
@@ -285,7 +286,7 @@ def test_paths_of_another_kind_do_not_know_what_the_tolerance_costs():
     job = Job(text(LINES))
     path = job.samples.path
     samples = dataclasses.replace(job.samples, path=OtherPath(path.toolpath, path.tol, path.tol_ap))
-    priced = price_list(samples, job.problem, job.solution, job.machine)
+    priced = path_prices(samples, job.problem, job.solution, job.machine)
     known = job.prices()
     assert priced.tolerance is None
     assert priced.corners is None
@@ -303,7 +304,7 @@ def test_paths_of_another_kind_do_not_know_what_the_tolerance_costs():
 def test_a_solver_without_multipliers_has_no_prices():
     job = Job(text(LINES))
     with pytest.raises(ValueError, match="no multipliers"):
-        price_list(job.samples, job.problem, dataclasses.replace(job.solution, multipliers=None), MACHINE)
+        path_prices(job.samples, job.problem, dataclasses.replace(job.solution, multipliers=None), MACHINE)
 
     class Silent:
         def solve(self, problem, progress=None):

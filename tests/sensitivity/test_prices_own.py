@@ -11,7 +11,7 @@ from benchmarks.prices import compared
 from planner import JointLimit, PathLimit
 from planner.constraints.own import Place, ScaledLimit
 from planner.nc.reader import parse_program
-from planner.sensitivity.prices import WORTH
+from planner.sensitivity.path_prices import WORTH
 
 JOB = "G21 G90 G64 P0.05\nF6000\nG1 X12 Y3\nX18 Y0\nG3 X24 Y6 I0 J6\nG1 X12 Y12\nM2\n"
 MACHINE = problems.machine()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +12,8 @@ from benchmarks import problems
 from benchmarks.prices import compared, with_more
 from planner.nc.reader import parse_program
 from planner.sensitivity import savings
-from planner.sensitivity.prices import HINT_LEAST, MORE_LIMIT, UNREST, WORTH, price_list
+from planner.sensitivity.path_prices import UNREST, WORTH, path_prices
+from planner.sensitivity.prices import HINT_LEAST, MORE_LIMIT, WITHIN
 
 MACHINE = problems.machine()
 MOST = 1.0 - 1.0 / (1.0 + MORE_LIMIT)  # share of the time that a tenth more of one limit can save
@@ -78,7 +78,7 @@ def test_a_tenth_more_of_anything_saves_no_more_than_everything_a_tenth_faster(o
                 assert row["found_s"] <= (MOST + HINT_LEAST) * result["cycle_time_s"]
 
 
-@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
+@pytest.mark.usual_sizes  # plans are made more finely
 @pytest.mark.parametrize("corner", ["bezier", "auto"])
 def test_at_a_crawl_the_feed_saves_all_that_can_be_saved_and_nothing_else_saves_anything(corner):
     program = parse_program(LINES.replace("F4800", "F240"), MACHINE)
@@ -93,7 +93,7 @@ def test_at_a_crawl_the_feed_saves_all_that_can_be_saved_and_nothing_else_saves_
 
 
 def test_the_prices_of_a_plan_sum_up_to_its_time():
-    """Time k times as fast is velocities times k, accelerations k^2, jerks k^3, feeds k, periods 1/k (sensitivity/prices.py's own law),
+    """Time k times as fast is velocities times k, accelerations k^2, jerks k^3, feeds k, periods 1/k (path_prices.py's own law),
     here with the problem that the plan ended with, limit_scale and all."""
     machine = problems.machine(dt=1e-5)
     plan = planner.plan(parse_program(LINES, machine), machine, method="optimal", corner="bezier")
@@ -117,87 +117,47 @@ def test_where_feed_and_an_axis_are_equally_fast_neither_alone_is_worth_anything
 
 @pytest.fixture(scope="module")
 def solved():
-    """What `price_list` gets of a plan."""
+    """What `path_prices` gets of a plan."""
     got = {}
     from planner.optimal import result
 
     def kept(*given):
         got["given"] = given
-        return price_list(*given)
+        return path_prices(*given)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(result, "price_list", kept)
+        patch.setattr(result, "path_prices", kept)
         planner.plan(problems.zigzag(), MACHINE, method="optimal", corner="bezier")
     return got["given"][:4]
 
 
-def test_windows_of_a_grid_foretell_what_the_whole_grid_foretells(solved, monkeypatch):
-    whole = price_list(*solved)
-    monkeypatch.setattr(savings, "POINTS", 1)  # a quarter of the job's grid is left: windows
-    monkeypatch.setattr(savings, "WINDOW", 250)
-    part = savings.thinned(*solved, rows=3)
-    assert part.sampled
-    assert len(part.samples) < 1000
-    sampled = price_list(*solved)
+@pytest.mark.usual_sizes
+def test_a_long_job_is_solved_again_for_what_saves_most_only(solved, monkeypatch):
+    """The others are foretold by their prices, as a range: near what is found where a limit holds all along."""
+    samples, whole = solved[0], path_prices(*solved)
+    first = max(whole.saved, key=lambda name: whole.saved[name])
+    monkeypatch.setattr(savings, "POINTS", 2 * len(samples))
+    assert path_prices(*solved).saved[first] == whole.saved[first]
+    monkeypatch.setattr(savings, "POINTS", len(samples))
+    told = path_prices(*solved)
     for name in ("acceleration.y", "jerk.x", "tolerance"):
-        least, most = sampled.ranges[name]
-        assert least <= whole.saved[name] * 1.1
-        assert most >= whole.saved[name] * 0.9
-        assert sampled.saved[name] == pytest.approx(whole.saved[name], rel=0.15)
-
-
-@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
-def test_a_thinned_grid_keeps_ends_slow_places_and_elements(solved):
-    samples, problem, solution, machine = solved
-    part = savings.thinned(samples, problem, solution, machine, rows=3)
-    assert not part.sampled
-    assert len(part.samples) < 0.5 * len(samples)
-    assert part.solution.cycle_time == pytest.approx(solution.cycle_time, rel=0.01)
-    assert part.samples.s[-1] == pytest.approx(samples.s[-1], rel=1e-9)
-    assert set(np.unique(part.samples.element)) == set(np.unique(samples.element))
+        least, most = told.ranges[name]
+        assert most - least == pytest.approx(2.0 * WITHIN * told.saved[name])
+        assert told.saved[name] == pytest.approx(whole.saved[name], rel=0.12)
 
 
 def test_legs_that_a_wider_tolerance_opens_count(solved):
     """A path whose corners are made smaller has free parts of legs that its grid does not know: they take their time."""
-    samples, problem, solution, machine = solved
-    part = savings.thinned(samples, problem, solution, machine, rows=3)
+    samples, _, solution, _ = solved
     path = samples.path
     free = path.legs.length - path.d_out[:-1] - path.d_in[1:]
     closed = np.flatnonzero(free < 1e-9)
-    assert part.opened(path) == pytest.approx(0.0, abs=1e-9)
+    assert savings.opened(samples, solution, path) == pytest.approx(0.0, abs=1e-9)
     smaller = dataclasses.replace(path, d=0.9 * path.d)
-    opened = part.opened(smaller)
+    opened = savings.opened(samples, solution, smaller)
     if not len(closed):
         assert opened == 0.0
         return
     gaps = (smaller.legs.length - smaller.d_out[:-1] - smaller.d_in[1:])[closed]
     v = np.sqrt(solution.feed_sq[solution.feed_sq > 0.0])
     assert gaps.sum() / v.max() <= opened <= gaps.sum() / v.min()
-
-
-def test_windows_hold_whole_pieces_however_short_and_parts_with_room_to_start_and_stop():
-    """400 pieces of 10 points, then one of 5000: windows of the first hold whole pieces, none has a part that is too short."""
-    piece = np.append(np.arange(0, 4001, 10), 9000)
-    kept = np.arange(9000)
-    edges, points, sampled = savings.windows_of_grid(piece, kept, 3_000)
-    assert sampled
-    assert 2_500 <= len(points) <= 3_000
-    for a, b in pairwise(edges):
-        part = points[a:b]
-        assert (np.diff(part) == 1).all()
-        inside = np.searchsorted(piece, part[0], side="right") - 1
-        assert part[-1] < piece[inside + 1]
-        whole = part[0] == piece[inside] and part[-1] + 1 == piece[inside + 1]
-        assert whole or len(part) > savings.INTERVALS_MIN
-    assert (points < 4000).any()
-    assert savings.windows_of_grid(piece, kept, 9_000)[2] is False
-
-
-@pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
-def test_a_grid_that_fits_in_one_window_is_taken_whole():
-    """Many limits leave each of their problems fewer points than a window has."""
-    kept = np.arange(0, 1_800, 2)
-    assert len(kept) < savings.WINDOW
-    edges, points, sampled = savings.windows_of_grid(np.array([0, 800, 1_800]), kept, len(kept) - 100)
-    np.testing.assert_array_equal(points, kept)
-    assert (edges.tolist(), sampled) == ([0, 400, 900], False)

@@ -18,13 +18,13 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
-from planner.report.colours import LOW_TO_HIGH, limit_colours
+from planner.report.colours import limit_colours
 from planner.report.export import json_ready, summary
-from planner.report.figure import AGAINST, MotionColumns, colourings, profile_panels, three
+from planner.report.figure import AGAINST, MotionColumns, profile_panels, three
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.html.picture import path_picture
-from planner.report.plotly_figure import PROGRAMMED, colour_line, fitted_scene, panel_figure
+from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
 from planner.report.replace import check_file
 from planner.report.rows import plan_rows
 
@@ -92,11 +92,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "linear": [axis for axis in shown.axes if axis in LINEAR_AXES],
         "limits": list(samples.limits),
         "colours": limit_colours(samples.limits),
-        "colourings": {
-            name: {"column": how.column, "scale": how.scale}
-            | {ground: colour_line(how, ground) for ground in LOW_TO_HIGH}
-            for name, how in colourings(samples).items()
-        },
+        "colourings": colourings(samples),
         "programmed": PROGRAMMED,
         "profile": figure,
         "against": AGAINST,

@@ -1,0 +1,165 @@
+"""What the limits cost: by how much the cycle time of a time-optimal plan changes with each of them, and which corners are dear.
+
+The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed (feedrate/lagrangian.py). The
+tolerance works through the path: more of it makes corners larger. So do accelerations, the other way: the more a corner could use,
+the more of its budget is set aside for the chord error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
+
+Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with the corners, the splines
+and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold together and both must give (equal axes at 45
+degrees) the time has a kink and the price is a slope between the left one and the right one. Prices of the programmed feed and of axis
+velocities are those of more of them: where both are equal, neither alone is worth anything.
+
+Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of reshaping (optimal/reshape.py)
+from the present shape gives dT/d(tolerance) at every site as a multiplier, added up at the nearest joint of the program. Accelerations
+are priced with the path as it is.
+
+**Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is solved again with what
+saves `WORTH` of the time (savings.py), which is right to within a few per cent.
+
+**Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may need some of it back
+(delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the problem says, 10 um half, on five points at
+4 ms, where chords use 40 %. There nothing may be saved, and what would be is a hint.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.constraints import chord_error
+from planner.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
+from planner.constraints.problem import FeedrateProblem
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.lagrangian import Lagrangian, lagrangian
+from planner.feedrate.solution import FeedrateSolution, Prices
+from planner.geometry.toolpath import Joint
+from planner.job.records import PriceList
+from planner.machine import Machine
+from planner.path.samples import PathSamples
+from planner.sensitivity.corner_prices import corner_prices, sums
+from planner.sensitivity.places import bounds_but_speeds, bounds_with, by_place
+from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, STEP, TOLERANCE, dearest, price_list
+from planner.sensitivity.savings import Change, more_of, solved_again
+
+WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
+# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]: 2.5e-4 with 1e-4 more or less
+# of the tolerance (pentagon), 1e-3 with more jerk (bracket: 5e-4 was too little for jerk.y).
+UNREST = 1e-3
+CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
+
+
+class SitePrices(NamedTuple):
+    """What the corridor of splines costs at J sites.
+
+    place : (J,) along the legs [mm]
+    price : (J,) dT/d(tolerance) there [s/mm]
+    """
+
+    place: FloatArray
+    price: FloatArray
+
+
+def path_prices(
+    samples: PathSamples,
+    problem: FeedrateProblem,
+    solution: FeedrateSolution,
+    machine: Machine,
+    by_site: SitePrices | None = None,
+) -> PriceList:
+    """The prices of a solution.
+
+    by_site : what the corridor of splines costs; None for single corners
+
+    Raises ValueError if the solver of the solution gives no multipliers.
+    """
+    now, path, cycle_time = lagrangian(problem, solution), samples.path, solution.cycle_time
+    rest = bounds_but_speeds(samples, machine)
+    prices = solution.prices
+    assert prices is not None  # solvers that give multipliers give prices
+    limit, slope = _by_share(problem, prices)
+    changes = {name: Change(machine=more_of(machine, name)) for name in limit}
+    changes[FEED.name] = Change(machine=lambda share: machine, feed=lambda share: 1.0 + share)
+    velocities = [name for name in map(VELOCITY.called, problem.axes) if name in limit]
+    bounds = {}
+    for name in (FEED.name, *(name for name in velocities if slope[name] < 0.0)):
+        slope[name] = _by_speed(samples, problem, now, changes[name], rest)
+        more = bounds_with(samples, changes[name], MORE_LIMIT, rest)
+        bounds[name] = -2.0 * float(now.feed_sq_max @ (1.0 - np.sqrt(problem.feed_sq_max / more)))
+    dear, tolerance, together, corners, solved = None, None, None, None, {}
+    if by_site is not None:
+        together = _by_joint(path, by_site.place, by_site.price)
+        tolerance = float(together.sum())
+        alone = np.zeros(len(path.toolpath) + 1)
+        alone[path.legs.first] = together
+        dear = dearest(path.toolpath, alone)
+    elif isinstance(path, SmoothPath) and not len(path.spline):
+        corners = corner_prices(path, samples, problem, solution, machine, now)
+        for axis in problem.axes[: problem.machine_axes]:
+            slope[ACCELERATION.called(axis)] += corners.by_acceleration(axis)
+        together = corners.by_tolerance()
+        tolerance = float(together.sum()) + corners.between()
+        dear = corners.dearest(together)
+        wider = Change(
+            machine=lambda share: machine, tolerance=lambda share: share / MORE_LIMIT * MORE_TOLERANCE
+        )
+        straight = {name: bounds.get(name, -price * MORE_LIMIT) for name, price in slope.items()}
+        straight[TOLERANCE] = -MORE_TOLERANCE * tolerance
+        worth = [name for name, saved in straight.items() if abs(saved) >= WORTH * cycle_time]
+        worth.sort(key=lambda name: -abs(straight[name]))
+        changes[TOLERANCE] = wider
+        solved = solved_again(samples, problem, {name: changes[name] for name in worth}, MORE_LIMIT)
+    return price_list(
+        limit,
+        slope,
+        tolerance,
+        path.toolpath,
+        cycle_time,
+        bounds=bounds,
+        solved=solved,
+        unrest=UNREST if corners is None else 0.0,
+        unsure=_chord_use(samples, solution, machine) > CHORDS,
+        corners=dear,
+        places=by_place(samples, problem, now, changes[FEED.name], together, rest),
+    )
+
+
+def _by_share(problem: FeedrateProblem, prices: Prices) -> tuple[dict[str, float], dict[str, float]]:
+    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit itself, of one's own the least
+    that was met, in its own unit; and dT/d(ln limit) [s]."""
+    limit, by_share = {}, {}
+    for quantity, kind in enumerate(OF_AXES):
+        planned, price = getattr(problem, kind.name), getattr(prices, kind.name)
+        for k, axis in enumerate(problem.axes):
+            least = planned[k]
+            if problem.own_least is not None and k >= problem.machine_axes:
+                least = problem.own_least[quantity, k - problem.machine_axes]
+            if np.isfinite(least):
+                name = kind.called(axis)
+                limit[name], by_share[name] = float(least), float(price[k]) * float(planned[k])
+    return limit, by_share
+
+
+def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatArray:
+    """(R+1,) prices of places along the legs, added up at the nearest joint that is no full stop."""
+    joints = np.concatenate([[0.0], np.cumsum(path.legs.length)])
+    inner = np.flatnonzero(path.joint != Joint.STOP)
+    middles = (joints[inner[1:]] + joints[inner[:-1]]) / 2.0
+    return sums(inner[np.searchsorted(middles, place)], price, len(joints))
+
+
+def _by_speed(
+    samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change, rest: FloatArray | None
+) -> float:
+    """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the other one that stays."""
+    gained = np.log(bounds_with(samples, change, STEP, rest) / problem.feed_sq_max)
+    return float(now.feed_sq_max @ gained) / STEP
+
+
+def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machine) -> float:
+    """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
+    kappa = np.maximum(samples.kappa_left, samples.kappa_right)
+    tolerance = samples.path.toolpath.tolerance[samples.segment]
+    chord = kappa * solution.feed_sq * chord_error.rate(machine)
+    return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())

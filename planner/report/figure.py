@@ -1,7 +1,9 @@
-"""What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py, toolpath_figure.py), plotly in
-notebooks (interactive/figures.py) and in pages (html/), for which plotly_figure.py puts it into plotly's words.
+"""What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py,
+toolpath_figure.py), plotly in notebooks (interactive/figures.py) and in pages (html/), for which
+plotly_figure.py puts it into plotly's words.
 
-A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of numbers.
+A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of
+numbers.
 """
 
 from __future__ import annotations
@@ -91,8 +93,9 @@ def profile_panels(machine: Machine, axes: Sequence[str], quantities: Sequence[s
 
 
 class MotionColumns:
-    """Columns of N samples of a plan's motion, each (N,), made when they are asked for: t [s], s [mm], line; feed and programmed as F
-    means them, programmed NaN for rapids; x, y ... the place, and vx, ax, jx ... of the axes as the machine gets them [mm, deg, s]."""
+    """Columns of N samples of a plan's motion, each (N,), made when they are asked for: t [s], s [mm], line;
+    feed and programmed as F means them, programmed NaN for rapids; x, y ... the place, and vx, ax, jx ... of
+    the axes as the machine gets them [mm, deg, s]."""
 
     def __init__(self, plan: Plan, shown: Trajectory, joints: Trajectory | None = None):
         """joints : the samples as the machine gets them, where they are known"""
@@ -119,13 +122,15 @@ def _in_degrees(motion: Trajectory, quantity: str, axis: str) -> FloatArray:
 
 
 def highest_feed(feed: FloatArray, programmed: FloatArray) -> float:
-    """The highest feed (n,) of moves with a programmed one (n,): rapids have its colour, and leave the others theirs."""
+    """The highest feed (n,) of moves with a programmed one (n,): rapids have its colour, and leave the others
+    theirs."""
     asked = np.isfinite(programmed)
     return float(feed[asked].max() if asked.any() else feed.max(initial=0.0))
 
 
 def flat_view(extent: FloatArray) -> list[int] | None:
-    """The two axes that show a nearly flat path of an `extent` (2 or 3,) best; None for a path that needs three."""
+    """The two axes that show a nearly flat path of an `extent` (2 or 3,) best; None for a path that needs
+    three."""
     if len(extent) == 2:
         return [0, 1]
     thin = int(extent.argmin())

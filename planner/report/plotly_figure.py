@@ -1,9 +1,9 @@
-"""Figures (figure.py) in plotly's words, without its package: traces and layouts, which a notebook fills with numbers and a page in
-the browser does (html/view.js).
+"""Figures (figure.py) in plotly's words, without its package: traces and layouts, which a notebook fills with
+numbers and a page in the browser does (html/view.js).
 
-The first view of a path in 3-D is along its thinnest direction if it is flat, and as large as the box allows. plotly's orthographic
-camera shows two units of its scene to the height of the box, from any distance; what a scene measures in those units is its aspect
-ratio.
+The first view of a path in 3-D is along its thinnest direction if it is flat, and as large as the box allows.
+plotly's orthographic camera shows two units of its scene to the height of the box, from any distance; what a
+scene measures in those units is its aspect ratio.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ PROGRAMMED = {
 
 
 def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
-    """`data` and `layout` of panels over an axis of `AGAINST`, and in `columns` of each trace what it lacks: `y`, the name of its
-    column of numbers, what these are multiplied with, and what is `before` the name of the axis for its x."""
+    """`data` and `layout` of panels over an axis of `AGAINST`, and in `columns` of each trace what it lacks:
+    `y`, the name of its column of numbers, what these are multiplied with, and what is `before` the name of
+    the axis for its x."""
     data, columns, shapes, height = [], [], [], (1.0 + GAP) / len(panels)
     layout: dict[str, Any] = {"xaxis": {"title": {"text": AGAINST[against]}, "anchor": f"y{len(panels)}"}}
     named: set[str] = set()
@@ -119,8 +120,8 @@ def colourings(samples: Samples) -> dict[str, dict[str, Any]]:
 
 
 def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
-    """plotly's `scene` of a path (n, 3) x, y, z [mm] without a zoom, and how wide and high the path then is on the screen, in units of
-    the scene: `aspectratio`, `camera`, and the ranges of the axes."""
+    """plotly's `scene` of a path, `points` (n, 3) x, y, z [mm], without a zoom, and how wide and high the
+    path then is on the screen, in units of the scene: `aspectratio`, `camera`, and the ranges of the axes."""
     low, end = points.min(axis=0), points.max(axis=0)
     length = end - low
     size = max(float(length.max()), 1e-9)
@@ -147,14 +148,16 @@ def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
 
 
 def scene_in_box(points: FloatArray, room: float) -> dict[str, Any]:
-    """The scene of a path (n, 3) [mm] that fills a box; `room` is the width of that, but for the colour bar, over its height [-]."""
+    """The scene of a path, `points` (n, 3) [mm], that fills a box; `room` is the width of that, but for the
+    colour bar, over its height [-]."""
     scene, wide, high = fitted_scene(points)
     zoom = FILLED * 2.0 * min(room / wide, 1.0 / high)
     return scene | {"aspectratio": {axis: zoom * ratio for axis, ratio in scene["aspectratio"].items()}}
 
 
 def _flat_view(thin: int, length: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Right and up of a view along axis `thin`; what is longer along z than along x, a turned part, lies down."""
+    """Right and up of a view along axis `thin`; what is longer along z than along x, a turned part, lies
+    down."""
     x, y, z = np.eye(3)
     if thin == 1:
         return (z, x) if length[2] > length[0] else (x, z)

@@ -1,13 +1,15 @@
 """Output files that take their place when all of them are written, `summary.json` last.
 
-The files of a run are written into a hidden directory inside the output directory and forced to disk. Then each is renamed into its
-place, in the order of `OUTPUTS`; files of the run before that the new one lacks (another format, no pictures) go in between. A kill
-before the renames leaves the old set, after them the new one. A kill between two renames leaves whole files of two runs, and that can
-be seen: the `run_id` of the trajectory is then not that of `summary.json`, or one of the two is missing.
+The files of a run are written into a hidden directory inside the output directory and forced to disk. Then
+each is renamed into its place, in the order of `OUTPUTS`; files of the run before that the new one lacks
+(another format, no pictures) go in between. A kill before the renames leaves the old set, after them the new
+one. A kill between two renames leaves whole files of two runs, and that can be seen: the `run_id` of the
+trajectory is then not that of `summary.json`, or one of the two is missing.
 
-Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their SHA-256, and so does that of a
-killed run. A lock on the output directory makes a second run wait, and what is hidden there under the lock is the leftover of a killed
-run. Windows and file systems without such locks do without.
+Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their
+SHA-256, and so does that of a killed run. A lock on the output directory makes a second run wait, and what is
+hidden there under the lock is the leftover of a killed run. Windows and file systems without such locks do
+without.
 """
 
 from __future__ import annotations
@@ -69,7 +71,8 @@ def _remove(places: Iterable[Path]) -> None:
 
 @contextlib.contextmanager
 def _writing(place: Path) -> Iterator[list[Path]]:
-    """A list whose places are removed at the end, however it ends; an OSError is raised as an InputError about `place`."""
+    """A list whose places are removed at the end, however it ends; an OSError is raised as an InputError
+    about `place`."""
     temporaries: list[Path] = []
     _temporaries[id(temporaries)] = temporaries
     try:
@@ -83,13 +86,15 @@ def _writing(place: Path) -> Iterator[list[Path]]:
 
 @contextlib.contextmanager
 def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False) -> Iterator[Path]:
-    """A context in which files of a run are written into an empty directory; at its end they take their places in `directory`.
+    """A context in which files of a run are written into an empty directory; at its end they take their
+    places in `directory`.
 
     kept  : names of files of the earlier run that stay although the new run lacks them
     force : replace files that no run wrote, too
 
-    One of the files is `summary.json`, with `checksums` of the others. After an exception `directory` is as before, unless the system
-    refused one of the renames: then, as after a kill there, it has files of two runs.
+    One of the files is `summary.json`, with `checksums` of the others. After an exception `directory` is as
+    before, unless the system refused one of the renames: then, as after a kill there, it has files of two
+    runs.
 
     Raises InputError if `directory` cannot be written, or if a file is in the way that no run wrote.
     """
@@ -121,7 +126,8 @@ def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False
 
 @contextlib.contextmanager
 def replacing_file(path: Path) -> Iterator[Path]:
-    """The same for one file: yields the place of a new file to write, which takes the place of `path` at the end.
+    """The same for one file: yields the place of a new file to write, which takes the place of `path` at the
+    end.
 
     After an exception `path` is as before. Raises InputError if it cannot be written.
     """
@@ -134,7 +140,8 @@ def replacing_file(path: Path) -> Iterator[Path]:
 
 
 def check_output(directory: Path, names: Iterable[str], *, force: bool = False) -> None:
-    """Raise InputError if a directory cannot be written, or if one of `names` in it exists, no run wrote it, and `force` is not set."""
+    """Raise InputError if a directory cannot be written, or if one of `names` in it exists, no run wrote it,
+    and `force` is not set."""
     with _writing(directory):
         if directory.exists() and not directory.is_dir():
             raise InputError("cannot be written: is a file, not a directory", source=str(directory))
@@ -148,7 +155,8 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
 def check_file(
     path: Path, inputs: Iterable[Path], written_by_us: Callable[[Path], bool], *, force: bool = False
 ) -> None:
-    """Raise InputError if a file cannot be written: a directory, an input, or a file of another kind while `force` is not set.
+    """Raise InputError if a file cannot be written: a directory, an input, or a file of another kind while
+    `force` is not set.
 
     written_by_us : says whether a file is of the kind that is to be written
     """
@@ -198,7 +206,8 @@ def _missing(directory: Path) -> list[Path]:
 
 
 def _vouched(directory: Path) -> set[tuple[str, str]]:
-    """Names and checksums of what runs wrote into `directory`, as their summaries say, themselves included."""
+    """Names and checksums of what runs wrote into `directory`, as their summaries say, themselves
+    included."""
     vouched: set[tuple[str, str]] = set()
     for file in (directory / SUMMARY, *directory.glob(f"{HIDDEN}/{SUMMARY}")):
         with contextlib.suppress(OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
@@ -247,8 +256,8 @@ def _locked(directory: Path) -> Iterator[None]:
 
 
 def _sync(place: Path) -> None:
-    """Force a file, or the names in a directory, to disk; a directory where the system can. Windows does so through handles that may
-    write only."""
+    """Force a file, or the names in a directory, to disk; a directory where the system can. Windows does so
+    through handles that may write only."""
     names = place.is_dir()
     with contextlib.suppress(*[OSError] * names):
         handle = os.open(place, os.O_RDONLY if names else os.O_RDWR)

@@ -1,24 +1,28 @@
-"""What the limits cost: by how much the cycle time of a time-optimal plan changes with each of them, and which corners are dear.
+"""What the limits cost: by how much the cycle time of a time-optimal plan changes with each of them, and
+which corners are dear.
 
-The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed (feedrate/lagrangian.py). The
-tolerance works through the path: more of it makes corners larger. So do accelerations, the other way: the more a corner could use,
-the more of its budget is set aside for the chord error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
+The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed
+(feedrate/lagrangian.py). The tolerance works through the path: more of it makes corners larger. So do
+accelerations, the other way: the more a corner could use, the more of its budget is set aside for the chord
+error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
 
-Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with the corners, the splines
-and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold together and both must give (equal axes at 45
-degrees) the time has a kink and the price is a slope between the left one and the right one. Prices of the programmed feed and of axis
-velocities are those of more of them: where both are equal, neither alone is worth anything.
+Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with
+the corners, the splines and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold
+together and both must give (equal axes at 45 degrees) the time has a kink and the price is a slope between
+the left one and the right one. Prices of the programmed feed and of axis velocities are those of more of
+them: where both are equal, neither alone is worth anything.
 
-Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of reshaping (optimal/reshape.py)
-from the present shape gives dT/d(tolerance) at every site as a multiplier, added up at the nearest joint of the program. Accelerations
-are priced with the path as it is.
+Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of
+reshaping (optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a multiplier,
+added up at the nearest joint of the program. Accelerations are priced with the path as it is.
 
-**Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is solved again with what
-saves `WORTH` of the time (savings.py), which is right to within a few per cent.
+**Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is
+solved again with what saves `WORTH` of the time (savings.py), which is right to within a few per cent.
 
-**Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may need some of it back
-(delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the problem says, 10 um half, on five points at
-4 ms, where chords use 40 %. There nothing may be saved, and what would be is a hint.
+**Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may
+need some of it back (delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the
+problem says, 10 um half, on five points at 4 ms, where chords use 40 %. There nothing may be saved, and what
+would be is a hint.
 """
 
 from __future__ import annotations
@@ -126,8 +130,8 @@ def path_prices(
 
 
 def _by_share(problem: FeedrateProblem, prices: Prices) -> tuple[dict[str, float], dict[str, float]]:
-    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit itself, of one's own the least
-    that was met, in its own unit; and dT/d(ln limit) [s]."""
+    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit
+    itself, of one's own the least that was met, in its own unit; and dT/d(ln limit) [s]."""
     limit, by_share = {}, {}
     for quantity, kind in enumerate(OF_AXES):
         planned, price = getattr(problem, kind.name), getattr(prices, kind.name)
@@ -152,13 +156,15 @@ def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatAr
 def _by_speed(
     samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change, rest: FloatArray | None
 ) -> float:
-    """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the other one that stays."""
+    """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the
+    other one that stays."""
     gained = np.log(bounds_with(samples, change, STEP, rest) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 
 def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machine) -> float:
-    """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
+    """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq.
+    (18)."""
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
     tolerance = samples.path.toolpath.tolerance[samples.segment]
     chord = kappa * solution.feed_sq * chord_error.rate(machine)

@@ -1,16 +1,19 @@
-"""From slopes to what more of every limit saves: what the prices of a path (path_prices.py) and those of a search (found_prices.py)
-have in common.
+"""From slopes to what more of every limit saves: what the prices of a path (path_prices.py) and those of a
+search (found_prices.py) have in common.
 
-**Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3), one that acceleration lets
-through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln limit) foretells for r times the limit
+**Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3),
+one that acceleration lets through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln
+limit) foretells for r times the limit
 
-    T(r) - T(1)  =  p/n (1 - r^-n),      n = 1/3 for jerk and tolerance, 1/2 for accelerations, 1 for velocities and the feed,
+    T(r) - T(1)  =  p/n (1 - r^-n),     n = 1/3 for jerk and tolerance, 1/2 for accelerations, 1 for
+    velocities and the feed,
 
-and the range is by `WITHIN` of it narrower and wider, and by what a motion made again ends elsewhere for no other reason. Where only a
-part of ten per cent more feed can be used, that part is what counts, and the least is twice as far below it: accelerations behind it
-hold the motion back, too. Slower by 1.1, a motion with 1.1 of any one limit keeps all the old ones: nothing saves more than
-T (1 - 1/1.1). Where least and most are so far apart that their middle may be off by more than `HINT` of itself and more than
-`HINT_LEAST` of the time, the saving is a hint only.
+and the range is by `WITHIN` of it narrower and wider, and by what a motion made again ends elsewhere for no
+other reason. Where only a part of ten per cent more feed can be used, that part is what counts, and the least
+is twice as far below it: accelerations behind it hold the motion back, too. Slower by 1.1, a motion with 1.1
+of any one limit keeps all the old ones: nothing saves more than T (1 - 1/1.1). Where least and most are so
+far apart that their middle may be off by more than `HINT` of itself and more than `HINT_LEAST` of the time,
+the saving is a hint only.
 """
 
 from __future__ import annotations
@@ -141,14 +144,15 @@ def _present(toolpath: Toolpath) -> float:
 
 
 def dearest(toolpath: Toolpath, price: FloatArray) -> DearCorners:
-    """The joints where more tolerance saves most, of prices (M+1,) [s/mm]."""
+    """The joints where more tolerance saves most, by the `price` (M+1,) of each [s/mm]."""
     tolerance, n = toolpath.tolerance, POWER[TOLERANCE]
     saved = -price * tolerance / n * (1.0 - (1.0 + MORE_TOLERANCE / tolerance) ** -n)
     return dearest_of(toolpath, np.arange(len(price)), price, saved)
 
 
 def dearest_of(toolpath: Toolpath, joint: Array, price: FloatArray, saved: FloatArray) -> DearCorners:
-    """The dearest of joints (n,) of a toolpath with their prices (n,) [s/mm] and what `MORE_TOLERANCE` saves there (n,) [s]."""
+    """The dearest of each `joint` (n,) of a toolpath with its `price` (n,) [s/mm] and what `MORE_TOLERANCE`
+    saved there (n,) [s]."""
     best = np.argsort(-saved, kind="stable")[:DEAREST]
     best = best[saved[best] >= SAVED_MIN]
     at = joint[best]

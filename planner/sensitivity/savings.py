@@ -1,9 +1,10 @@
 """What a tenth more of a limit saves where corners are rounded: the problem solved again with it.
 
-A price is a slope, and ten per cent of a limit are a long way down a curve that flattens: soon another limit holds, a feed that an
-axis cannot follow, a corner's normal acceleration. On a given path of rounded corners the problem is solved once more for each change
-that is worth it, as long as all of these together have no more than `POINTS` points. The corners are rounded again for the changed
-machine (their size depends on accelerations and tolerance) and keep their grid (path.moved_grid). Splines would adapt their shape.
+A price is a slope, and ten per cent of a limit are a long way down a curve that flattens: soon another limit
+holds, a feed that an axis cannot follow, a corner's normal acceleration. On a given path of rounded corners
+the problem is solved once more for each change that is worth it, as long as all of these together have no
+more than `POINTS` points. The corners are rounded again for the changed machine (their size depends on
+accelerations and tolerance) and keep their grid (path.moved_grid). Splines would adapt their shape.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ class Change:
 def solved_again(
     samples: PathSamples, problem: FeedrateProblem, changes: Mapping[str, Change], share: float
 ) -> dict[str, float]:
-    """Time that a share more [-] of each of some changes saves on a path of rounded corners, as many as `POINTS` allow, by name [s];
-    those that have no solution are not among them."""
+    """Time that a share more [-] of each of some changes saves on a path of rounded corners, as many as
+    `POINTS` allow, by name [s]; those that have no solution are not among them."""
     many = POINTS // len(samples) - 1
     if not changes or many < 1:
         return {}
@@ -79,7 +80,8 @@ def _changed(samples: PathSamples, change: Change, share: float) -> tuple[PathSa
 
 
 def opened(samples: PathSamples, solution: FeedrateSolution, path: SmoothPath) -> float:
-    """Time on parts of legs that another rounding leaves free and this one does not: the grid has no intervals there [s]."""
+    """Time on parts of legs that another rounding leaves free and this one does not: the grid has no
+    intervals there [s]."""
     element = samples.element
     inside = np.ones(len(element) - 1, dtype=bool)
     inside[samples.piece[1:-1] - 1] = False
@@ -91,8 +93,9 @@ def opened(samples: PathSamples, solution: FeedrateSolution, path: SmoothPath) -
 
 
 def more_of(machine: Machine, name: str) -> Callable[[float], Machine]:
-    """A function that makes the machine with a given share more of a limit: "velocity.x" of an axis, or "velocity.NAME" of a limit of
-    one's own, whose bound of that quantity is then so much larger everywhere."""
+    """A function that makes the machine with a given share more of a limit: "velocity.x" of an axis, or
+    "velocity.NAME" of a limit of one's own, whose bound of that quantity is then so much larger
+    everywhere."""
     quantity, _, of = name.partition(".")
 
     def more(share: float) -> Machine:

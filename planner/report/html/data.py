@@ -154,7 +154,7 @@ def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
 
 
 def used_limits(names: tuple[str, ...], index: Array) -> tuple[tuple[str, ...], Array]:
-    """The names that occur, `NO_LIMIT` last, and the indices among them."""
+    """Of `names` those that occur in an `index` (n,), `NO_LIMIT` last, and the indices (n,) among them."""
     used = sorted(set(np.unique(index).tolist()), key=lambda k: (names[k] == NO_LIMIT, k))
     place = np.zeros(len(names), np.int64)
     place[used] = np.arange(len(used))

@@ -100,6 +100,23 @@ VERIFY_MAY_IMPORT = {
     "motion.trajectory",
     "verify",
 }
+# The planner reads verdicts. It asks for one only where a motion is delivered, and measures nothing by the judge's means.
+VERDICT_RECORDS = {
+    "DERIVATIVES",
+    "NOT_LIMITED_NAMES",
+    "OF_CHORDS",
+    "WHOLE",
+    "AfterFilters",
+    "CornerCheck",
+    "Given",
+    "Kind",
+    "LimitCheck",
+    "Ringing",
+    "ThreadCheck",
+    "Verdict",
+}
+JUDGING = {"verify", "verify_joints", "fit_axes"}
+MAY_JUDGE = ("job.job", "job.at_tip", "commands", "interactive", "report")
 HEAVY = {"casadi", "matplotlib", "toppra", "numba", "scipy", "pyarrow", "ruckig"}
 
 
@@ -165,6 +182,26 @@ def test_the_verifier_is_independent() -> None:
             for name in imports(file):
                 short = name.removeprefix("planner.")
                 assert short in VERIFY_MAY_IMPORT or short.startswith("verify."), f"{module} imports {name}"
+
+
+def test_nobody_who_plans_uses_the_verifier() -> None:
+    """All imports count, those for annotations and inside functions too."""
+    for module, file in MODULES.items():
+        short = module.removeprefix("planner.")
+        if short.split(".")[0] == "verify":
+            continue
+        names = VERDICT_RECORDS | (
+            JUDGING if any(f"{short}.".startswith(f"{may}.") for may in MAY_JUDGE) else set()
+        )
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("planner.verify") for alias in node.names), module
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("planner.verify"):
+                assert node.module == "planner.verify", (
+                    f"{module} imports {node.module}: only what the room says"
+                )
+                imported = {alias.name for alias in node.names}
+                assert imported <= names, f"{module} imports {', '.join(sorted(imported - names))}"
 
 
 def test_kernels_are_made_where_the_cache_may_fail() -> None:

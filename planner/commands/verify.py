@@ -79,8 +79,7 @@ def verify_command(
     from planner.report.export import corner_summary, verdict_summary
     from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
-    from planner.verify.axes import fit_axes
-    from planner.verify.judge import NOT_LIMITED_NAMES
+    from planner.verify import NOT_LIMITED_NAMES, fit_axes
 
     unjudged = tuple(not_limited or ())
     for name in unjudged:

@@ -17,9 +17,7 @@ need (periods.py). Behind the last run nothing is added: the filtered motion end
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,20 +25,14 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.delivery.filtered_setpoints import PER_PERIOD, FilteredSetpoints
 from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
+from planner.delivery.path_errors import SPARE, Errors, PathErrors
 from planner.delivery.periods import Standing, standing, with_standstills
 from planner.delivery.rests import mean_of_filters
 from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.timing import MotionInTime, in_chunks
-from planner.verify.follow import follow
-from planner.verify.matching import Located
-from planner.verify.pieces import ProgramPieces, program_pieces, widened
 
-# Of the tolerance, what measuring at other times may find more [-].
-SPARE = 2e-3
-# A motion that leaves the tolerance is matched with budgets so many times as large, so that what exceeds them is measured and not lost.
-WIDER = 16.0
 STOPS_AT_ONCE = SIZES.stops_at_once
 # At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
 # together by up to 240, which leaves 1/57,600 of any filter's error.
@@ -78,41 +70,13 @@ class Violations:
         return room / (self.ratio - (1.0 - SPARE) + room)
 
 
-class Errors(NamedTuple):
-    """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of places.
-
-    time      : (n,) of places where the contour leaves the tolerance [s]
-    ratio     : (n,) there
-    piece     : (n,) and the piece of the path that they are at
-    near      : (N+1,) of every vertex
-    near_time : (N+1,) when the motion is nearest to it [s]; where it is lost, when it passed the last one before
-    worst     : (N,) the largest of the contour on each piece
-    """
-
-    time: FloatArray
-    ratio: FloatArray
-    piece: Array
-    near: FloatArray
-    near_time: FloatArray
-    worst: FloatArray
-
-    @property
-    def over(self) -> bool:
-        """Whether the motion leaves the tolerance."""
-        return bool(len(self.time)) or bool((self.near > 1.0 - SPARE).any())
-
-
-Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions (T, A) [mm], in parts
-
-
 class Behind:
     """Measures motions along one path of N pieces behind the filters of one machine."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine):
         self.toolpath, self.machine = toolpath, machine
         self.tolerance = float(toolpath.tolerance.min())
-        self.pieces = program_pieces(toolpath)
-        self._wide = widened(self.pieces, WIDER)
+        self.path = PathErrors(toolpath)
         self._setpoints: FilteredSetpoints | None = None
         if machine.fir is None:
             return  # `errors` of the motion itself can be asked for
@@ -122,47 +86,16 @@ class Behind:
         self._setpoints = FilteredSetpoints(machine.interpolation, lengths, machine.dt)
 
     def errors(self, motion: MotionInTime) -> Errors:
-        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion itself.
-
-        A match loses a motion which leaves the tolerance; so it is matched again with wider budgets, which measure how far it does.
-        Where another way along the path fits these, what was found first counts.
-        """
-        if self._setpoints is None:
-            return self.path_errors(motion)
-        return self._errors(list(self._setpoints.of(motion)))
+        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion itself."""
+        return (
+            self.path_errors(motion) if self._setpoints is None else self.path.of(self._setpoints.of(motion))
+        )
 
     def path_errors(self, motion: MotionInTime) -> Errors:
-        """Errors of the motion itself, as in `errors`."""
+        """Errors of the motion itself."""
         dt = self.machine.dt
         times = np.append(np.arange(0.0, motion.end, dt / PER_PERIOD), motion.end)
-        return self._errors([(seen.t, seen.position) for seen in in_chunks(motion, dt, times)])
-
-    def _errors(self, places: Places) -> Errors:
-        seen = self._measured(places, self.pieces, 1.0)
-        if not seen.over:
-            return seen
-        wide = self._measured(places, self._wide, WIDER)
-        return wide if wide.over else seen
-
-    def _measured(self, places: Places, pieces: ProgramPieces, wider: float) -> Errors:
-        """The errors of the motion matched with budgets `wider` times as large."""
-        kept: list[tuple[FloatArray, FloatArray, Array]] = []
-        worst = np.zeros(len(self.pieces.piece))
-
-        def each(t: FloatArray, ratio: FloatArray, place: Located) -> None:
-            ratio = ratio * wider
-            np.maximum.at(worst, place.piece, ratio)
-            over = ratio > 1.0 - SPARE
-            kept.append((t[over], ratio[over], place.piece[over]))
-
-        look = follow(places, pieces, each=each)
-        near = look.seen.match.passed["near"] / self.pieces.joint["budget"]
-        lost = np.isinf(near)
-        near[lost] = 2.0 * wider
-        near_time = np.where(lost, 0.0, look.seen.match.passed["near_time"])
-        near_time[lost] = np.maximum.accumulate(near_time)[lost]
-        t, ratio, piece = (np.concatenate(column) for column in zip(*kept, strict=True))
-        return Errors(t, ratio, piece, near, near_time, worst)
+        return self.path.of((seen.t, seen.position) for seen in in_chunks(motion, dt, times))
 
     def places(self, motion: Timed, of_path: Errors) -> Violations:
         """Where a motion leaves the tolerance behind the filters.

@@ -20,8 +20,7 @@ from planner.delivery.periods import Standing
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import FAR, Place, Slowed, reach, without_stands
 from planner.motion.timing import MotionInTime
-from planner.verify import Verdict
-from planner.verify.excess import OF_CHORDS, Kind
+from planner.verify import OF_CHORDS, Kind, Verdict
 
 # So often a motion is mended and judged again, at other times each time: an excess may be larger between the places looked at before.
 ROUNDS = 6

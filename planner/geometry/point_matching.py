@@ -38,6 +38,7 @@ FIRST_WIDER, WIDEST = (
     1.05,
     100.0,
 )  # budgets are widened by the first of these, then doubled, up to the second [-]
+ANYWHERE = 1e12  # the same where no point is to be lost
 ENTERED, THROUGH = (
     1,
     2,
@@ -112,7 +113,7 @@ class SegmentsInOrder:
         fresh = self._before is None
         before = point[0] if self._before is None else self._before
         found, marks, self._low, self._high = _forward(
-            self._chain, before, point, feed, fresh, self._low, self._high, self._cost
+            self._chain, before, point, feed, fresh, self._low, self._high, self._cost, WIDEST
         )
         self._lost, self._before = not found, point[-1].copy()
         self._open.append(_Marks(*marks))
@@ -163,7 +164,7 @@ class _Marks(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _from_chord(begin, end, point):
+def from_chord(begin, end, point):
     """Squared distance of a point (A,) from a chord, and the share of the chord at its foot."""
     along, length_sq = 0.0, 0.0
     for k in range(len(point)):
@@ -186,7 +187,7 @@ def in_order(chain, point, feed):
     """
     count, links = len(point), len(chain.budget)
     cost, link, crossed = np.empty(links), np.empty(count, np.int64), np.empty(links + 1)
-    found, marks, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost)
+    found, marks, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost, WIDEST)
     if not found or high != links - 1:
         return False, link, crossed
     _trace(marks[0], marks[1], marks[2], high, link)
@@ -194,7 +195,7 @@ def in_order(chain, point, feed):
     at = 0
     for n in range(count):
         for i in range(at + 1, link[n] + 1):
-            _, share = _from_chord(point[max(n - 1, 0)], point[n], chain.vertex[i])
+            _, share = from_chord(point[max(n - 1, 0)], point[n], chain.vertex[i])
             crossed[i] = max(n - 1, 0) + share * min(n, 1)
         at = link[n]
     for i in range(links):
@@ -203,10 +204,21 @@ def in_order(chain, point, feed):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _forward(chain, before, point, feed, fresh, low, high, cost):
+def links_anywhere(chain, point):
+    """(n,) the link of each of n points (n, A), however far from the chain they are; feeds do not count."""
+    count, links = len(point), len(chain.budget)
+    cost, link, feed = np.empty(links), np.empty(count, np.int64), np.zeros(count)
+    _, marks, _, high = _forward(chain, point[0], point, feed, True, 0, 0, cost, ANYWHERE)
+    _trace(marks[0], marks[1], marks[2], high, link)
+    return link
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _forward(chain, before, point, feed, fresh, low, high, cost, widest):
     """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh` if there is none before.
 
-    cost : (K,) of the best assignment that ends at each of these links; those of the last point are written into it
+    cost   : (K,) of the best assignment that ends at each of these links; those of the last point are written into it
+    widest : budgets are widened up to so many times [-]
 
     Returns whether there is any assignment, the fields of `_Marks`, and the links that the last point can be at.
     """
@@ -224,7 +236,7 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
             stay, enter = np.inf, 0.0 if begins else np.inf
             for i in range(low, links):
                 if i > low:
-                    off_sq, _ = _from_chord(before, point[n], vertex[i])
+                    off_sq, _ = from_chord(before, point[n], vertex[i])
                     within = off_sq <= (wide * MISSED * at_vertex[i] + SAME_PLACE) ** 2
                     if off_sq > (wide * at_vertex[i] + SAME_PLACE) ** 2:
                         off_sq += TOO_FAR * at_vertex[i] * at_vertex[i]
@@ -240,7 +252,7 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
                 through = THROUGH if i + 1 < links and enter + skipped[i] < stay else 0
                 marks[mark] = through | (ENTERED if enter < np.inf and enter <= stay else 0)
                 mark += 1
-                off_sq, _ = _from_chord(vertex[i], vertex[i + 1], point[n])
+                off_sq, _ = from_chord(vertex[i], vertex[i + 1], point[n])
                 new[i] = np.inf
                 if off_sq <= (wide * budget[i] + SAME_PLACE) ** 2:
                     new[i] = min(stay, enter) + off_sq
@@ -251,7 +263,7 @@ def _forward(chain, before, point, feed, fresh, low, high, cost):
             if highest >= 0:
                 break
             wide = 2.0 * wide if wide > 1.0 else FIRST_WIDER
-            if wide > WIDEST:
+            if wide > widest:
                 return False, (first, begin, marks), low, high
         first[n], begin[n], used = low, used, mark
         low, high = lowest, highest

@@ -16,9 +16,7 @@ from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.nc.set_limits import limited
 from planner.report.trajectory_reader import trajectory_of_columns
-from planner.verify import Verdict
-from planner.verify.axes import fit_axes
-from planner.verify.judge import NOT_LIMITED_NAMES
+from planner.verify import NOT_LIMITED_NAMES, Verdict, fit_axes
 
 
 def verify(

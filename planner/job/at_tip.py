@@ -20,10 +20,7 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.nc.set_limits import limited
-from planner.verify.given import Given
-from planner.verify.joints import verify_joints
-from planner.verify.judge import WHOLE, verify
-from planner.verify.verdict import Verdict
+from planner.verify import WHOLE, Given, Verdict, verify, verify_joints
 
 
 @dataclass(frozen=True, kw_only=True)

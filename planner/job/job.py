@@ -33,8 +33,7 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
-from planner.verify import Verdict, verify
-from planner.verify.excess import OF_CHORDS
+from planner.verify import OF_CHORDS, Verdict, verify
 
 Delivered = tuple[Trajectory, Verdict]
 FILTERS = "filters"

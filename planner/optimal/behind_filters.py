@@ -22,7 +22,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.limits import FILTER_ERROR
 from planner.constraints.problem import FeedrateProblem
-from planner.delivery.filters import ROOM_LEAST, SPARE, Behind, Errors, Violations, kept, rested
+from planner.delivery.filters import ROOM_LEAST, Behind, Violations, kept, rested
+from planner.delivery.path_errors import SPARE, Errors
 from planner.job.job import FILTERS, Job
 from planner.motion.timing import Motion
 from planner.optimal.on_path import OnPath
@@ -104,8 +105,8 @@ class CornerFeeds:
     def __init__(self, problem: FeedrateProblem, motion: Motion, behind: Behind, of_path: Errors):
         self.zone = _zones(problem, motion, of_path.near_time, REACH * behind.tolerance)
         self.least = CREEP**2 * np.square(motion.law.feed)
-        self.sharp = behind.pieces.joint["real"].copy()
-        self.sharp[self.sharp] = behind.toolpath.theta > SHARP
+        self.sharp = np.zeros(len(of_path.near), bool)
+        self.sharp[behind.path.joint] = behind.toolpath.theta > SHARP
         self.delay, self.path = behind.filters.delay, of_path.near
         self.room = np.maximum(1.0 - AIM - self.path, ROOM_LEAST)
         count = len(self.zone)

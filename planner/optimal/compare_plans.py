@@ -30,7 +30,7 @@ from planner.optimal.compare_corners import corner_bounds
 from planner.optimal.geometry import corner_shape
 from planner.optimal.order import Order
 from planner.path.samples import RESOLUTION
-from planner.verify.excess import OF_CHORDS, Kind
+from planner.verify import OF_CHORDS, Kind
 
 RIVAL_POINTS = SIZES.rivals_planned
 RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)

@@ -12,9 +12,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.constraints.normal_limit import slowest
-from planner.delivery.filters import FLOOR_STEP, WIDER, Behind, runs_within, stops_between
-from planner.delivery.filters import SPARE as SPARE_ERROR
+from planner.delivery.filters import FLOOR_STEP, Behind, runs_within, stops_between
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
+from planner.delivery.path_errors import SPARE as SPARE_ERROR
 from planner.delivery.rests import mean_of_copies
 from planner.geometry.toolpath import Joint
 from planner.job.job import Job
@@ -146,8 +146,7 @@ class Settling:
             self._put(factor, motion, chunk.t, worst)
         off = self.behind.errors(delivered)
         missed = off.near > ROOM
-        # a contour error above WIDER is the distance from a piece that D is not on: the match was lost before
-        ratio = np.append(np.minimum(off.ratio, WIDER), off.near[missed])
+        ratio = np.append(off.ratio, off.near[missed])
         t = np.append(off.time, off.near_time[missed])
         slower = np.sqrt(np.maximum(ratio - self.share, 0.0) / (ROOM - self.share))
         limit = np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(len(begin))))

@@ -35,21 +35,31 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 """
 
 from planner.base.called import call_like
+from planner.verify.axes import fit_axes
 from planner.verify.corners import CornerCheck
-from planner.verify.given import Given
-from planner.verify.judge import verify
+from planner.verify.excess import OF_CHORDS, Kind
+from planner.verify.given import DERIVATIVES, WHOLE, Given
+from planner.verify.joints import verify_joints
+from planner.verify.judge import NOT_LIMITED_NAMES, verify
 from planner.verify.ringing import Ringing
 from planner.verify.verdict import AfterFilters, LimitCheck, ThreadCheck, Verdict
 
 __all__ = [
+    "DERIVATIVES",
+    "NOT_LIMITED_NAMES",
+    "OF_CHORDS",
+    "WHOLE",
     "AfterFilters",
     "CornerCheck",
     "Given",
+    "Kind",
     "LimitCheck",
     "Ringing",
     "ThreadCheck",
     "Verdict",
+    "fit_axes",
     "verify",
+    "verify_joints",
 ]
 
 call_like(__name__, "planner.interactive.given_motion:verify")

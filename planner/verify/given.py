@@ -34,3 +34,6 @@ class Given:
             raise ValueError(
                 f"Given.columns: {', '.join(sorted(unknown))}; there are {', '.join(DERIVATIVES)}"
             )
+
+
+WHOLE = Given()

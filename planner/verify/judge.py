@@ -18,7 +18,7 @@ from planner.verify.excess import Kind
 from planner.verify.extruder import extruder_seen
 from planner.verify.filtered import after_filters
 from planner.verify.findings import QUANTITIES
-from planner.verify.given import DERIVATIVES, Given
+from planner.verify.given import DERIVATIVES, WHOLE, Given
 from planner.verify.held import thread_checks, thread_faults
 from planner.verify.limits import NORMAL_NAME, normal_limit
 from planner.verify.pieces import program_pieces, widened
@@ -29,7 +29,6 @@ from planner.verify.times import AnyMotion, cells_per_period
 from planner.verify.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
-WHOLE = Given()
 READING = 0.9  # share of a verdict's time that the first reading takes, about [-]
 
 

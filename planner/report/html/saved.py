@@ -26,8 +26,7 @@ from planner.report.export import json_ready, program_file
 from planner.report.replace import SUMMARY
 from planner.report.trajectory_reader import read_trajectory
 from planner.report.word_feed import WordFeed
-from planner.verify.axes import fit_axes
-from planner.verify.judge import NOT_LIMITED_NAMES
+from planner.verify import NOT_LIMITED_NAMES, fit_axes
 
 
 def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:

@@ -61,7 +61,7 @@ def planned(seed: int, method: str) -> dict:
         "status": plan.status.name,
         "passed": plan.verdict.passed,
         "cycle_time": plan.cycle_time,
-        "said": plan.verdict.faults[0] if plan.verdict.faults else "",
+        "said": plan.verdict.sentences[0] if plan.verdict.sentences else "",
     }
 
 

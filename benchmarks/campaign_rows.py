@@ -20,6 +20,7 @@ from planner.job.plan import Plan
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.methods.registry import plan
 from planner.nc.program import Kind, Program
+from planner.verify import Kind as KindOfFault
 
 LAW_EVERY = 10  # jobs
 NO_JERK_LIMIT = ("second-order",)
@@ -85,16 +86,16 @@ def _planned(made: Job) -> Row:
         "status": found.status.name,
         "time": found.cycle_time,
         "samples": len(found.trajectory),
-        "said": found.verdict.faults[0] if found.verdict.faults else "",
+        "said": found.verdict.sentences[0] if found.verdict.sentences else "",
         "second": second,
     }
-    if not found.verdict.passed and (why := documented(made, found.verdict.faults)):
+    if not found.verdict.passed and (why := documented(made, found.verdict.kinds)):
         row |= {"outcome": DOCUMENTED, "why": why}
     return row | (_law(made, found) if made.seed % LAW_EVERY == 0 and found.verdict.passed else {})
 
 
-def documented(made: Job, said: tuple[str, ...]) -> str:
-    """Why docs/methods.md says that a method's verdict fails with these faults; empty where it does not."""
+def documented(made: Job, kinds: frozenset[KindOfFault]) -> str:
+    """Why docs/methods.md says that a method's verdict fails with these kinds of faults; empty where it does not."""
     if made.method.endswith("-plain"):
         return "methods as their papers describe them"
     assert made.program is not None
@@ -103,8 +104,7 @@ def documented(made: Job, said: tuple[str, ...]) -> str:
         or "shaped" in made.settings
         or (made.method == "kinematic" and len(made.program.splines))
     )
-    only = all(fault.startswith("exact path") for fault in said)
-    return "chords within the tolerance under G61" if under_g61 and only else ""
+    return "chords within the tolerance under G61" if under_g61 and kinds <= {KindOfFault.EXACT} else ""
 
 
 def _law(made: Job, found: Plan) -> Row:
@@ -120,7 +120,7 @@ def _law(made: Job, found: Plan) -> Row:
     except InputError as fault:
         return {"law": other.law, "law_said": f"refused: {fault}"}
     if after.trajectory is None or after.verdict is None or not after.verdict.passed:
-        said = after.sentence if after.verdict is None else after.verdict.faults[0]
+        said = after.sentence if after.verdict is None else after.verdict.sentences[0]
         return {"law": other.law, "law_said": f"{after.status.name}: {said}"}
     stops = 1 + int(np.isin(made.program.kind, (Kind.STOP, Kind.DWELL, Kind.RAPID)).sum())
     slack = made.machine.dt * (

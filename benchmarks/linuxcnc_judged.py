@@ -87,7 +87,7 @@ def row_of(seed: int, mode: str, peers: Path) -> dict[str, Any]:
         "planned": subject.plan.cycle_time,
         "method": subject.plan.method,
         "passed": verdict.passed,
-        "said": list(verdict.faults),
+        "said": verdict.sentences,
         **counted(positions, subject),
     }
 

@@ -134,7 +134,7 @@ def _run(pipe: Any, file: str, options: argparse.Namespace, corner: str) -> None
         verdict = plan.verdict
         row |= {
             "outcome": "passed" if verdict.passed else "failed",
-            "message": "; ".join(verdict.faults[:3]),
+            "message": "; ".join(verdict.sentences[:3]),
             "cycle_s": plan.trajectory.cycle_time,
             "samples": len(plan.trajectory),
             "limits": {name: check.ratio for name, check in verdict.limits.items() if check.limited},

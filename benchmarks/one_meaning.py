@@ -156,7 +156,7 @@ def row(seed: int) -> dict[str, Any]:
         "other": compared(averaged(made.trajectory, machine.interpolation, lengths), job, ratio),
         "unfiltered": unfiltered,
         "other, unfiltered": compared(averaged(made.trajectory, machine.interpolation, ()), job, unfiltered),
-        "said": (made.verdict.faults or alone.faults or ("",))[0],
+        "said": (made.verdict.sentences or alone.sentences or [""])[0],
     }
 
 

@@ -75,7 +75,7 @@ def found(seed: int) -> Row:
         "outcome": PASSED if made.verdict.passed else FAILED,
         "method": drawn.method,
         "time": made.cycle_time,
-        "said": made.verdict.faults[0] if made.verdict.faults else "",
+        "said": made.verdict.sentences[0] if made.verdict.sentences else "",
         "columns": {name: np.array(getattr(made.trajectory, name)) for name in COLUMNS},
     }
 

@@ -79,7 +79,7 @@ def _planned(program: Path, machine: str, method: str, effort: str) -> dict[str,
         "angle_error_deg": plan.verdict.angle_error_deg,
         "shares": _shares(plan.verdict),
         "held_by": [] if plan.grid is None else plan.grid.ranked()[:SHARES_SHOWN],
-        "faults": plan.verdict.faults[:3],
+        "faults": plan.verdict.sentences[:3],
         "notes": plan.notes,
     }
 

@@ -101,7 +101,7 @@ def faults_of(seed: int, count: int) -> list[dict[str, Any]]:
                 continue
             given = Given() if fault.columns else POSITIONS
             verdict = judged(fault.trajectory, fault.points, fault.feed, fault.machine, given, subject.jerk)
-            said = "" if verdict.passed else verdict.faults[0]
+            said = "" if verdict.passed else verdict.sentences[0]
             rows.append(
                 {
                     "plan": seed,
@@ -208,7 +208,7 @@ def correct_of(seed: int) -> list[dict[str, Any]]:
                 verdict = judged(
                     read.trajectory, subject.points, subject.feed, subject.machine, read.given, jerk
                 )
-                wrong = [text for text in verdict.faults if TOO_FEW_DIGITS not in text]
+                wrong = [text for text in verdict.sentences if TOO_FEW_DIGITS not in text]
                 answer = "passed" if verdict.passed else "refused" if wrong else TOO_FEW_DIGITS
                 rows.append(
                     {

@@ -108,6 +108,7 @@ VERDICT_RECORDS = {
     "WHOLE",
     "AfterFilters",
     "CornerCheck",
+    "Fault",
     "Given",
     "Kind",
     "LimitCheck",

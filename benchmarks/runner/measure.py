@@ -203,7 +203,7 @@ def _judged(verdict: Verdict, row: Row) -> Row:
     return dataclasses.replace(
         row,
         verdict=PASSED if verdict.passed else FAILED,
-        message=row.message if verdict.passed else verdict.faults[0],
+        message=row.message if verdict.passed else verdict.sentences[0],
         excess=round(max(ratios, default=0.0), 9),
         error=round(max(errors, default=0.0), 9),
     )

@@ -51,7 +51,7 @@ def mended(
     again  : rounds before this one
     """
     slower = np.array([each.slower for each in verdict.excesses])
-    if not len(slower) or not set(verdict.kinds) <= MENDED or slower.max() > MOST_SLOWER:
+    if not len(slower) or not verdict.kinds <= MENDED or slower.max() > MOST_SLOWER:
         return None
     more = MORE * MORE_AGAIN**again
     unknown = np.array([each.kind in (Kind.CONTOUR, Kind.FILTERS) for each in verdict.excesses])

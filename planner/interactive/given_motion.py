@@ -48,7 +48,7 @@ def verify(
     >>> t = np.arange(0.0, 1.001, 0.001)
     >>> x = 10.0 * t**2 * (3.0 - 2.0 * t)
     >>> found = planner.verify(t, np.stack([x, 0.0 * x], axis=1), there, "mill")
-    >>> found.passed, found.faults[0][:18], round(found.limits["feed"].ratio, 2)
+    >>> found.passed, str(found.faults[0])[:18], round(found.limits["feed"].ratio, 2)
     (False, 'start: not at rest', 0.75)
     """
     if not isinstance(machine, Machine):

@@ -124,10 +124,7 @@ def _both(tip: Verdict, joints: Verdict) -> Verdict:
     """The verdict on the motion of the tip, between its samples too, with the limits of the joints in place of those of its
     coordinates, and with what the judgement of the setpoints found."""
     limits = dict(joints.limits)
-    faults = dict(zip(joints.faults, joints.kinds, strict=True)) | dict(
-        zip(tip.faults, tip.kinds, strict=True)
-    )
-    faults = {said: faults[said] for said in (*tip.faults, *joints.faults)}
+    faults = {fault.sentence: fault for fault in (*tip.faults, *joints.faults)}
     for name, check in tip.limits.items():
         quantity, _, what = name.partition(".")
         own = f"{quantity}.{what.removeprefix('joint ')}" if what else name
@@ -143,8 +140,7 @@ def _both(tip: Verdict, joints: Verdict) -> Verdict:
         contour_error_mm=_larger(tip.contour_error_mm, joints.contour_error_mm),
         linear_error_mm=_larger(tip.linear_error_mm, joints.linear_error_mm),
         angle_error_deg=_larger(tip.angle_error_deg, joints.angle_error_deg),
-        faults=tuple(faults),
-        kinds=tuple(faults.values()),
+        faults=tuple(faults.values()),
         notes=tuple(dict.fromkeys((*tip.notes, *joints.notes))),
     )
 

@@ -185,7 +185,7 @@ class Job:
                 break
         if not mended[1].passed:
             return made
-        if set(made[1].kinds) & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
+        if made[1].kinds & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
             self.mended[made[0]] = mended
             return made
         return mended

@@ -90,7 +90,7 @@ class Method(ABC):
         made = self.plan_best(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
         if (lost := _out_of_step(made)) is not None:  # it would be no thread
             return _not_delivered(
-                made, f"{lost.sentence()}: the feed is reached behind the run-in; {self._in_step(made)}"
+                made, f"{lost.fault()}: the feed is reached behind the run-in; {self._in_step(made)}"
             )
         if made.pricing is None:
             return made

@@ -215,7 +215,7 @@ def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered,
         passed = made[1].passed or not start[1].passed
         if passed and made[0].cycle_time <= start[0].cycle_time:
             return made, kept, why
-        why = "what was found there is slower with its standstills" if passed else made[1].faults[0]
+        why = "what was found there is slower with its standstills" if passed else str(made[1].faults[0])
         missed = set() if filtered else _missed(job, motion, found) - set(kept)
         kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
     return (start[0], start[1]), kept, why

@@ -93,7 +93,7 @@ def counted_time(plan: Plan) -> float:
     planned again with less tolerance (delivery/periods.py). Chords that leave the contour leave the exact path of G61 as well."""
     if plan.trajectory is None or plan.verdict is None:
         return float("inf")
-    kinds = set(plan.verdict.kinds)
+    kinds = plan.verdict.kinds
     chords = kinds <= OF_CHORDS | ({Kind.EXACT} if kinds & {Kind.CONTOUR, Kind.VERTEX} else set())
     return plan.trajectory.cycle_time if chords else float("inf")
 

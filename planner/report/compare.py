@@ -160,7 +160,7 @@ def row_of_plan(method: str, plan: Plan) -> Row:
     return Row(
         method=method,
         outcome="passed" if verdict.passed else "failed",
-        sentence=plan.sentence if verdict.passed else verdict.faults[0],
+        sentence=plan.sentence if verdict.passed else str(verdict.faults[0]),
         cycle_time=plan.trajectory.cycle_time,
         worst=worst,
         free=tuple(verdict_summary(verdict)["not_limited"]),

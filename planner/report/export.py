@@ -185,7 +185,9 @@ def summary(plan: Plan) -> dict[str, Any]:
 
 def verdict_summary(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers: the largest ratio to each limit, errors, faults."""
-    return json_ready({**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.faults})
+    return json_ready(
+        {**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.sentences}
+    )
 
 
 def corner_summary(corners: CornerCheck) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def verdict_rows(verdict: Verdict) -> Rows:
     for mode in verdict.ringing:
         rows.append((f"rings at {mode.frequency:g} Hz", _ringing_text(mode)))
     rows.append((VERDICT, PASSED if verdict.passed else FAILED))
-    return rows + [("", fault) for fault in first_of(verdict.faults, FAULTS_SHOWN)]
+    return rows + [("", fault) for fault in first_of(verdict.sentences, FAULTS_SHOWN)]
 
 
 def first_of(items: Sequence[str], count: int) -> list[str]:

@@ -61,7 +61,7 @@ def _found(plan: Plan) -> dict[str, Any]:
     verdict: Verdict = plan.verdict
     return {
         "outcome": PASSED if verdict.passed else FAILED,
-        "sentence": plan.sentence if verdict.passed else verdict.faults[0],
+        "sentence": plan.sentence if verdict.passed else str(verdict.faults[0]),
         "cycle_time_s": plan.trajectory.cycle_time,
         "contour_error_mm": verdict.contour_error_mm,
         "vertex_error_mm": verdict.vertex_error_mm,

@@ -37,7 +37,7 @@ The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are neve
 from planner.base.called import call_like
 from planner.verify.axes import fit_axes
 from planner.verify.corners import CornerCheck
-from planner.verify.excess import OF_CHORDS, Kind
+from planner.verify.excess import OF_CHORDS, Fault, Kind
 from planner.verify.given import DERIVATIVES, WHOLE, Given
 from planner.verify.joints import verify_joints
 from planner.verify.judge import NOT_LIMITED_NAMES, verify
@@ -51,6 +51,7 @@ __all__ = [
     "WHOLE",
     "AfterFilters",
     "CornerCheck",
+    "Fault",
     "Given",
     "Kind",
     "LimitCheck",

@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
-from planner.verify.excess import Excess, Kind
+from planner.verify.excess import Excess, Fault, Kind, and_more
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, line_of
 from planner.verify.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
@@ -121,25 +121,27 @@ class Apart:
             note=look.note,
         )
 
-    def vertex_faults(self, toolpath: Toolpath) -> list[str]:
+    def vertex_faults(self, toolpath: Toolpath) -> list[Fault]:
         """Vertices that the motion misses by more than their budget, and arcs cut short."""
-        said = []
+        said: list[Fault] = []
         pieces, budgets = self.pieces, self.pieces.joint["budget"]
         for look in self.looks:
             near, seen = self.near(look), look.seen.match.passed["near"]
             missed = np.flatnonzero((seen > self._allowed) & np.isfinite(seen))
+            here: list[Fault] = []
             for i in missed[:FAULTS_OF_A_KIND]:
                 what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
                 where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
                 by = f"missed by more than {NEAR_MISS:g} times the budget {budgets[i]:.6g} mm"
                 if not np.isnan(near[i]):
                     by = f"missed by {near[i]:.7g} mm, {near[i] / budgets[i]:.6g} of the budget {budgets[i]:.6g} mm"
-                said.append(
-                    f"vertex: {what} of line {line_of(toolpath, pieces, i - 1)} at {where}: {look.noted(by)}"
-                    f", t = {look.seen.match.passed['near_time'][i]:.6g} s"
+                line, time = line_of(toolpath, pieces, i - 1), float(look.seen.match.passed["near_time"][i])
+                text = f"{what} of line {line} at {where}: {look.noted(by)}, t = {time:.6g} s"
+                ratio = float(seen[i] / budgets[i])
+                here.append(
+                    Fault(kind=Kind.VERTEX, name="vertex", found=text, ratio=ratio, time=time, line=line)
                 )
-            if len(missed) > FAULTS_OF_A_KIND:
-                said.append(f"vertex: {len(missed)} vertices missed in all")
+            said += and_more(here, len(missed), "vertices missed")
         return said
 
     def excesses(self) -> list[Excess]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.motion.trajectory import Trajectory
+from planner.verify.excess import Fault, Kind
 from planner.verify.findings import Look, measured
 from planner.verify.limits import ACCELERATION
 from planner.verify.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING
@@ -55,16 +56,17 @@ class Comparison:
         left = slice(int(np.searchsorted(t, seen_t[-1])), None)
         self._sample_t, self._sample = t[left].copy(), self._sample[left].copy()
 
-    def faults(self, limits: Limits, looks: list[Look]) -> list[str]:
-        """What differs, in sentences."""
+    def faults(self, limits: Limits, looks: list[Look]) -> list[Fault]:
+        """What differs."""
         said = []
         if abs(self.first) > PERIOD_ROUNDING or abs(self.end - self.last) > PERIOD_ROUNDING:
-            said.append(
-                f"motion: it lasts from 0 to {self.end:.9g} s, its samples from {self.first:.9g} to {self.last:.9g} s"
+            found = (
+                f"it lasts from 0 to {self.end:.9g} s, its samples from {self.first:.9g} to {self.last:.9g} s"
             )
+            said.append(Fault(kind=Kind.SAMPLES, name="motion", found=found))
         bound = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION)) * (1 + RATIO_ROUNDING)
         for axis in np.flatnonzero(self.excess > bound):
-            said.append(
-                f"motion: not the delivered one: {self.axes[axis]} differs at t = {self.time[axis]:.6g} s"
-            )
+            time = float(self.time[axis])
+            found = f"not the delivered one: {self.axes[axis]} differs at t = {time:.6g} s"
+            said.append(Fault(kind=Kind.SAMPLES, name="motion", found=found, time=time))
         return said

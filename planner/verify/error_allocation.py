@@ -50,7 +50,7 @@ from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verify.between import bow_share
 from planner.verify.corners import CornerCheck
-from planner.verify.excess import Excess, Kind
+from planner.verify.excess import Excess, Fault, Kind, and_more
 from planner.verify.findings import FAULTS_OF_A_KIND, Look
 from planner.verify.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
 from planner.verify.matching import NEAR_MISS
@@ -145,14 +145,15 @@ def check_corners(
     )
 
 
-def too_fast_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[str]:
-    """Corners that are passed too fast, in sentences."""
-    return _faults(check, check.too_fast & check.judged, check.speed_ratio, _too_fast, axes)
+def too_fast_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
+    """Corners that are passed too fast."""
+    broken = check.too_fast & check.judged
+    return _faults(check, broken, check.speed_ratio, Kind.CORNER_SPEED, _too_fast, axes)
 
 
-def overdrawn_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[str]:
-    """Corners whose budget is overdrawn, in sentences."""
-    return _faults(check, check.overdrawn, check.budget_ratio, _overdrawn, axes)
+def overdrawn_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
+    """Corners whose budget is overdrawn."""
+    return _faults(check, check.overdrawn, check.budget_ratio, Kind.CORNER_BUDGET, _overdrawn, axes)
 
 
 def excesses(check: CornerCheck) -> list[Excess]:
@@ -175,31 +176,32 @@ def _faults(
     check: CornerCheck,
     broken: Array,
     values: FloatArray,
-    sentence: Callable[[CornerCheck, int], str],
+    kind: Kind,
+    found: Callable[[CornerCheck, int], str],
     axes: tuple[str, ...],
-) -> list[str]:
+) -> list[Fault]:
     worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
     said = []
     for k in worst[:FAULTS_OF_A_KIND]:
         where = " ".join(f"{name}{x:.6g}" for name, x in zip(axes, check.position[k], strict=True))
+        line, time = int(check.line[k]), float(check.time[k])
+        text = f"{found(check, k)}, at the end of line {line}, {where}, t = {time:.6g} s"
         said.append(
-            f"{sentence(check, k)}, at the end of line {check.line[k]}, {where}, t = {check.time[k]:.6g} s"
+            Fault(kind=kind, name=kind.value, found=text, ratio=float(values[k]), time=time, line=line)
         )
-    if len(worst) > FAULTS_OF_A_KIND:
-        said.append(f"{sentence(check, worst[0]).partition(':')[0]}: {len(worst)} corners in all")
-    return said
+    return and_more(said, len(worst), "corners")
 
 
 def _too_fast(check: CornerCheck, k: int) -> str:
     return (
-        f"eq. 19: passed at {check.feed_planned[k]:.6g} mm/s, {check.speed_ratio[k]:.7g} of what the axes' acceleration leaves a "
+        f"passed at {check.feed_planned[k]:.6g} mm/s, {check.speed_ratio[k]:.7g} of what the axes' acceleration leaves a "
         "motion of its curvature"
     )
 
 
 def _overdrawn(check: CornerCheck, k: int) -> str:
     return (
-        f"eq. 18: missed by {check.budget_ratio[k] * check.budget[k]:.7g} mm with the chord error, {check.budget_ratio[k]:.7g} "
+        f"missed by {check.budget_ratio[k] * check.budget[k]:.7g} mm with the chord error, {check.budget_ratio[k]:.7g} "
         f"of the budget {check.budget[k]:.6g} mm"
     )
 

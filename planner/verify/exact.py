@@ -28,6 +28,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
+from planner.verify.excess import Fault, Kind
 from planner.verify.findings import Look, line_of
 from planner.verify.follow import follow
 from planner.verify.matching import HELD, LAST, LOST_AFTER, Located
@@ -42,8 +43,10 @@ from planner.verify.pieces import (
 from planner.verify.stream import BLOCK_SAMPLES, Limits
 
 
-def exact_faults(trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, limits: Limits) -> list[str]:
-    """What is wrong with a motion where the path is to be followed exactly, in a sentence; empty if nothing is."""
+def exact_faults(
+    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, limits: Limits
+) -> list[Fault]:
+    """What is wrong with a motion where the path is to be followed exactly; empty if nothing is."""
     if not toolpath.exact.any():
         return []
     digits = float(np.linalg.norm(limits.rounding))
@@ -57,11 +60,13 @@ def exact_faults(trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, 
         return []
     worst = _Worst(widened(pieces, more=digits), exact)
     wide = follow(_positions(trajectory), worst.pieces, each=worst.take, search=False)
-    where = f"followed in its order only as far as line {line_of(toolpath, pieces, lost_at)}"
+    line, time = line_of(toolpath, pieces, lost_at), None
+    where = f"followed in its order only as far as line {line}"
     if worst.apart > PLACE_ROUNDING + digits and not wide.seen.match.tally[HELD]:
-        line = line_of(toolpath, pieces, worst.piece)
-        where = f"{worst.apart:.6g} mm off at t = {worst.time:.6g} s, line {line}"
-    return [f"exact path: {where}: G61 asks for the path itself"]
+        line, time = line_of(toolpath, pieces, worst.piece), worst.time
+        where = f"{worst.apart:.6g} mm off at t = {time:.6g} s, line {line}"
+    found = f"{where}: G61 asks for the path itself"
+    return [Fault(kind=Kind.EXACT, name="exact path", found=found, time=time, line=line)]
 
 
 @dataclass

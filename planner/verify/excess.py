@@ -1,4 +1,4 @@
-"""Where and when a motion exceeds what it is judged by: data for who made it. What is wrong in words is `Verdict.faults`."""
+"""What is wrong with a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for who made it."""
 
 from __future__ import annotations
 
@@ -26,6 +26,41 @@ class Kind(StrEnum):
     FILTERS = "after the filters"
     CORNER_SPEED = "eq. 19"
     CORNER_BUDGET = "eq. 18"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One thing that is wrong with a motion; as text its sentence.
+
+    kind  : what it is about
+    name  : the quantity or the rule: "jerk.x", "feed", "vertex", "stop", "eq. 19", ...
+    found : what was found there, what is allowed, and where, in words
+    ratio : value over what is allowed [-]; None where it is no matter of size
+    time  : of its place in the motion [s]; None where it has none
+    line  : NC line of its place; None where it has none
+    """
+
+    kind: Kind
+    name: str
+    found: str
+    ratio: float | None = None
+    time: float | None = None
+    line: int | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Name and finding: "jerk.x: 1200 mm/s3, 1.2 of the limit 1000 mm/s3 at t = 0.1 s, X1, line 3"."""
+        return f"{self.name}: {self.found}"
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def and_more(faults: list[Fault], count: int, of: str) -> list[Fault]:
+    """The faults, and one that tells how many there are in all, if these are not all `count`."""
+    if count == len(faults):
+        return faults
+    return [*faults, Fault(kind=faults[0].kind, name=faults[0].name, found=f"{count} {of} in all")]
 
 
 # What an error of the chords between samples alone can break.

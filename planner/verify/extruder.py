@@ -22,6 +22,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
+from planner.verify.excess import Fault, Kind, and_more
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, joint_times
 from planner.verify.given import Given
 from planner.verify.limits import FEED_AT_REST, ROUNDING_ULPS
@@ -42,7 +43,7 @@ class ExtruderSeen:
     """What the extruder did: of each quantity the worst (value, time, place of the axes, line), and faults of its place."""
 
     worst: list[tuple[float, float, FloatArray, int]] = field(default_factory=list)
-    faults: tuple[str, ...] = ()
+    faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = ()
 
     def checks(self, limits: FloatArray, not_limited: tuple[str, ...]) -> dict[str, LimitCheck]:
@@ -168,7 +169,7 @@ class _Watch:
             segment = int(np.clip(np.searchsorted(self.passed, t[k]) - 1, 0, len(self.toolpath) - 1))
             self.worst[which] = float(value[k]), float(t[k]), position[k], int(self.toolpath.line[segment])
 
-    def place_faults(self) -> list[str]:
+    def place_faults(self) -> list[Fault]:
         """Joints at which the extruder is not where the program wants it."""
         fed, toolpath = self.fed, self.toolpath
         last = len(toolpath) - 1
@@ -183,16 +184,14 @@ class _Watch:
         np.maximum.at(high, joint, place)
         off = np.maximum(np.maximum(low - self.seen, self.seen - high), 0.0)
         bad = np.flatnonzero(np.where(np.isnan(off), 0.0, off) > allowed * (1.0 + RATIO_ROUNDING))
-        said = [
-            f"extruder: {off[k]:.6g} mm of filament off where line {toolpath.line[max(fed.joint[k] - 1, 0)]} ends, "
-            f"{allowed[k]:.6g} mm allowed"
-            for k in bad[:FAULTS_OF_A_KIND]
-        ]
-        if len(bad) > FAULTS_OF_A_KIND:
-            said.append(f"extruder: {len(bad)} such places in all")
+        said = []
+        for k in bad[:FAULTS_OF_A_KIND]:
+            line, ratio = int(toolpath.line[max(fed.joint[k] - 1, 0)]), float(off[k] / allowed[k])
+            text = f"{off[k]:.6g} mm of filament off where line {line} ends, {allowed[k]:.6g} mm allowed"
+            said.append(Fault(kind=Kind.EXTRUDER, name="extruder", found=text, ratio=ratio, line=line))
+        said = and_more(said, len(bad), "such places")
         missed = abs(self.end - float(fed.leave[-1]))
         if missed > PLACE_ROUNDING + 2.0 * self.given.extruder_rounding:
-            said.append(
-                f"extruder: ends at {self.end:.6g} mm of filament, the program at {fed.leave[-1]:.6g} mm"
-            )
+            text = f"ends at {self.end:.6g} mm of filament, the program at {fed.leave[-1]:.6g} mm"
+            said.append(Fault(kind=Kind.EXTRUDER, name="extruder", found=text))
         return said

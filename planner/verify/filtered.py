@@ -116,7 +116,7 @@ def after_filters(
     looks = read(pieces)
     apart = contour.apart(looks, pieces, read)
     check = apart.contour_check(toolpath)
-    faults = [check.sentence(toolpath.axes)] if check.broken else []
+    faults = [check.fault(Kind.FILTERS, toolpath.axes)] if check.broken else []
     faults += apart.vertex_faults(toolpath)
     faults += findings.order(looks, toolpath, pieces)[2]
     faults = faults or findings.out_of_order(looks, toolpath, pieces)
@@ -125,7 +125,7 @@ def after_filters(
         vertex=apart.vertex_check(toolpath),
         contour_error_mm=apart.contour_error(),
         vertex_error_mm=apart.vertex_error(),
-        faults=tuple(faults),
+        faults=tuple(replace(fault, kind=Kind.FILTERS) for fault in faults),
         excesses=tuple(
             # of what the filters took in until then
             replace(each, kind=Kind.FILTERS, begin=each.begin - sum(lengths), still=0.0)

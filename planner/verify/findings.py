@@ -11,7 +11,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import in_degrees
 from planner.verify import limits as rows
-from planner.verify.excess import Excess, of_check
+from planner.verify.excess import Excess, Fault, Kind, and_more, of_check
 from planner.verify.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verify.stream import Limits, Observed
@@ -159,7 +159,9 @@ def _limit_check(
     )
 
 
-def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
+def column_faults(
+    looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces
+) -> list[Fault]:
     """Columns that do not belong to the positions (formulas in `limits`)."""
     acceleration = np.maximum(1.0, measured(looks, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
     jerk = np.maximum(1.0, measured(looks, rows.JERK)) * (1.0 + RATIO_ROUNDING)
@@ -172,12 +174,16 @@ def column_faults(looks: list[Look], limits: Limits, toolpath: Toolpath, pieces:
         for column, against, group, bound in tests:
             for axis, letter in enumerate(toolpath.axes):
                 row = group * len(toolpath.axes) + axis
-                if look.seen.worst[row, 0] > bound[axis]:
-                    where = f"t = {look.seen.time[row]:.6g} s, line {line_of(toolpath, pieces, look.seen.piece[row])}"
-                    said.append(
-                        f"columns: {column}.{letter} does not agree with {against} at {where}: "
-                        + look.noted(f"{look.seen.worst[row, 0]:.6g} of the difference that the limits allow")
+                if (ratio := float(look.seen.worst[row, 0])) > bound[axis]:
+                    time, line = float(look.seen.time[row]), line_of(toolpath, pieces, look.seen.piece[row])
+                    text = (
+                        f"{column}.{letter} does not agree with {against} at t = {time:.6g} s, line {line}: "
                     )
+                    text += look.noted(f"{ratio:.6g} of the difference that the limits allow")
+                    fault = Fault(
+                        kind=Kind.SAMPLES, name="columns", found=text, ratio=ratio, time=time, line=line
+                    )
+                    said.append(fault)
     return said
 
 
@@ -189,7 +195,7 @@ def largest_chord_error(looks: list[Look]) -> float:
 # ---- ends, order, stops -----------------------------------------------------------------------------------------------
 
 
-def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tuple[float, list[str]]:
+def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tuple[float, list[Fault]]:
     """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it.
 
     rounding : (A,) largest error of a position by its digits [mm]
@@ -204,13 +210,23 @@ def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tu
             distance = float(np.linalg.norm(place - wanted))
             worst = max(worst, distance)
             if distance > allowed:
-                text = f"{name}: the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
-                said.append(text + look.noted(f"{allowed:.2g} mm allowed, line {line}"))
+                text = f"the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
+                text += look.noted(f"{allowed:.2g} mm allowed, line {line}")
+                said.append(
+                    Fault(
+                        kind=Kind.ORDER,
+                        name=name,
+                        found=text,
+                        ratio=distance / allowed,
+                        time=time,
+                        line=int(line),
+                    )
+                )
     return worst, said
 
 
-def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[str]]:
-    """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it, in sentences."""
+def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[Fault]]:
+    """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it."""
     lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
     for look in looks:
@@ -228,16 +244,22 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple
             shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
                 " ..." if len(lines) > FAULTS_OF_A_KIND else ""
             )
-            said.append("order: " + look.noted(f"{len(here)} blocks are not run to their end, line {shown}"))
+            said.append(
+                _order(look.noted(f"{len(here)} blocks are not run to their end, line {shown}"), lines[0])
+            )
         if match.tally[HELD]:
             line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
             held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
-            said.append("order: " + look.noted(held))
+            said.append(_order(look.noted(held), line))
         in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said
 
 
-def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[str]:
+def _order(found: str, line: int) -> Fault:
+    return Fault(kind=Kind.ORDER, name="order", found=found, line=line)
+
+
+def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
     """What is wrong with a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
     been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
     for look in looks:
@@ -245,11 +267,11 @@ def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -
         if at != NOT_LOST:
             line = line_of(toolpath, pieces, at - 1)
             said = f"near enough to all of the path, but not in its order, at the end of line {line}"
-            return ["order: the motion is " + look.noted(said)]
+            return [_order("the motion is " + look.noted(said), line)]
     return []
 
 
-def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits) -> list[str]:
+def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits) -> list[Fault]:
     """Full stops that are run through, and dwells cut short."""
     joint = np.flatnonzero(pieces.joint["real"])
     # A motion above its limits leaves a rest faster than they say: it is not called short by that, too.
@@ -268,20 +290,23 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, li
         # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
         unknown = RATIO_ROUNDING * toolpath.dwell + hurry * look.seen.gap_max + 2.0 * limits.time_rounding
         short = toolpath.dwell - match.passed["rest"][joint] > unknown
+        of_kind: dict[str, list[Fault]] = {"stop": [], "dwell": []}
         for i in through[:FAULTS_OF_A_KIND]:
-            ratio = look.noted(
-                f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
-            )
-            said.append(f"stop: no full stop at {_joint_name(toolpath, i)}: {ratio}")
+            seen = f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
+            text = f"no full stop at {_joint_name(toolpath, i)}: {look.noted(seen)}"
+            of_kind["stop"].append(_stop("stop", text, toolpath, i, float(stop_ratio[i])))
         for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
-            seen = look.noted(
-                f"{match.passed['rest'][joint[i]]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
-            )
-            said.append(f"dwell: too short at {_joint_name(toolpath, i)}: {seen}")
-        for what, count in (("stop", len(through)), ("dwell", int(short.sum()))):
-            if count > FAULTS_OF_A_KIND:
-                said.append(f"{what}: {count} such places in all")
+            seen = f"{match.passed['rest'][joint[i]]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
+            text = f"too short at {_joint_name(toolpath, i)}: {look.noted(seen)}"
+            of_kind["dwell"].append(_stop("dwell", text, toolpath, i))
+        said += of_kind["stop"] + of_kind["dwell"]
+        for name, count in (("stop", len(through)), ("dwell", int(short.sum()))):
+            said += and_more(of_kind[name], count, "such places")[len(of_kind[name]) :]
     return said
+
+
+def _stop(name: str, found: str, toolpath: Toolpath, i: int, ratio: float | None = None) -> Fault:
+    return Fault(kind=Kind.STOP, name=name, found=found, ratio=ratio, line=int(toolpath.line[max(i - 1, 0)]))
 
 
 def _joint_name(toolpath: Toolpath, i: int) -> str:

@@ -20,6 +20,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
+from planner.verify.excess import Fault, and_more
 from planner.verify.findings import FAULTS_OF_A_KIND, Look, joint_times
 from planner.verify.pieces import CONTOUR_ROUNDING, ProgramPieces
 from planner.verify.verdict import ThreadCheck
@@ -47,11 +48,10 @@ def thread_checks(
     )
 
 
-def thread_faults(threads: tuple[ThreadCheck, ...]) -> list[str]:
-    """Moves that are not in step with the spindle, in sentences; the largest errors first."""
+def thread_faults(threads: tuple[ThreadCheck, ...]) -> list[Fault]:
+    """Moves that are not in step with the spindle; the largest errors first."""
     bad = sorted((thread for thread in threads if thread.broken), key=lambda thread: -thread.ratio)
-    said = [thread.sentence() for thread in bad[:FAULTS_OF_A_KIND]]
-    return said + ([f"thread: {len(bad)} such moves in all"] if len(bad) > FAULTS_OF_A_KIND else [])
+    return and_more([thread.fault() for thread in bad[:FAULTS_OF_A_KIND]], len(bad), "such moves")
 
 
 def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:

@@ -25,7 +25,7 @@ from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, Machine
 from planner.motion.trajectory import Trajectory, joined
-from planner.verify.excess import Kind
+from planner.verify.excess import Fault, Kind
 from planner.verify.findings import QUANTITIES
 from planner.verify.given import DERIVATIVES, Given
 from planner.verify.judge import verify
@@ -48,16 +48,14 @@ class JointVerdict:
     limits       : of the linear joints, "velocity.x" and so on
     tip          : the verdict of the tip's motion
     tip_error_mm : largest distance of tip and angles from the path, with what lies between setpoints [mm]; inf where it was lost
-    faults       : one sentence for each failure
-    kinds        : what each of them is about
+    faults       : each failure
     """
 
     passed: bool
     limits: dict[str, LimitCheck]
     tip: Verdict
     tip_error_mm: float
-    faults: tuple[str, ...]
-    kinds: tuple[Kind, ...]
+    faults: tuple[Fault, ...]
 
     @property
     def ratios(self) -> dict[str, float]:
@@ -79,7 +77,6 @@ class JointVerdict:
             contour_error_mm=self.tip_error_mm if known else None,
             linear_error_mm=None if linear is None else linear + more,
             faults=self.faults,
-            kinds=self.kinds,
         )
 
     def _of_joints_and_tip(self) -> dict[str, LimitCheck]:
@@ -125,20 +122,18 @@ def verify_joints(
     )
     gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
     limits = _joint_checks(setpoints, machine, given, not_limited)
-    faults = [f"joint {check.sentence(setpoints.axes)}" for check in limits.values() if check.broken]
-    of_joints = len(faults)
+    broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
+    faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
     error = (np.inf if tip.contour_error_mm is None else tip.contour_error_mm) + gap
     tolerance = tip.contour.limit
     if error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING and not tip.contour.broken:
-        faults.append(
-            f"between setpoints of the joints the tip is up to {gap:.4g} mm beside its chord: {error:.6g} mm from the path, "
+        found = (
+            f"up to {gap:.4g} mm beside its chord between setpoints of the joints: {error:.6g} mm from the path, "
             f"with {tolerance:.6g} mm allowed"
         )
-    kinds = (*[Kind.LIMIT] * of_joints, *[Kind.CONTOUR] * (len(faults) - of_joints), *tip.kinds)
+        faults.append(Fault(kind=Kind.CONTOUR, name="tip", found=found, ratio=error / tolerance))
     faults += tip.faults
-    return JointVerdict(
-        passed=not faults, limits=limits, tip=tip, tip_error_mm=error, faults=tuple(faults), kinds=kinds
-    )
+    return JointVerdict(passed=not faults, limits=limits, tip=tip, tip_error_mm=error, faults=tuple(faults))
 
 
 class _Carried:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -105,22 +105,21 @@ def verify(
         limits=limits,
         judged="acceleration" not in not_limited,
     )
-    said: list[tuple[Kind, Sequence[str]]] = [
-        (Kind.SAMPLES, of_samples),
-        (Kind.LIMIT, [check.sentence(toolpath.axes) for check in checks.values() if check.broken]),
-        (Kind.ORDER, end_faults),
-        (Kind.CONTOUR, [contour_check.sentence(toolpath.axes)] if contour_check.broken else []),
-        (Kind.VERTEX, vertex_faults),
-        (Kind.ORDER, order_faults),
-        (Kind.STOP, findings.stop_faults(looks, toolpath, pieces, limits)),
-        (Kind.EXACT, exact_faults(trajectory, looks, toolpath, limits)),
-        (Kind.THREAD, thread_faults(threads)),
-        (Kind.EXTRUDER, extruder.faults),
-        (Kind.FILTERS, after.faults if after is not None else ()),
-        (Kind.CORNER_SPEED, error_allocation.too_fast_faults(corners, toolpath.axes)),
-        (Kind.CORNER_BUDGET, error_allocation.overdrawn_faults(corners, toolpath.axes)),
-    ]
-    faults = tuple(sentence for _, sentences in said for sentence in sentences)
+    faults = (
+        *of_samples,
+        *(check.fault(Kind.LIMIT, toolpath.axes) for check in checks.values() if check.broken),
+        *end_faults,
+        *([contour_check.fault(Kind.CONTOUR, toolpath.axes)] if contour_check.broken else []),
+        *vertex_faults,
+        *order_faults,
+        *findings.stop_faults(looks, toolpath, pieces, limits),
+        *exact_faults(trajectory, looks, toolpath, limits),
+        *thread_faults(threads),
+        *extruder.faults,
+        *(after.faults if after is not None else ()),
+        *error_allocation.too_fast_faults(corners, toolpath.axes),
+        *error_allocation.overdrawn_faults(corners, toolpath.axes),
+    )
     excesses = findings.excesses(looks, checks, not_limited)
     excesses += apart.excesses() + error_allocation.excesses(corners)
     excesses += () if after is None else after.excesses
@@ -128,7 +127,6 @@ def verify(
         progress(1.0)
     return Verdict(
         passed=not faults,
-        kinds=tuple(kind for kind, sentences in said for _ in sentences),
         excesses=tuple(sorted(excesses, key=lambda each: each.begin)),
         limits=checks,
         contour=contour_check,

@@ -32,6 +32,7 @@ from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
+from planner.verify.excess import Fault, Kind
 from planner.verify.findings import QUANTITIES, Look, measured
 from planner.verify.given import Given
 from planner.verify.limits import ACCELERATION, JERK, ROUNDING_ULPS
@@ -108,7 +109,7 @@ class Delivered:
             self._first = float(when[wrong[0]]), float(periods[wrong[0]])
         self._wrong += len(wrong)
 
-    def period_faults(self) -> list[str]:
+    def period_faults(self) -> list[Fault]:
         """Periods that are not dt."""
         when, periods = self._last
         self._last = when[:0], periods[:0]
@@ -116,15 +117,17 @@ class Delivered:
         self._judge(when, np.maximum(periods - most, 0.0), periods, self.given.end_rounding)
         if not self._wrong:
             return []
-        return [
-            f"period: {self._first[1]:.9g} s between the samples at t = {self._first[0]:.6g} s and the next, dt is "
-            f"{self.dt:.9g} s ({self._wrong} such periods)"
-        ]
+        time, period = self._first
+        found = (
+            f"{period:.9g} s between the samples at t = {time:.6g} s and the next, dt is {self.dt:.9g} s "
+            f"({self._wrong} such periods)"
+        )
+        return [Fault(kind=Kind.SAMPLES, name="period", found=found, ratio=period / self.dt, time=time)]
 
 
 def density(
     trajectory: Trajectory, machine: Machine, limits: Limits, budget: float, seen: float | None
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[Fault], list[str]]:
     """Faults and notes about what is not known between samples that are further apart than the machine's period.
 
     budget : smallest tolerance of the program [mm]
@@ -143,15 +146,14 @@ def density(
         dense = np.sqrt(8.0 * max(budget - (seen or 0.0), 0.0) / most)
         remedy = f"sample every {dense:.3g} s" if dense > 0 else "sample every period"
         with_seen = f", beside the {seen:.4g} mm seen" if seen else ""
-        return [
-            f"samples: too coarse to judge: {apart}{with_seen}; the tolerance is {budget:g} mm; {remedy}"
-        ], []
+        found = f"too coarse to judge: {apart}{with_seen}; the tolerance is {budget:g} mm; {remedy}"
+        return [Fault(kind=Kind.SAMPLES, name="samples", found=found)], []
     return [], [f"{apart}; velocity, acceleration and jerk are known as means over such periods only"]
 
 
 def digits(
     trajectory: Trajectory, limits: Limits, given: Given, not_limited: tuple[str, ...]
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[Fault], list[str]]:
     """Faults and notes about what the positions and times are too coarsely written to tell."""
     if not (limits.rounding.any() or given.time_rounding):
         return [], []
@@ -166,10 +168,11 @@ def digits(
         k = int(share.argmax())
         shares.append(f"{quantity}.{axes[k]} to {100 * share[k]:.2g} % of its limit")
         if share[k] >= 1.0 and quantity not in given.columns and quantity not in not_limited:
-            faults.append(
-                f"samples: too few digits to judge {quantity}.{axes[k]}: positions good to {error[k]:.2g} mm every {h:g} s leave it "
+            found = (
+                f"too few digits to judge {quantity}.{axes[k]}: positions good to {error[k]:.2g} mm every {h:g} s leave it "
                 f"unknown to {share[k]:.3g} times its limit; write more digits, or report it unjudged: --not-limited {quantity}"
             )
+            faults.append(Fault(kind=Kind.SAMPLES, name="samples", found=found))
         if share[k] < WORTH_A_WORD:
             shares.pop()
     if not shares:
@@ -178,7 +181,7 @@ def digits(
     return faults, [f"{said}: their differences know {', '.join(shares)}"]
 
 
-def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list[str]:
+def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list[Fault]:
     """A first or last sample that is not at rest."""
     t, x, given, axes = delivered.ends["t"], delivered.ends["position"], delivered.given, limits.axes
     if len(t) < 2:
@@ -200,16 +203,16 @@ def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list
         )
         k = int(over.argmax())
         if over[k] > 0:
-            said.append(
-                f"{name}: not at rest: {axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
+            found = (
+                f"not at rest: {axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
                 f"next to it, {furthest[k]:.4g} mm are possible{advice}"
             )
+            said.append(Fault(kind=Kind.SAMPLES, name=name, found=found, time=float(t[at])))
         for quantity, row in (("velocity", 0), ("acceleration", 1)):
             value: FloatArray = np.abs(delivered.ends[quantity][at])
             k = int((value / limits.per_axis[row]).argmax())
             judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
             if judged and value[k] > RATIO_ROUNDING * limits.per_axis[row, k]:
-                said.append(
-                    f"{name}: not at rest: {quantity}.{axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
-                )
+                found = f"not at rest: {quantity}.{axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
+                said.append(Fault(kind=Kind.SAMPLES, name=name, found=found, time=float(t[at])))
     return said

@@ -7,7 +7,7 @@ from typing import Any
 
 from planner.base.arrays import FloatArray, freeze
 from planner.verify.corners import CornerCheck
-from planner.verify.excess import Excess, Kind
+from planner.verify.excess import Excess, Fault, Kind
 from planner.verify.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verify.ringing import Ringing
 
@@ -47,11 +47,15 @@ class LimitCheck:
 
     def sentence(self, axes: tuple[str, ...]) -> str:
         """Value, ratio, limit, time, place and line: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
+        return self.fault(Kind.LIMIT, axes).sentence
+
+    def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
+        """What is wrong where the limit does not hold."""
         where = " ".join(f"{letter}{value:.6g}" for letter, value in zip(axes, self.position, strict=True))
-        said = f"{self.name}: {self.value:.7g} {self.unit}, {self.ratio:.6g} of the limit {self.limit:.6g} {self.unit}"
-        return f"{said} at t = {self.time:.6g} s, {where}, line {self.line}" + (
-            f" ({self.note})" if self.note else ""
-        )
+        found = f"{self.value:.7g} {self.unit}, {self.ratio:.6g} of the limit {self.limit:.6g} {self.unit}"
+        found = f"{found} at t = {self.time:.6g} s, {where}, line {self.line}"
+        found += f" ({self.note})" if self.note else ""
+        return Fault(kind=kind, name=self.name, found=found, ratio=self.ratio, time=self.time, line=self.line)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,12 +83,13 @@ class ThreadCheck:
         """True if the move is out of step."""
         return self.error_mm > self.allowed_mm * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
 
-    def sentence(self) -> str:
+    def fault(self) -> Fault:
         """Distance, what is allowed, feed and line."""
-        return (
-            f"thread: {self.error_mm:.6g} mm out of step with the spindle, {self.allowed_mm:.6g} mm allowed, at the feed "
+        found = (
+            f"{self.error_mm:.6g} mm out of step with the spindle, {self.allowed_mm:.6g} mm allowed, at the feed "
             f"{self.feed:.6g} mm/s, line {self.line}"
         )
+        return Fault(kind=Kind.THREAD, name="thread", found=found, ratio=self.ratio, line=self.line)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,7 +100,7 @@ class AfterFilters:
     vertex: LimitCheck
     contour_error_mm: float | None
     vertex_error_mm: float | None
-    faults: tuple[str, ...]
+    faults: tuple[Fault, ...]
     excesses: tuple[Excess, ...] = ()
 
 
@@ -121,8 +126,7 @@ class Verdict:
     lost             : indices of blocks that the motion never visits
     lost_lines       : their NC lines
     threads          : moves in step with the spindle, in the order of the program, each with how far it is out of step
-    faults           : one sentence for each failure: what, by how much, when, where, NC line
-    kinds            : what each of the faults is about
+    faults           : each failure: what, by how much, when, where, NC line; `str` of one is its sentence
     excesses         : spans of time in which limits or the tolerance are exceeded, as far as their times are known
     after_filters    : errors of the motion behind the filters of the machine; None for a machine without filters
     ringing          : what each vibration mode of the machine does; reported, not judged
@@ -141,8 +145,7 @@ class Verdict:
     order: bool
     lost: tuple[int, ...]
     lost_lines: tuple[int, ...]
-    faults: tuple[str, ...]
-    kinds: tuple[Kind, ...] = ()
+    faults: tuple[Fault, ...]
     excesses: tuple[Excess, ...] = ()
     linear_error_mm: float | None = None
     angle_error_deg: float | None = None
@@ -156,6 +159,16 @@ class Verdict:
         """Whether it passed, and the first fault."""
         more = f", and {len(self.faults) - 1} more" if len(self.faults) > 1 else ""
         return "<Verdict: passed>" if self.passed else f"<Verdict: failed, {self.faults[0]}{more}>"
+
+    @property
+    def kinds(self) -> frozenset[Kind]:
+        """What the faults are about."""
+        return frozenset(fault.kind for fault in self.faults)
+
+    @property
+    def sentences(self) -> list[str]:
+        """The faults in words."""
+        return [fault.sentence for fault in self.faults]
 
     def summary(self) -> dict[str, Any]:
         """The part `verdict` of `summary.json`."""

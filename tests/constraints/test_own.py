@@ -106,13 +106,13 @@ def test_a_motion_planned_without_is_faulted(job, limit):
     made = planner.plan(job, corner="bezier")
     machine = made.machine.with_own([limit])
     found = verify(made.trajectory, made.toolpath, machine)
-    assert any(limit.name in fault for fault in found.faults)
+    assert any(limit.name in fault for fault in found.sentences)
     by_positions = verify(made.trajectory, made.toolpath, machine, given=Given(columns=()))
-    assert any(limit.name in fault and "differences" in fault for fault in by_positions.faults)
+    assert any(limit.name in fault and "differences" in fault for fault in by_positions.sentences)
     reported = verify(
         made.trajectory, made.toolpath, machine, not_limited=("velocity", "acceleration", "jerk")
     )
-    assert not any(limit.name in fault for fault in reported.faults)
+    assert not any(limit.name in fault for fault in reported.sentences)
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_the_path_limit_on_a_line_is_the_ramp(tmp_path):
 
 def test_other_methods_are_judged_by_it(job):
     made = planner.plan(job, method="kinematic", limits=[Soft()])
-    assert any("spindle power" in fault for fault in made.verdict.faults)
+    assert any("spindle power" in fault for fault in made.verdict.sentences)
 
 
 class _Bad(Soft):

@@ -50,7 +50,7 @@ def test_a_joint_that_is_too_fast_fails_the_plan(plan: planner.Plan) -> None:
     found = in_joints(plan, slower, kinematics_of(slower)).verdict
     assert found is not None
     assert not found.passed
-    assert any(fault.startswith("joint velocity.y") for fault in found.faults)
+    assert any(fault.startswith("joint velocity.y") for fault in found.sentences)
     assert found.limits["velocity.y"].broken
 
 

@@ -143,7 +143,7 @@ def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(mending, "mended", lambda *of_motion: None)
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed
-    assert all("after the filters" in fault for fault in made.verdict.faults)
+    assert all("after the filters" in fault for fault in made.verdict.sentences)
 
 
 # --- the closed forms along arcs ----------------------------------------------------------------------------------------------

@@ -143,7 +143,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[0]
-    assert any(fault.startswith("eq. 19") for fault in free.verdict.faults)
+    assert any(fault.startswith("eq. 19") for fault in free.verdict.sentences)
 
 
 def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch):
@@ -160,7 +160,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[1]
-    assert any(fault.startswith("eq. 18") for fault in free.verdict.faults)
+    assert any(fault.startswith("eq. 18") for fault in free.verdict.sentences)
 
 
 @pytest.mark.parametrize("method", ["optimal", "second-order", "kinematic", "fir"])
@@ -169,7 +169,7 @@ def test_a_plan_for_faster_axes_breaks_equation_19(method):
     plan = planner.plan(JOBS["zigzag"], problems.machine(acceleration=8000.0, jerk=1.6e6), method=method)
     verdict = verify(plan.trajectory, plan.toolpath, MACHINE, not_limited=("jerk",))
     assert laws_broken(verdict.corners)[0]
-    assert any(fault.startswith("eq. 19") for fault in verdict.faults)
+    assert any(fault.startswith("eq. 19") for fault in verdict.sentences)
 
 
 def test_without_sharing_the_budget_equation_18_is_broken():

@@ -234,7 +234,8 @@ def test_start_stop_speed_is_a_step_at_the_vertex():
     assert "step of velocity" in stepping.sentence
     assert not stepping.verdict.passed
     assert all(
-        fault.startswith(("acceleration", "jerk", "columns", "motion")) for fault in stepping.verdict.faults
+        fault.startswith(("acceleration", "jerk", "columns", "motion"))
+        for fault in stepping.verdict.sentences
     )
     assert stepping.verdict.vertex_error_mm <= 1e-3
     speed = stepping.trajectory.velocity

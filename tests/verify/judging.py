@@ -26,11 +26,15 @@ def judge(motion, toolpath, machine=M, **more):
 
 
 def fault(verdict, begins):
-    """The one fault that begins so."""
+    """The sentence of the first fault that begins so; what its record knows stands in it."""
     assert not verdict.passed
-    found = [text for text in verdict.faults if text.startswith(begins)]
+    found = [each for each in verdict.faults if str(each).startswith(begins)]
     assert found, verdict.faults
-    return found[0]
+    record, text = found[0], str(found[0])
+    assert record.line is None or f"line {record.line}" in text
+    assert record.time is None or f"{record.time:.6g} s" in text or "not at rest" in text
+    assert record.ratio is None or record.ratio > 1.0
+    return text
 
 
 @njit

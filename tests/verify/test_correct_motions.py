@@ -70,7 +70,7 @@ def test_helices_are_on_their_own_path(sweep, rise):
     verdict = judge(motion, toolpath)
     # the program's end point is rounded to 1e-4 mm, so that end and contour are off by that much
     assert verdict.contour_error_mm < 1.2e-4
-    assert [fault for fault in verdict.faults if not fault.startswith(("end", "start", "stop"))] == []
+    assert [fault for fault in verdict.sentences if not fault.startswith(("end", "start", "stop"))] == []
 
 
 @pytest.mark.parametrize("angle", [10.0, 90.0, 150.0])
@@ -81,7 +81,7 @@ def test_a_corner_cut_by_the_whole_budget_passes_and_is_measured(angle):
     toolpath = Moves().line(*points[1]).line(*points[2]).toolpath(fast)
     verdict = judge(rounded(points, 0.0495, 5.0), toolpath, fast, not_limited=JERK_FREE)
     # it neither starts nor ends at rest
-    assert [f for f in verdict.faults if not f.startswith(("stop", "start", "end"))] == []
+    assert [f for f in verdict.sentences if not f.startswith(("stop", "start", "end"))] == []
     assert verdict.vertex_error_mm == pytest.approx(0.0495, rel=5e-3)
     assert verdict.order
 

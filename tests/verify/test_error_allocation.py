@@ -43,7 +43,7 @@ def judged(motion, points, on=UNEQUAL, between=True, **more):
 
 
 def laws_broken(verdict):
-    return [fault for fault in verdict.faults if fault.startswith("eq.")]
+    return [fault for fault in verdict.sentences if fault.startswith("eq.")]
 
 
 def arc_of(theta, cut):
@@ -209,7 +209,7 @@ def test_a_budget_that_chords_overdraw_is_a_fault_wherever_the_samples_fall():
         verdict = judged(chain(stay(points[0], wait), rounded(points, 0.045, feed)), points, on)
         assert verdict.corners.budget_ratio[0] == pytest.approx(0.053 / 0.05, rel=2e-3)
         assert [fault for fault in laws_broken(verdict) if fault.startswith("eq. 18")]
-        shown += any(fault.startswith("vertex") for fault in verdict.faults)
+        shown += any(fault.startswith("vertex") for fault in verdict.sentences)
     assert 0 < shown < 8
 
 
@@ -258,5 +258,5 @@ def test_accelerations_from_positions_break_the_law_only_if_the_motion_does(digi
         assert verdict.corners.count == 1
         # of 1780 mm/s2 4 r / h^2 is 3.5 for six digits, 350 for four; it is in there once and taken off once
         assert verdict.corners.speed_ratio[0] > share * {None: 0.99, 6: 0.98, 4: 0.6}[digits]
-        broken = any(fault.startswith("eq. 19") for fault in verdict.faults)
+        broken = any(fault.startswith("eq. 19") for fault in verdict.sentences)
         assert broken == (share > 1)

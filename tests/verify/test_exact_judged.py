@@ -45,7 +45,7 @@ def faults(plan: Plan, motion: Trajectory, mode: str) -> list[str]:
     program = planner.read_program(text=TEXT.format(mode=mode), machine=plan.machine)
     path = toolpath_from_program(program, plan.machine)
     found = verify(motion, path, plan.machine, not_limited=("acceleration", "jerk", "velocity"))
-    return [fault for fault in found.faults if "exact path" in fault]
+    return [fault for fault in found.sentences if "exact path" in fault]
 
 
 @pytest.mark.parametrize("block", range(6))
@@ -130,7 +130,7 @@ def test_within_the_tolerance_of_a_whole_circle_the_order_says_where_a_sample_is
         machine,
         not_limited=("acceleration", "jerk", "velocity"),
     )
-    assert any(fault.startswith("exact path: 5e-05 mm off") for fault in found.faults)
+    assert any(fault.startswith("exact path: 5e-05 mm off") for fault in found.sentences)
 
 
 # ---- the order of the path within the tolerance -------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def found_in(asked: str, run: str, method: str = "second-order", machine: Machin
     motion, program = made.trajectory, planner.read_program(text=RUN_IN + asked, machine=machine)
     axes = "".join(motion.axes)
     found = planner.verify(motion.t, motion.position, program, machine, axes=axes, not_limited=("jerk",))
-    return list(found.faults)
+    return list(found.sentences)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_digits_of_the_positions_are_allowed(digits: int) -> None:
         given=Given(columns=(), position_rounding=np.full(3, 0.5 * 10.0**-digits)),
         not_limited=("jerk",),
     )
-    assert not [fault for fault in found.faults if fault.startswith("exact path")]
+    assert not [fault for fault in found.sentences if fault.startswith("exact path")]
 
 
 def test_an_overshoot_along_a_side_is_measured() -> None:
@@ -236,5 +236,5 @@ def test_half_of_a_line_beside_a_block_under_g64_is_exact(plan: Plan, share: flo
         plan.machine,
         not_limited=("acceleration", "jerk", "velocity"),
     )
-    exact = [fault for fault in found.faults if fault.startswith("exact path: 5e-05 mm off")]
+    exact = [fault for fault in found.sentences if fault.startswith("exact path: 5e-05 mm off")]
     assert len(exact) == (share > 0.5)

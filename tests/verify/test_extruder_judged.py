@@ -34,7 +34,7 @@ def plan() -> Plan:
 def judged(plan: Plan, extruder: FloatArray) -> list[str]:
     assert plan.trajectory is not None
     motion = dataclasses.replace(plan.trajectory, extruder=extruder)
-    return list(verify(motion, plan.toolpath, plan.machine, not_limited=("jerk",)).faults)
+    return list(verify(motion, plan.toolpath, plan.machine, not_limited=("jerk",)).sentences)
 
 
 def test_what_was_planned_passes(plan: Plan) -> None:
@@ -68,7 +68,7 @@ def test_each_limit_is_found_broken_when_it_is_lowered(plan: Plan, quantity: str
     lower = fed.limits.copy()
     lower[which] *= 0.99 * ratio
     path = dataclasses.replace(plan.toolpath, extrusion=dataclasses.replace(fed, limits=lower))
-    faults = verify(trajectory, path, plan.machine).faults
+    faults = verify(trajectory, path, plan.machine).sentences
     assert any(fault.startswith(f"{quantity}.e:") for fault in faults)
 
 

@@ -19,7 +19,7 @@ from motions import (
 )
 
 from planner.base.errors import InputError
-from planner.verify import verify
+from planner.verify import Kind, verify
 
 # ---- limits ----------------------------------------------------------------------------------------------------------
 
@@ -39,7 +39,7 @@ def test_an_axis_limit_broken_by_a_little_is_found(tightened, name, ratio):
     assert verdict.limits[name].ratio == pytest.approx(ratio, rel=1e-4)
     assert "line" in fault(verdict, name)
     for other in ("column", "end", "start", "vertex", "contour", "order", "dwell"):
-        assert not any(text.startswith(other) for text in verdict.faults)
+        assert not any(text.startswith(other) for text in verdict.sentences)
 
 
 def test_the_positions_convict_where_the_columns_are_silent():
@@ -58,7 +58,12 @@ def test_one_axis_too_fast_is_named_with_its_line():
     verdict = judge(chain(*legs), toolpath, not_limited=JERK_FREE)
     assert "line 20" in fault(verdict, "velocity.y")
     assert verdict.limits["velocity.y"].ratio == pytest.approx(1.04, abs=1e-9)
-    assert len(verdict.faults) == 1
+    (found,) = verdict.faults
+    assert (found.kind, found.name, found.line) == (Kind.LIMIT, "velocity.y", 20)
+    assert found.ratio == pytest.approx(1.04, abs=1e-9)
+    assert found.time is not None
+    assert f"{found.name}: " in str(found)
+    assert verdict.kinds == {Kind.LIMIT}
 
 
 def test_acceleration_between_the_samples_is_seen_in_the_asked_motion_only():
@@ -179,7 +184,7 @@ def test_a_contour_error_of_101_percent_is_found():
         return r, v, a, j
 
     fits = judge((duration, lambda t: bulging(t, 0.05)), toolpath)
-    assert [f for f in fits.faults if not f.startswith("feed")] == []
+    assert [f for f in fits.sentences if not f.startswith("feed")] == []
     assert fits.contour_error_mm == pytest.approx(0.05, abs=1e-6)
     verdict = judge((duration, lambda t: bulging(t, 0.0505)), toolpath)
     assert verdict.contour_error_mm == pytest.approx(0.0505, abs=1e-6)
@@ -250,4 +255,4 @@ def test_a_stop_run_through_slowly_is_no_rest_where_jerk_is_limited(speed):
     assert "no full stop" in fault(verdict, "stop")
     rests = chain(*(polyline([(a, 0, 0), (a + 0.5, 0, 0)], feed=speed, jerk=2e5) for a in (0.0, 0.5)))
     verdict = judge(rests, toolpath)
-    assert not [text for text in verdict.faults if text.startswith("stop")], verdict.faults
+    assert not [text for text in verdict.sentences if text.startswith("stop")], verdict.sentences

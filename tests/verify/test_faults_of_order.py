@@ -144,7 +144,7 @@ def test_a_stop_that_is_rounded_is_found():
     toolpath = Moves().line(*points[1], control=PathControl.EXACT_STOP).line(*points[2]).toolpath(M)
     assert judge(polyline(points, jerk=2e5), toolpath).passed
     verdict = judge(rounded(points, 0.03, 5.0), toolpath, not_limited=JERK_FREE)
-    assert any("line 10" in text for text in verdict.faults if text.startswith("stop"))
+    assert any("line 10" in text for text in verdict.sentences if text.startswith("stop"))
 
 
 def test_a_stop_before_the_vertex_is_found():
@@ -166,7 +166,7 @@ def test_vertices_that_are_near_in_the_wrong_order_are_found(tolerance: float, i
     assert verdict.vertex.ratio < 1
     assert verdict.contour.ratio < 1
     assert verdict.order == in_order
-    assert any("not in its order" in said for said in verdict.after_filters.faults) != in_order
+    assert any("not in its order" in str(said) for said in verdict.after_filters.faults) != in_order
     if not in_order:
         assert fault(verdict, "order").startswith(
             "order: the motion is near enough to all of the path, but not in its order, at the end of line 20"

@@ -76,7 +76,7 @@ def test_a_slow_block_run_fast_is_found_however_short_it_is(length, tolerance):
     for phase in np.linspace(0.0, 0.875, 8):
         fast = shifted(ramp(m, [80], [20]), phase * m.dt)
         verdict = judged(fast, toolpath, m)
-        fault = [text for text in verdict.faults if text.startswith("feed: ")]
+        fault = [text for text in verdict.sentences if text.startswith("feed: ")]
         assert fault, phase
         # a chord of 0.08 mm of which the share `length` is at 1 mm/s may last 0.08 / 80 + length (1 - 1/80) at least
         in_chord = min(length, 0.08)

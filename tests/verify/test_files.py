@@ -59,8 +59,8 @@ def test_few_digits_and_any_first_time_are_judgeable(tmp_path, kind, offset):
 def test_what_too_few_digits_cannot_tell_is_a_fault(tmp_path):
     given = {name: np.round(values, 4) if name != "t" else values for name, values in columns().items()}
     verdict, _ = judged(tmp_path, program(), **given)
-    assert any(text.startswith("samples: too few digits to judge jerk") for text in verdict.faults)
-    assert not any(text.startswith(("acceleration", "jerk")) for text in verdict.faults)
+    assert any(text.startswith("samples: too few digits to judge jerk") for text in verdict.sentences)
+    assert not any(text.startswith(("acceleration", "jerk")) for text in verdict.sentences)
     free, _ = judged(tmp_path, program(), not_limited=("jerk",), **given)
     assert free.passed, free.faults
 
@@ -68,7 +68,7 @@ def test_what_too_few_digits_cannot_tell_is_a_fault(tmp_path):
 def test_an_excess_beyond_the_digits_is_found(tmp_path):
     given = {name: values.astype(np.float32) for name, values in columns().items()}
     verdict, _ = judged(tmp_path, program(), limits=machine(acceleration=1900.0), **given)
-    assert any(text.startswith("acceleration.x") for text in verdict.faults)
+    assert any(text.startswith("acceleration.x") for text in verdict.sentences)
 
 
 def test_axes_that_the_program_does_not_move_may_be_missing(tmp_path):
@@ -128,7 +128,9 @@ def test_samples_too_coarse_to_judge_are_a_fault_and_others_a_note(tmp_path):
 
     verdict, _ = at(0.05)
     bow = np.sqrt(3) * 2000 * 0.05**2 / 8
-    assert any(text.startswith("samples: too coarse") and f"{bow:.4g} mm" in text for text in verdict.faults)
+    assert any(
+        text.startswith("samples: too coarse") and f"{bow:.4g} mm" in text for text in verdict.sentences
+    )
     verdict, notes = at(0.004)
     assert verdict.passed, verdict.faults
     assert any("means over such periods" in note for note in notes)
@@ -137,9 +139,9 @@ def test_samples_too_coarse_to_judge_are_a_fault_and_others_a_note(tmp_path):
 @pytest.mark.parametrize("cut", [1, 2, 5])
 def test_a_file_whose_end_is_cut_off_is_found(tmp_path, cut):
     verdict, _ = judged(tmp_path, program(), **{name: values[:-cut] for name, values in columns().items()})
-    assert any(text.startswith("end") for text in verdict.faults)
+    assert any(text.startswith("end") for text in verdict.sentences)
     verdict, _ = judged(tmp_path, program(), **{name: values[cut:] for name, values in columns().items()})
-    assert any(text.startswith("start") for text in verdict.faults)
+    assert any(text.startswith("start") for text in verdict.sentences)
 
 
 def test_normal_acceleration_by_positions_is_never_above_the_true_one_and_an_excess_is_found():

@@ -152,7 +152,7 @@ def test_a_motion_that_leaves_the_tolerance_behind_the_filters_fails():
     for fir, passes in ((Fir(time_constants=(0.01, 0.004)), True), (Fir(time_constants=(0.05, 0.03)), False)):
         judged = verify(made.trajectory, made.toolpath, problems.machine(fir=fir))
         assert judged.passed == passes
-        assert any("after the filters" in fault for fault in judged.faults) != passes
+        assert any("after the filters" in fault for fault in judged.sentences) != passes
         assert judged.summary()["vertex_error_after_filters_mm"] == judged.after_filters.vertex_error_mm
     assert judged.after_filters.vertex_error_mm == pytest.approx(0.126, abs=5e-4)
     assert judged.contour_error_mm < 1e-5
@@ -166,4 +166,4 @@ def test_a_lost_motion_has_no_number():
     cut = dataclasses.replace(half, **{name: getattr(half, name)[kept] for name in names})
     judged = verify(cut, made.toolpath, problems.machine(fir=Fir(time_constants=(0.01,))))
     assert not judged.passed
-    assert any("after the filters" in fault for fault in judged.faults)
+    assert any("after the filters" in fault for fault in judged.sentences)

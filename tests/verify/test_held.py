@@ -52,7 +52,7 @@ def down(speed: float, wave: float = 0.0):
 
 
 def threads(verdict):
-    return [text for text in verdict.faults if text.startswith("thread")]
+    return [text for text in verdict.sentences if text.startswith("thread")]
 
 
 def test_a_thread_at_its_feed_passes() -> None:
@@ -80,7 +80,7 @@ def test_the_verdict_has_a_field_for_threads() -> None:
     verdict = judge(down(0.9 * FEED), toolpath())
     (lost,) = verdict.threads
     assert lost.broken
-    assert lost.sentence() in verdict.faults
+    assert str(lost.fault()) in verdict.sentences
     assert verdict.summary()["thread_error_mm"] == lost.error_mm == pytest.approx(lost.ratio * 0.05)
     straight = toolpath_from_program(parse_program(f"G21 G90 F1500\nG1 Z-{LENGTH}\nM2"), M)
     assert judge(down(FEED), straight).threads == ()

@@ -67,7 +67,7 @@ def test_faults_are_found(plan, setpoints: Trajectory, change, said: str) -> Non
     changed = dataclasses.replace(setpoints, **change(setpoints))
     found = verify_joints(changed, plan.toolpath, MACHINE, not_limited=NOT_LIMITED)
     assert not found.passed
-    assert any(re.search(said, fault) for fault in found.faults), found.faults
+    assert any(re.search(said, str(fault)) for fault in found.faults), found.faults
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def test_detours_are_measured_or_unknown_but_never_wrong(seed):
             assert verdict.vertex_error_mm == pytest.approx(far[1], rel=1e-6, abs=1e-9)
         if None in (verdict.contour_error_mm, verdict.vertex_error_mm):
             assert verdict.lost_after in (20, 30, 40)
-            assert any("lost after line" in text for text in verdict.faults)
+            assert any("lost after line" in text for text in verdict.sentences)
     assert known >= 4
 
 

@@ -23,7 +23,7 @@ NO_COLUMNS = Given(columns=())
 def said(kind, trajectory, toolpath, **more):
     """The faults of a kind, by positions alone."""
     verdict = verify(trajectory, toolpath, M, given=NO_COLUMNS, **more)
-    return [text for text in verdict.faults if text.startswith(kind)]
+    return [text for text in verdict.sentences if text.startswith(kind)]
 
 
 def along_x(x):
@@ -105,7 +105,7 @@ def test_digits_of_the_times_are_allowed_at_both_ends_of_a_dwell():
     for digits, allowed in ((0.4 * H, True), (0.2 * H, False)):
         given = Given(columns=(), time_rounding=digits)
         found = [
-            verify(dwelling(0.02 - 0.79 * H, phase), toolpath, M, given=given).faults for phase in PHASES
+            verify(dwelling(0.02 - 0.79 * H, phase), toolpath, M, given=given).sentences for phase in PHASES
         ]
         short = [any(text.startswith("dwell") for text in faults) for faults in found]
         assert not any(short) if allowed else any(short)
@@ -120,7 +120,7 @@ def test_digits_of_the_last_time_are_allowed_to_a_dwell_at_the_end(digits, long_
     t = motion.t.copy()
     t[-1] -= 0.1 * H
     given = Given(columns=(), end_rounding=digits)
-    found = verify(dataclasses.replace(motion, t=t), toolpath, M, given=given).faults
+    found = verify(dataclasses.replace(motion, t=t), toolpath, M, given=given).sentences
     assert (not any(text.startswith("dwell") for text in found)) == long_enough
 
 
@@ -184,7 +184,7 @@ def test_columns_may_differ_from_the_mean_of_a_period_by_what_the_limits_allow(
         given=Given(columns=columns),
         not_limited=limited,
     )
-    assert any(text.startswith(f"columns: {columns[-1]}.x") for text in found.faults) != agrees
+    assert any(text.startswith(f"columns: {columns[-1]}.x") for text in found.sentences) != agrees
 
 
 # ---- G61: a vertex of an arc is missed by its chord by no more than a h^2 / 8 ----------------------------------------------------
@@ -202,7 +202,7 @@ def test_between_samples_on_an_exact_arc_its_vertices_are_missed_by_the_bow_of_t
     found = verify(
         trajectory_of(H * np.arange(len(angle)), place, 0 * place), toolpath, strong, given=NO_COLUMNS
     )
-    assert any(text.startswith("exact path") for text in found.faults) != exact
+    assert any(text.startswith("exact path") for text in found.sentences) != exact
 
 
 # ---- order within one chord --------------------------------------------------------------------------------------------------

@@ -137,4 +137,4 @@ def test_samples_of_a_clock_that_jitters_are_judged_at_their_own_times():
         if t is jittering:
             less = changed(whole, **{name: value[keep] for name, value in (columns | rows).items()})
             verdict = verify(less, toolpath, m, given=Given(columns=()), not_limited=("jerk",))
-            assert any(text.startswith("period: ") for text in verdict.faults)
+            assert any(text.startswith("period: ") for text in verdict.sentences)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.base.names import METHODS, NORMAL, OPTIMAL, users_of
+from planner.base.names import OPTIMAL, users_of
 from planner.commands.exit_codes import FAILED
 from planner.commands.first_run import Helper
 from planner.commands.options import (
@@ -137,8 +137,7 @@ def plan_command(
         return
     (job,) = jobs
     from planner import plan
-    from planner.commands.time_left import TimeLeft
-    from planner.job.trace import Step, Trace
+    from planner.job.trace import Trace
     from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, summary, write_plan
 
@@ -149,22 +148,9 @@ def plan_command(
     if trace is not None:
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
-    left = TimeLeft(
-        solves=METHODS[method].shapes,
-        effort=effort or NORMAL,
-        rounds=rounds,
-        writes=output is not None,
-        searched=method == OPTIMAL and not any(how[name] for name in how if name != "effort"),
-    )
-
-    def log(step: Step) -> None:
-        progress.log(step)
-        if verbose or trace is not None:
-            steps(step)
-
     with (
         Helper(str(machine or DEFAULT_MACHINE), method) as helper,
-        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start, left=left) as progress,
+        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start) as progress,
     ):
         result = plan(
             job,
@@ -173,7 +159,7 @@ def plan_command(
             tolerance=tolerance,
             reading=reading,
             progress=progress,
-            log=log,
+            log=steps if verbose or trace is not None else None,
             **how,
         )
         written: list[str] = []

@@ -31,6 +31,8 @@ is imported on first use, so that `import planner` costs nothing.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from planner.job.shown import VIEWS
+
 if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
     from planner.constraints.own import JointLimit, PathLimit
@@ -76,6 +78,14 @@ _HOME = {
     "InputError": "planner.base.errors",
     "NotSolvedError": "planner.base.errors",
 }
+
+VIEWS.update(
+    to_pandas="planner.interactive.frame:plan_frame",
+    plot="planner.interactive.figures:PlanFigures",
+    save="planner.interactive.files:save",
+    report="planner.interactive.page:ReportPage",
+    card="planner.interactive.card:plan_card",
+)
 
 __all__ = [
     "InputError",

@@ -12,9 +12,15 @@ from planner.job.records import GridHistory, PriceList
 from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
-from planner.verify import CornerCheck
+from planner.verify import CornerCheck, Fault, Kind
 
 SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
+
+TOO_FAST = Fault(
+    kind=Kind.LIMIT,
+    name="velocity.y",
+    found="101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",
+)
 
 
 def trajectory_along(toolpath: Any, *, dt: float = 1e-3, time: float = 0.2) -> Trajectory:
@@ -70,9 +76,8 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         ringing=(),
         lost_after=None,
         notes=(),
-        faults=()
-        if passed
-        else ("velocity.y: 101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",),
+        faults=() if passed else (TOO_FAST,),
+        sentences=[] if passed else [str(TOO_FAST)],
         summary=lambda: {
             "passed": passed,
             "limits": {"velocity.x": 0.5, "velocity.y": 1.0000014, "acceleration.x": 0.75, "jerk.x": 3.5},

@@ -205,6 +205,14 @@ def test_nobody_who_plans_uses_the_verifier() -> None:
                 assert imported <= names, f"{module} imports {', '.join(sorted(imported - names))}"
 
 
+def test_a_plan_knows_nothing_of_what_shows_it() -> None:
+    """Neither by an import for annotations nor by a module's name."""
+    for module in ("planner.job.plan", "planner.job.shown"):
+        text = MODULES[module].read_text(encoding="utf-8")
+        for later in ("planner.interactive", "planner.report"):
+            assert later not in text, module
+
+
 def test_kernels_are_made_where_the_cache_may_fail() -> None:
     for module, file in MODULES.items():
         if module == "planner.base.compiling":  # where kernels.py has them made

@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from planner.geometry.point_matching import SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
 from planner.job.notes import job_notes
 from planner.job.plan import Plan
-from planner.job.records import NO_TABLES, GridHistory, Tables
+from planner.job.records import NO_TABLES, Delivered, GridHistory, Making, Tables
 from planner.job.stages import Stages
 from planner.job.trace import Tell
 from planner.lookahead.stop_moves import stop_time
@@ -33,9 +32,8 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
-from planner.verify import OF_CHORDS, Verdict, verify
+from planner.verify import OF_CHORDS, verify
 
-Delivered = tuple[Trajectory, Verdict]
 FILTERS = "filters"
 # A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this share of its time [-].
 CHEAP = 1e-4
@@ -57,8 +55,6 @@ class Job:
     noted     : what the method has noted so far (`note`)
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
     most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
-    motion_of : the motions of the trajectories delivered so far, as long as the trajectories exist
-    mended    : of trajectories that failed, what was delivered of the same motion run slower in places
     slowed_by : what made one of the motions slower than its limits did, noted as it happens: `FILTERS` or nothing
     """
 
@@ -69,8 +65,6 @@ class Job:
     noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
     most: float = np.inf
-    motion_of: WeakKeyDictionary[Trajectory, MotionInTime] = field(default_factory=WeakKeyDictionary)
-    mended: WeakKeyDictionary[Trajectory, Delivered] = field(default_factory=WeakKeyDictionary)
     slowed_by: set[str] = field(default_factory=set)
 
     @property
@@ -163,31 +157,28 @@ class Job:
         not_limited : quantities that are reported and not judged, "jerk" for example
         as_it_is    : whatever the verdict finds; else the motion is run slower where that mends it (delivery/mending.py). If only the
                       chords between samples are in the way, and that costs more than `CHEAP`, a motion planned with less tolerance may
-                      be faster: then the motion is delivered as it is, and the slower one is in `mended`.
+                      be faster: then the motion is delivered as it is, with the slower one.
 
         Standstills are added where the chords between samples would cut off a full stop (delivery/periods.py).
-
-        Returns the trajectory and the verdict.
         """
         made, stands = self._delivered(motion, not_limited, 0)
-        if as_it_is or made[1].passed:
+        if as_it_is or made.verdict.passed:
             return made
         slower, mended = motion, made
         for again in range(mending.ROUNDS):
-            found = mending.mended(slower, stands, mended[1], self.real[0].dt, again)
+            found = mending.mended(slower, stands, mended.verdict, self.real[0].dt, again)
             if found is None:
                 return made
-            places = len(mended[1].excesses)
+            places = len(mended.verdict.excesses)
             self.tell("slower in places", found=found.end, before=slower.end, places=places)
             slower = found
             mended, stands = self._delivered(slower, not_limited, again + 1)
-            if mended[1].passed:
+            if mended.verdict.passed:
                 break
-        if not mended[1].passed:
+        if not mended.verdict.passed:
             return made
-        if made[1].kinds & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
-            self.mended[made[0]] = mended
-            return made
+        if made.verdict.kinds & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
+            return made._replace(slower=mended)
         return mended
 
     def _delivered(
@@ -223,9 +214,7 @@ class Job:
                 not_limited=not_limited,
                 progress=progress,
             )
-        trajectory = self._named(trajectory, places)
-        self.motion_of[trajectory] = motion
-        return (trajectory, verdict), stands
+        return Delivered(self._named(trajectory, places), verdict, motion), stands
 
     def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
         """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
@@ -256,11 +245,11 @@ class Job:
     ) -> Plan:
         """The plan of the job.
 
-        made : trajectory and verdict, or None if the job could not be solved
+        made : None if the job could not be solved
 
         The other arguments are fields of `Plan`.
         """
-        trajectory, verdict = made or (None, None)
+        trajectory, verdict = (None, None) if made is None else (made.trajectory, made.verdict)
         held: dict[str, Any] = {} if tables.grid is None else {"held_by": _largest_shares(tables.grid)}
         self.tell(
             "plan",
@@ -271,7 +260,7 @@ class Job:
             passed=verdict is not None and verdict.passed,
             **held,
         )
-        self._note_ringing(trajectory, method)
+        self._note_ringing(made, method)
         return Plan(
             method=method,
             corner=corner,
@@ -288,14 +277,14 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=tables.prices,
-            pricing=tables.pricing,
+            making=None if made is None else Making(made.motion, made.slower, tables.pricing),
             notes=(*job_notes(self.program, *self.real), *self.noted),
             timings=self.stages.timings,
         )
 
-    def _note_ringing(self, trajectory: Trajectory | None, method: str) -> None:
+    def _note_ringing(self, made: Delivered | None, method: str) -> None:
         """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
-        shaped = trajectory is None or isinstance(self.motion_of.get(trajectory), ShapedMotion)
+        shaped = made is None or isinstance(made.motion, ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
             can = (
                 "give --shaped"

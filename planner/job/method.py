@@ -92,10 +92,11 @@ class Method(ABC):
             return _not_delivered(
                 made, f"{lost.fault()}: the feed is reached behind the run-in; {self._in_step(made)}"
             )
-        if made.pricing is None:
+        making, made = made.making, dataclasses.replace(made, making=None)
+        if making is None or making.pricing is None:
             return made
         with stages.stage("report"):
-            return dataclasses.replace(made, prices=made.pricing(), pricing=None)
+            return dataclasses.replace(made, prices=making.pricing())
 
     def plan_best(self, job: Job) -> Plan:
         """The plan of a job; on a machine with filters the fastest of those that are tried (`ways`)."""
@@ -133,7 +134,7 @@ class Method(ABC):
         made = self.plan_job(job)
         if made.verdict is None or (made.verdict.passed and (_inside(made) or not self.keeps_tolerance)):
             return made
-        return faster(self._planned_again(job, made), _slower_in_places(job, made))
+        return faster(self._planned_again(job, made), _slower_in_places(made))
 
     def _planned_again(self, job: Job, made: Plan) -> Plan:
         """The plan of another method, or with less tolerance, in the place of one that leaves it."""
@@ -161,14 +162,9 @@ class Method(ABC):
         """The plan with the runs on which its verdict finds something planned each by itself, and all others as they are; None where
         these are not few, or what comes of it does not pass."""
         machine, toolpath = job.real
-        if (
-            made.trajectory is None
-            or made.verdict is None
-            or machine.fir is not None
-            or not self.keeps_tolerance
-        ):
+        if made.making is None or made.verdict is None or machine.fir is not None or not self.keeps_tolerance:
             return None
-        motion = job.motion_of[made.trajectory]
+        motion = made.making.motion
         stops = full_stops(job.toolpath)
         if len(stops) < 3 or isinstance(motion, ShapedMotion) or len(stops) != len(full_stops(toolpath)):
             return None
@@ -184,22 +180,21 @@ class Method(ABC):
             for k in broken:
                 of_run = job_of_run(job, int(stops[k]), int(stops[k + 1]))
                 plan = self.plan_within_periods(of_run)
-                if plan.trajectory is None or not _passed(plan):
+                if plan.making is None or not _passed(plan):
                     return None
-                own = job.motion_of[plan.trajectory]
+                own = plan.making.motion
                 parts[k] = SplicedRun(motion=own, begin=0.0, end=own.end)
             jerk = made.verdict.limits.get(JERK.called(toolpath.axes[0]))
             not_limited = () if jerk is None or jerk.limited else ("jerk",)
             whole = Spliced(runs=tuple(parts))
-            trajectory, verdict = job.deliver(whole, not_limited)
-            job.tell(
-                "runs alone", found=trajectory.cycle_time, before=made.cycle_time, runs=len(parts) - len(left)
-            )
+            again = job.deliver(whole, not_limited)
+            verdict, found = again.verdict, again.trajectory.cycle_time
+            job.tell("runs alone", found=found, before=made.cycle_time, runs=len(parts) - len(left))
             if verdict.passed:
                 grid = made.grid
                 if grid is not None:
                     grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges(), whole.begin))
-                return dataclasses.replace(made, trajectory=trajectory, verdict=verdict, grid=grid)
+                return made.delivering(again, grid=grid)
         return None
 
     def _with_less(self, made: Plan, job: Job) -> Plan:
@@ -208,10 +203,10 @@ class Method(ABC):
         given, planned, (machine, programmed) = job, job.toolpath, job.real
         before, times = np.nan, 1.0
         for again in range(1, PERIOD_ROUNDS + 1):
-            if made.trajectory is None or _inside(made) or made.cycle_time > job.most:
+            if made.making is None or _inside(made) or made.cycle_time > job.most:
                 break
             with job.stage("geometry"):
-                near, far = periods.missed(job.motion_of[made.trajectory], programmed, machine.dt)
+                near, far = periods.missed(made.making.motion, programmed, machine.dt)
                 same = abs(made.cycle_time - before) <= SAME_TIME * made.cycle_time
                 times = 2.0 * times if same else 1.0
                 before = made.cycle_time
@@ -236,7 +231,8 @@ class Method(ABC):
             return made
         # what less tolerance costs is not in the problem's prices
         said = _said(made, programmed, planned)
-        return dataclasses.replace(made, prices=None, pricing=None, notes=(*made.notes, said))
+        making = made.making and made.making._replace(pricing=None)
+        return dataclasses.replace(made, prices=None, making=making, notes=(*made.notes, said))
 
     def _rival(self, job: Job, made: Plan) -> Plan | None:
         """The fastest of the plans of the other methods that pass; None where there is none."""
@@ -277,10 +273,10 @@ def faster(plan: Plan, other: Plan) -> Plan:
     return other if other.trajectory.cycle_time < plan.trajectory.cycle_time else plan
 
 
-def _slower_in_places(job: Job, plan: Plan) -> Plan:
+def _slower_in_places(plan: Plan) -> Plan:
     """The plan with its motion run slower where the verdict found something, if that is kept; else as it is."""
-    found = job.mended.get(plan.trajectory) if plan.trajectory is not None else None
-    return plan if found is None else dataclasses.replace(plan, trajectory=found[0], verdict=found[1])
+    slower = plan.making.slower if plan.making is not None else None
+    return plan if slower is None else plan.delivering(slower)
 
 
 def _faster_than(plan: Plan, job: Job) -> Job:
@@ -303,7 +299,7 @@ def _out_of_step(plan: Plan) -> ThreadCheck | None:
 def _not_delivered(plan: Plan, why: str) -> Plan:
     """The plan without its motion."""
     return dataclasses.replace(
-        plan, status=Status.INFEASIBLE, sentence=why, trajectory=None, verdict=None, rounded=None, grid=None, prices=None, pricing=None
+        plan, status=Status.INFEASIBLE, sentence=why, trajectory=None, verdict=None, rounded=None, grid=None, prices=None, making=None
     )  # fmt: skip
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.beside import Beside, beside_motion
-from planner.job.records import CornerTable, GridHistory, PriceList, Pricing
+from planner.job.records import CornerTable, Delivered, GridHistory, Making, PriceList
 from planner.job.shown import Shown
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
@@ -32,7 +33,7 @@ class Plan(Shown):
     rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
-    pricing             : finds `prices`, in a plan that may not be the one that is taken; None in a plan that is delivered
+    making              : of a plan on its way what only planning needs; None in a finished one, and unless solved
     stop_time           : cycle time if every block ran from rest to rest [s], dwells included
     grid_points         : number of grid points of the problem that was solved
     notes               : what was assumed and what was given up, each with its first line and a count
@@ -55,7 +56,7 @@ class Plan(Shown):
     grid_points: int
     joints: Trajectory | None = None
     prices: PriceList | None = None
-    pricing: Pricing | None = None
+    making: Making | None = None
     notes: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
 
@@ -90,6 +91,13 @@ class Plan(Shown):
     def beside(self) -> tuple[Beside, ...]:
         """What happens while the axes stand still, tool changes for example, and how long it takes; no part of the cycle time."""
         return beside_motion(self.program, self.machine)
+
+    def delivering(self, made: Delivered, **changes: Any) -> Plan:
+        """The plan with another motion, which has its prices, and with other `changes` of its fields."""
+        pricing = self.making.pricing if self.making is not None else None
+        making = Making(made.motion, made.slower, pricing)
+        motion: dict[str, Any] = {"trajectory": made.trajectory, "verdict": made.verdict, "making": making}
+        return replace(self, **motion | changes)
 
     @property
     def solved(self) -> bool:

@@ -70,12 +70,12 @@ def searched_at_once(
         for _ in range(VERDICTS):
             motion = Spliced(runs=tuple(part for parts in alone.parts(found, start) for part in parts))
             made = job.deliver(motion)
-            if made[1].passed or not alone.planned(found, alone.broken(found, start, made[1])):
+            if made.verdict.passed or not alone.planned(found, alone.broken(found, start, made.verdict)):
                 break
     if found is None or made is None:
         job.tell("search", steps=steps, of_runs=len(runs))
         return AtOnce(None, steps)
-    trajectory, verdict = made
+    trajectory, verdict = made.trajectory, made.verdict
     kept = sorted(alone.plans)
     facts = {"steps": steps, "alone": len(kept)}
     job.tell("search", found=trajectory.cycle_time, before=start.motion.end, kept=verdict.passed, **facts)
@@ -91,7 +91,7 @@ def searched_at_once(
         status=status,
         sentence=sentence,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
-        tables=tabled(job, None, trajectory, found, kept, {k: plan.grid for k, plan in alone.plans.items()}),
+        tables=tabled(job, None, made, found, kept, {k: plan.grid for k, plan in alone.plans.items()}),
     )
     return AtOnce(plan, steps)
 
@@ -132,9 +132,9 @@ class _Alone:
     def _parts(self, k: int, one: FoundRun, start: Start) -> list[SplicedRun]:
         if k not in self.plans:
             return parts_of(self.job.toolpath, one, start.spliced(k))
-        trajectory = self.plans[k].trajectory
-        assert trajectory is not None
-        motion = self.job.motion_of[trajectory]
+        making = self.plans[k].making
+        assert making is not None
+        motion = making.motion
         return [SplicedRun(motion=motion, begin=0.0, end=motion.end)]
 
     def broken(self, found: list[FoundRun], start: Start, verdict: Verdict) -> list[int]:

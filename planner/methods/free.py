@@ -15,10 +15,10 @@ from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.job.by_run import RunsInTime
-from planner.job.job import Delivered, Job
+from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.job.records import NO_TABLES, GridHistory, Tables
+from planner.job.records import NO_TABLES, Delivered, GridHistory, Tables
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 from planner.optimal.effort import Search
@@ -140,10 +140,10 @@ class Starts:
         while self._methods:
             own_clock = dataclasses.replace(self._job, stages=self._job.stages.own_clock(), noted=[])
             plan = self._methods.pop(0).plan_best(own_clock)
-            if plan.trajectory is None:
+            if plan.making is None:
                 self.failed.append(plan)
                 continue
-            self.made.append(Start(own_clock.motion_of[plan.trajectory], self._job, plan=plan))
+            self.made.append(Start(plan.making.motion, self._job, plan=plan))
             yield self.made[-1]
 
 
@@ -198,9 +198,12 @@ def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered,
     """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
     motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
     assert first.plan is not None
-    start = first.plan.trajectory, first.plan.verdict
-    assert start[0] is not None
-    assert start[1] is not None
+    assert first.plan.trajectory is not None
+    assert first.plan.verdict is not None
+    assert first.plan.making is not None
+    start = Delivered(
+        first.plan.trajectory, first.plan.verdict, first.plan.making.motion, first.plan.making.slower
+    )
     kept, why = [k for k, one in enumerate(found) if one.steps is None], ""
     filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
     if filtered and not all(one.whole for one in found):
@@ -212,19 +215,19 @@ def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered,
             parts += [own] if k in kept else parts_of(job.toolpath, one, own)
         motion = Spliced(runs=tuple(parts))
         made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
-        passed = made[1].passed or not start[1].passed
-        if passed and made[0].cycle_time <= start[0].cycle_time:
+        passed = made.verdict.passed or not start.verdict.passed
+        if passed and made.trajectory.cycle_time <= start.trajectory.cycle_time:
             return made, kept, why
-        why = "what was found there is slower with its standstills" if passed else str(made[1].faults[0])
+        why = "what was found there is slower with its standstills" if passed else str(made.verdict.faults[0])
         missed = set() if filtered else _missed(job, motion, found) - set(kept)
         kept = sorted(missed | set(kept)) if missed else list(range(len(found)))
-    return (start[0], start[1]), kept, why
+    return start, kept, why
 
 
 def tabled(
     job: Job,
     start: Plan | None,
-    trajectory: Trajectory,
+    made: Delivered,
     found: list[FoundRun],
     kept: list[int],
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
@@ -238,15 +241,13 @@ def tabled(
         return NO_TABLES
     with job.stage("report"):
         taken = [one for k, one in enumerate(found) if k not in kept]
-        prices = found_prices(job.toolpath, job.machine, taken, trajectory.cycle_time)
-        grid = found_history(
-            job.toolpath, job.motion_of[trajectory], found, kept, start.grid if start else None, alone
-        )
-    moving = trajectory.cycle_time - float(job.toolpath.dwell.sum())
+        prices = found_prices(job.toolpath, job.machine, taken, made.trajectory.cycle_time)
+        grid = found_history(job.toolpath, made.motion, found, kept, start.grid if start else None, alone)
+    moving = made.trajectory.cycle_time - float(job.toolpath.dwell.sum())
     unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving
     pricing = None
     if prices is None or unpriced > UNPRICED_MOST:
-        prices, pricing = (start.prices, start.pricing) if start else (None, None)
+        prices, pricing = (start.prices, start.making and start.making.pricing) if start else (None, None)
         if prices is not None or pricing is not None:
             job.note("what limits cost is told of the motion before geometry and feed were found together")
     elif unpriced > UNPRICED:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import NamedTuple
 
 from planner.job.job import Job
 from planner.job.plan import Plan
+from planner.job.records import Making
 from planner.methods.all_runs import searched_runs
 from planner.methods.free import Start, delivered, said, tabled
 from planner.optimal.effort import Search
@@ -32,11 +32,11 @@ def freed(job: Job, plan: Plan, dial: Search) -> Freed:
 
     What holds the motion, and what limits cost, is told from the search (`tabled`).
     """
-    if plan.trajectory is None or plan.verdict is None or not plan.verdict.passed:
+    if plan.trajectory is None or plan.making is None or plan.verdict is None or not plan.verdict.passed:
         return Freed(plan, 1.0)
     with job.stage("search") as report:
         runs = list(tube_runs_of(job.toolpath, job.machine))
-        start = Start(job.motion_of[plan.trajectory], job, dial.cut, plan)
+        start = Start(plan.making.motion, job, dial.cut, plan)
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         if steps > dial.steps_max:
             job.tell("search", steps=steps, of=dial.steps_max)
@@ -44,20 +44,19 @@ def freed(job: Job, plan: Plan, dial: Search) -> Freed:
         found = searched_runs(runs, start, dial.of(steps), report, divide=True)
         assert found is not None  # as it divides windows that fail
     made, kept, why = delivered(job, start, found)
-    better = made[0] is not plan.trajectory
+    better = made.trajectory is not plan.trajectory
     share = _share_kept(start, found, kept) if better else 1.0
-    job.tell("search", found=made[0].cycle_time, before=plan.trajectory.cycle_time, kept=better, steps=steps)
+    time = made.trajectory.cycle_time
+    job.tell("search", found=time, before=plan.trajectory.cycle_time, kept=better, steps=steps)
     if not better:
         return Freed(plan, share)
-    tables = tabled(job, plan, made[0], found, kept)
-    faster = dataclasses.replace(
-        plan,
-        trajectory=made[0],
-        verdict=made[1],
+    tables = tabled(job, plan, made, found, kept)
+    faster = plan.delivering(
+        made,
         rounded=None,
         grid=tables.grid,
         prices=tables.prices,
-        pricing=tables.pricing,
+        making=Making(made.motion, made.slower, tables.pricing),
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         sentence=said(job, start, found, kept, why, "a path first, then its feed")[1],
         notes=(*plan.notes, *(note for note in job.noted if note not in plan.notes)),

@@ -21,10 +21,10 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.names import QUICK
 from planner.feedrate.solution import Status
-from planner.job.job import Delivered, Job
+from planner.job.job import Job
 from planner.job.method import Method
 from planner.job.plan import Plan
-from planner.job.records import NO_TABLES, Tables
+from planner.job.records import NO_TABLES, Delivered, Tables
 from planner.methods.free import Starts, delivered, said, search, tabled
 from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
@@ -66,7 +66,7 @@ class TubeMethod(Method):
         corner = f" with corner {first.plan.corner}" if first.plan.corner else ""
         status, sentence = said(job, first, found, kept, why, f"{first.plan.method}{corner}")
         grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
-        tables = tabled(job, first.plan, made[0], found, kept)
+        tables = tabled(job, first.plan, made, found, kept)
         return self._plan(job, made, status, sentence, grid_points, tables)
 
     def _plan(

@@ -118,7 +118,9 @@ def fastest_plan(job: Job, settings: Settings) -> Plan:
         return smooth
     best = dataclasses.replace(best, method=smooth.method, corner=smooth.corner, timings=job.stages.timings)
     if counted_time(smooth) < (1.0 + SAME_MOTION) * counted_time(best):
-        best = dataclasses.replace(best, prices=smooth.prices, pricing=smooth.pricing, grid=smooth.grid)
+        pricing = smooth.making and smooth.making.pricing
+        making = best.making and best.making._replace(pricing=pricing)
+        best = dataclasses.replace(best, prices=smooth.prices, making=making, grid=smooth.grid)
     return best
 
 

@@ -6,9 +6,9 @@ import dataclasses
 from functools import partial
 
 from planner.corners.smooth import CornerShape
-from planner.job.job import Delivered, Job
+from planner.job.job import Job
 from planner.job.plan import Plan
-from planner.job.records import NO_TABLES, PriceList, Pricing, Tables
+from planner.job.records import NO_TABLES, Delivered, PriceList, Pricing, Tables
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
@@ -32,7 +32,7 @@ def plan_of_solution(
     """The plan of a solution and what was delivered of it, None unless solved."""
     rounded = grid = None
     if made is not None:
-        delivered = job.motion_of[made[0]]  # with the standstills that its samples need
+        delivered = made.motion
         if isinstance(delivered, ShapedMotion):
             delivered = delivered.motion  # what the solution is of
         with job.stage("report"):

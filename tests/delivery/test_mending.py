@@ -21,7 +21,7 @@ from planner.methods.kinematic import KinematicMethod
 from planner.methods.registry import plan
 from planner.motion.slowed import Slowed
 from planner.nc.reader import parse_program
-from planner.verify.excess import Excess, Kind
+from planner.verify.excess import Excess, Fault, Kind
 
 MACHINE = load_machine("mill").model_copy(update={"dt": 2e-3, "normal_acceleration": 500.0})
 NO_STANDS = Standing(np.empty(0), np.empty(0))
@@ -55,10 +55,15 @@ def fast(motion, job, runs: dict[int, float]):
     return slower_runs(motion, runs_of(motion), factor)
 
 
+def of_kinds(*kinds: Kind) -> tuple[Fault, ...]:
+    """Faults of which no more is known."""
+    return tuple(Fault(kind=kind, name=kind.value, found="") for kind in kinds)
+
+
 def planned(job: Job):
     made = KinematicMethod().plan_job(job)
     assert made.verdict.passed, made.verdict.faults
-    return made, job.motion_of[made.trajectory]
+    return made, made.making.motion
 
 
 @pytest.mark.slow
@@ -73,11 +78,10 @@ def test_a_limit_exceeded_at_one_of_a_thousand_runs_costs_that_run(share):
     plain = job.deliver(broken, as_it_is=True)[1]
     for name in ("feed", "velocity.x", "jerk.y", "normal_acceleration"):
         assert plain.limits[name].ratio >= 1.0 + 0.9 * share
-    trajectory, verdict = job.deliver(broken)
+    trajectory, verdict, again, _ = job.deliver(broken)
     assert verdict.passed, verdict.faults
     assert abs(trajectory.cycle_time / made.cycle_time - 1.0) < WORTH
     # all else is as it was
-    again = job.motion_of[trajectory]
     assert isinstance(again, Slowed)
     runs = runs_of(broken)
     same = np.setdiff1d(np.arange(len(runs)), list(at))
@@ -91,7 +95,7 @@ def test_each_limit_alone(name):
     made, motion = planned(job)
     broken = fast(motion, job, {6: 1.2 ** (1.0 / POWER[name])})
     assert not job.deliver(broken, as_it_is=True)[1].passed
-    trajectory, verdict = job.deliver(broken)
+    trajectory, verdict, *_ = job.deliver(broken)
     assert verdict.passed, verdict.faults
     assert trajectory.cycle_time - made.cycle_time < 1e-3 * made.cycle_time
 
@@ -110,7 +114,7 @@ def test_one_place_of_a_long_run_costs_less_than_the_run():
     excess = Excess(
         kind=Kind.CORNER_SPEED, name="eq. 19", begin=worst.time[k], end=worst.time[k], ratio=1.05, power=1
     )
-    verdict = dataclasses.replace(made.verdict, kinds=(Kind.CORNER_SPEED,), excesses=(excess,))
+    verdict = dataclasses.replace(made.verdict, faults=of_kinds(Kind.CORNER_SPEED), excesses=(excess,))
     slower = mending.mended(motion, NO_STANDS, verdict, MACHINE.dt, 0)
     assert motion.end < slower.end < motion.end * (1.0 + 0.05 * 0.1)
     at = slower.at(slower.run_at(np.array([worst.time[k]])), MACHINE.dt)
@@ -124,15 +128,15 @@ def test_what_is_no_excess_is_not_mended():
     verdict, none = made.verdict, NO_STANDS
     assert mending.mended(motion, none, verdict, MACHINE.dt, 0) is None
     beyond = Excess(kind=Kind.LIMIT, name="jerk", begin=0.1, end=0.1, ratio=9.0, power=3)
-    jerk = dataclasses.replace(verdict, kinds=(Kind.LIMIT,), excesses=(beyond,))
+    jerk = dataclasses.replace(verdict, faults=of_kinds(Kind.LIMIT), excesses=(beyond,))
     assert (
         mending.mended(motion, none, jerk, MACHINE.dt, 0) is None
     )  # more than twice as slow: a mistake to be seen
     small = dataclasses.replace(beyond, ratio=1.1)
-    order = dataclasses.replace(verdict, kinds=(Kind.LIMIT, Kind.ORDER), excesses=(small,))
+    order = dataclasses.replace(verdict, faults=of_kinds(Kind.LIMIT, Kind.ORDER), excesses=(small,))
     assert mending.mended(motion, none, order, MACHINE.dt, 0) is None
     path = dataclasses.replace(small, kind=Kind.CONTOUR, name="contour", power=2, still=1.0)
-    contour = dataclasses.replace(verdict, kinds=(Kind.CONTOUR,), excesses=(path,))
+    contour = dataclasses.replace(verdict, faults=of_kinds(Kind.CONTOUR), excesses=(path,))
     assert (
         mending.mended(motion, none, contour, MACHINE.dt, 0) is None
     )  # the path itself leaves the tolerance
@@ -190,7 +194,7 @@ def test_an_excess_at_a_rest_is_of_the_run_behind_it_and_then_of_both(again, bef
     made, motion = planned(job)
     at = float(runs_of(motion).end[1])
     excess = Excess(kind=Kind.LIMIT, name="jerk", begin=at, end=at, ratio=1.1, power=3)
-    verdict = dataclasses.replace(made.verdict, kinds=(Kind.LIMIT,), excesses=(excess,))
+    verdict = dataclasses.replace(made.verdict, faults=of_kinds(Kind.LIMIT), excesses=(excess,))
     slower = mending.mended(motion, NO_STANDS, verdict, MACHINE.dt, again)
     lasting = np.diff(slower.run_at(np.array([at - 0.004, at, at + 0.004]))) / 0.004
     np.testing.assert_allclose(lasting, [before, 1.1 ** (1.0 / 3.0)], rtol=1e-3)

@@ -119,8 +119,7 @@ def _motion_of(made, job):
     """The motion along a path that method `stop` delivers."""
     from planner.methods.stop import StopMethod
 
-    again = StopMethod().plan_job(job)
-    return job.motion_of[again.trajectory]
+    return StopMethod().plan_job(job).making.motion
 
 
 def test_chunks_that_share_their_ends_are_joined():

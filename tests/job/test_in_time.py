@@ -37,8 +37,8 @@ def _job(fir: Fir | None) -> Job:
 def test_what_takes_longer_is_not_delivered(method: Method, fir: Fir | None) -> None:
     job = _job(fir)
     made = method.plan_job(job)
-    assert made.trajectory is not None
-    end = job.motion_of[made.trajectory].end
+    assert made.making is not None
+    end = made.making.motion.end
     late = dataclasses.replace(job.afresh(), most=0.999 * end)
     assert method.plan_job(late).trajectory is None
     early = dataclasses.replace(job.afresh(), most=1.001 * end)

@@ -23,7 +23,9 @@ from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.nc.reader import parse_program
 from planner.optimal.effort import EFFORTS, Search
 from planner.tube.own import WINDOW
+from planner.verify import Fault, Kind
 
+MADE_UP = Fault(kind=Kind.LIMIT, name="limit", found="made up")
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
 # Cycle time on single corners, over the bound without jerk limits [-]: where corners follow closely, jerk is what holds them.
@@ -181,10 +183,10 @@ def test_where_its_own_motion_fails_another_method_is_delivered(monkeypatch):
     def failing(method, job):
         made = own(method, job)
         return dataclasses.replace(
-            made, verdict=dataclasses.replace(made.verdict, passed=False, faults=("made up",))
+            made, verdict=dataclasses.replace(made.verdict, passed=False, faults=(MADE_UP,))
         )
 
     monkeypatch.setattr(OptimalMethod, "plan_job", failing)
     made = planner.plan(problems.pentagon(), MACHINE)
     assert made.verdict.passed, made.verdict.faults
-    assert made.sentence.startswith("another motion failed: made up; ")
+    assert made.sentence.startswith("another motion failed: limit: made up; ")

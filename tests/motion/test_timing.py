@@ -267,7 +267,7 @@ def test_places_follow_one_another_at_a_crawl():
         stages=Stages(None),
     )
     made = OptimalMethod(corner="spline", rounds=1).plan_job(job)
-    motion = job.motion_of[made.trajectory]
+    motion = made.making.motion
     times = np.sort(np.random.default_rng(3).uniform(0.0, motion.end, 20_000))
     seen = motion.at(times, machine.dt)
     moved = np.linalg.norm(np.diff(seen.position, axis=0), axis=1)

@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,27 @@ def readable(text: str, control: str = "") -> str:
     return re.sub(r"^\s*%.*$", "", text, flags=re.MULTILINE)
 
 
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """What a program does when it is read from a start, behind work offsets: the places (n, A) that it passes in machine coordinates
+    [mm, rad], how often it dwells or stops, and how long it dwells in all [s]."""
+
+    places: FloatArray
+    rests: tuple[int, float]
+
+
+def passed(
+    text: str,
+    machine: Machine,
+    start: tuple[float, ...],
+    offset: tuple[float, ...],
+    reading: Reading = AS_USUAL,
+) -> Passed:
+    """What a program does behind the lines of `prefix`."""
+    head = prefix(start, offset)
+    return passed_by(parse_program(head + readable(text), machine, reading), head.count("\n"))
+
+
 def path(
     text: str,
     machine: Machine,
@@ -57,35 +79,31 @@ def path(
     offset: tuple[float, ...],
     reading: Reading = AS_USUAL,
 ) -> FloatArray:
-    """The places (n, A) [mm, rad] that a program passes in machine coordinates, and how it stands, as a last column: 1 at a dwell or
-    stop."""
-    head = prefix(start, offset)
-    program = parse_program(head + readable(text), machine, reading)
-    return _path(program, head.count("\n"))
+    """The places (n, A) [mm, rad] that a program passes in machine coordinates."""
+    return passed(text, machine, start, offset, reading).places
 
 
-def _path(program: Program, skipped: int) -> FloatArray:
+def passed_by(program: Program, skipped: int = 0) -> Passed:
+    """What a program does after its first so many lines."""
     begun = int(np.searchsorted(program.line, skipped, side="right"))
-    here = program.end[begun - 1] if begun else program.start
-    places, arcs = (
-        [here[None]],
-        dict(zip(program.arc_block.tolist(), range(len(program.arc_block)), strict=True)),
-    )
-    for k in range(begun, len(program)):
-        end = program.end[k]
-        if program.kind[k] == Kind.ARC:
-            places.append(_arc(program, arcs[k], here, end))
-        elif program.kind[k] == Kind.SPLINE:
-            places.append(_curve(program, k))
-        places.append(end[None])
-        here = end
-    return np.vstack(places)
-
-
-def stands(text: str, machine: Machine, reading: Reading = AS_USUAL) -> tuple[int, float]:
-    """How often a program dwells or stops, and how long it dwells in all [s]."""
-    program = parse_program(readable(text), machine, reading)
-    return int(np.isin(program.kind, (Kind.DWELL, Kind.STOP)).sum()), round(float(program.dwell.sum()), 6)
+    places = [program.end[begun - 1 : begun] if begun else program.start[None]]
+    arcs = dict(zip(program.arc_block.tolist(), range(len(program.arc_block)), strict=True))
+    for k in np.flatnonzero(np.isin(program.kind, (Kind.ARC, Kind.SPLINE))).tolist():
+        if k < begun:
+            continue
+        straight = program.end[begun:k]
+        places.append(straight)
+        here = program.end[k - 1] if k else program.start
+        bend = (
+            _arc(program, arcs[k], here, program.end[k])
+            if program.kind[k] == Kind.ARC
+            else _curve(program, k)
+        )
+        places += [bend, program.end[k : k + 1]]
+        begun = k + 1
+    places.append(program.end[begun:])
+    rests = int(np.isin(program.kind, (Kind.DWELL, Kind.STOP)).sum())
+    return Passed(np.vstack(places), (rests, round(float(program.dwell.sum()), 6)))
 
 
 def _arc(program: Program, row: int, start: FloatArray, end: FloatArray) -> FloatArray:

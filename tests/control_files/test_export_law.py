@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.export_judge import OFFSETS, STARTS, alike, path, readable, unknown_words
 from benchmarks.export_programs import TOLERANCE, machine, random_program
-from benchmarks.exports import judged, of_file
+from benchmarks.export_rows import judged, of_file
 from planner.control_files.controls import CONTROLS
 from planner.machine import load_machine
 

@@ -278,6 +278,38 @@ def _canonical_arc(numbers, plane, unit, machine, here):  # type: ignore[no-unty
     return list(points)
 
 
+def filament(text: str, control: str) -> FloatArray:
+    """(n, 5) where a printer is after each line with E, and at what F: x y z, mm of filament in all, F; by the control's own rules:
+    after G91 E is a step, and Marlin's G90 ends M83."""
+    absolute, steps = True, False
+    place, zero, fed, feed = dict.fromkeys("XYZE", 0.0), dict.fromkeys("XYZE", 0.0), 0.0, 0.0
+    found = []
+    for line in text.splitlines():
+        words = re.findall(r"([A-Z])(-?[\d.]+)", line.split(";")[0])
+        code = "".join(words[0]) if words else ""
+        given = {letter: float(number) for letter, number in words[1:]}
+        if code in ("G90", "G91"):
+            absolute = code == "G90"
+            steps = steps if control == "klipper" and absolute else not absolute
+        elif code in ("M82", "M83"):
+            steps = code == "M83"
+        elif code == "G92":
+            zero |= {letter: place[letter] - value for letter, value in given.items()}
+        elif code == "G28":
+            place |= dict.fromkeys("XYZ", 0.0)
+        elif code in ("G0", "G1"):
+            feed = given.get("F", feed)
+            before = place["E"]
+            for letter, value in given.items():
+                if letter in place:
+                    step = steps or not absolute if letter == "E" else not absolute
+                    place[letter] = value + (place[letter] if step else zero[letter])
+            fed += place["E"] - before
+            if "E" in given:
+                found.append([*(place[letter] for letter in "XYZ"), fed, feed])
+    return np.array(found).reshape(-1, 5)
+
+
 # What each control may be given, as lines: written by hand from the controls' own lists, beside the exporter's tables.
 _CODES_OF_GRBL = frozenset((
     *(f"G{code}" for code in (0, 1, 2, 3, 4, 10, 17, 18, 19, 20, 21, 28, 28.1, 30, 30.1, 40, 43.1, 49, 53, 54, 55, 56, 57, 58, 59)),

@@ -202,3 +202,42 @@ def _arc(state: _State) -> list[str]:
     if state.chance(0.5) or state.absolute:
         return [f"{code} {i}{number} {j}0{feed}"]
     return [f"{code} {a}{2 * float(number):.4f} {i}{number} {j}0{feed}"]
+
+
+def random_print(seed: int) -> str:
+    """A printer's program: moves with E, retractions, travel, E as a place or a step."""
+    rng = np.random.default_rng(seed)
+    lines, extruded, steps, absolute = ["G21", "G90", "G28", "M104 S200", "M82", "G92 E0"], 0.0, False, True
+    lines += ["G1 Z0.3 F600", "G0 X5 Y5"]
+
+    def e(amount: float) -> str:
+        nonlocal extruded
+        extruded += amount
+        return f"E{amount if steps or not absolute else extruded:.4f}"
+
+    for _ in range(int(rng.integers(6, 16))):
+        kind = rng.random()
+        x, y = (f"{letter}{value:.3f}" for letter, value in zip("XY", rng.uniform(0, 40, 2), strict=True))
+        if not absolute:
+            x, y = (f"{letter}{value:.3f}" for letter, value in zip("XY", rng.uniform(-3, 3, 2), strict=True))
+        fed = f" F{int(rng.integers(10, 60)) * 60}" if rng.random() < 0.5 else ""
+        if kind < 0.4:
+            lines += [f"G1 {x} {y} {e(1.2)}{fed or ' F1800'}", f"G1 {y} {e(0.3)}"]
+        elif kind < 0.55:
+            lines += [f"G1 {e(-0.8)} F2400", f"G0 {x} {y}", f"G1 {x}", f"G1 {e(0.8)}"]
+        elif kind < 0.65:
+            lines += [f"G0 {x} {y}{fed}", f"G0 {y}", f"G0 {x} {e(0.1)}"]
+        elif kind < 0.75:
+            steps = not steps
+            lines.append("M83" if steps else "M82")
+            if not steps:
+                lines, extruded = [*lines, "G92 E0"], 0.0
+        elif kind < 0.85:
+            absolute = not absolute
+            lines.append("G90" if absolute else "G91")
+            if absolute:
+                lines, extruded = [*lines, "M83" if steps else "M82", "G92 E0"], 0.0
+        else:
+            lines.append(("M106 S128", "G4 P200", "G92 E0", "; a layer")[int(rng.integers(4))])
+            extruded = 0.0 if lines[-1] == "G92 E0" else extruded
+    return "\n".join([*lines, "M84", ""])

@@ -11,7 +11,6 @@ import signal
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +52,8 @@ TURN = Axis(
     velocity=360.0, acceleration=3600.0, jerk=72000.0
 )  # for programs that turn a rotary axis [deg/s ...]
 Place = tuple[tuple[float, ...], tuple[float, ...]]
-ALL_PLACES: tuple[Place, ...] = tuple(product(STARTS, OFFSETS))
+# From each start, in turn with one and the other of the offsets.
+ALL_PLACES: tuple[Place, ...] = tuple((start, OFFSETS[k % len(OFFSETS)]) for k, start in enumerate(STARTS))
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class Original:
         return self._broken_for_linuxcnc(out, places) if linuxcnc else ""
 
     def _broken_for_linuxcnc(self, out: str, places: Sequence[Place]) -> str:
-        for place in places[1::4] or places:  # a process each
+        for place in places[-2:]:  # a process each
             found, before = interpreted(out, *place), self.interpreted(place)
             if isinstance(found, str):
                 return f"rs274: {found}"
@@ -147,7 +147,7 @@ def judged(seed: int, *, starts: int = len(STARTS)) -> list[Row]:
         return []
     if _is_unplanned(plan):
         return []
-    places = list(product(STARTS[:starts], OFFSETS))
+    places = ALL_PLACES[:starts]
     original = Original(text, machine)
     return [row for control in CONTROLS for row in _of_control(seed, original, plan, control, places, method)]
 
@@ -268,7 +268,7 @@ def _exported(file: Path, plan: Plan, original: Original, control: str, method: 
     if original.program is not None:
         places: tuple[Place, ...] = ((tuple(plan.program.start[:3].tolist()), OFFSETS[0]),)
     else:
-        places = ALL_PLACES[3:4] if file.stat().st_size > ONE_PLACE_ABOVE else ALL_PLACES
+        places = ALL_PLACES[1:2] if file.stat().st_size > ONE_PLACE_ABOVE else ALL_PLACES
     broken = original.broken(out.decode("utf-8", "replace"), control, places)
     why = next((note for note in made.notes if "as it is is no" in note), "")
     return Row(file.name, control, outcome, why, broken, method, len(places))

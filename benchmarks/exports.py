@@ -4,7 +4,7 @@
 
 Random programs (export_programs.py) are planned, a tenth of them with the default method, and exported to the four controls as each
 candidate that the exporter has: the program as it is, its own path in the control's words, the planned path as chords. Each is read
-back from three starts and with two sets of work offsets, for LinuxCNC also by `rs274` where it is installed (export_judge.py). With
+back from three starts, in turn with two sets of work offsets, for LinuxCNC also by `rs274` where it is installed (export_judge.py). With
 `--programs`, the programs of a folder are exported as they would be; large ones are planned with less work and read back from one start
 (export_rows.py), as results/RESULT.md says of each. `--rows` keeps the rows of every job in a file, so that a run that is cut off goes
 on where it ended; rows of another state of the planner are made anew.
@@ -110,7 +110,7 @@ def _of_random(rows: list[Row]) -> list[str]:
     planned = ", ".join(f"{count:,} planned with `{name}`" for name, count in methods.most_common())
     return [
         f"Exports of {len(by_method):,} random programs ({planned}), each as every candidate that the exporter has for it, read "
-        f"back from {len(STARTS)} starts with {len(OFFSETS)} sets of work offsets{_by_rs274()}:\n",
+        f"back from {len(STARTS)} starts, in turn with {len(OFFSETS)} sets of work offsets{_by_rs274()}:\n",
         _counts(rows),
         "Refused, by the first reason:\n",
         _reasons(rows),

@@ -117,7 +117,8 @@ _POSITIONS_ALONE = (
     'take --for pvt, or plan with interpolation = "linear"'
 )
 _NO_EXTRUDER = (
-    "this export would lose what the extruder does; planned.ngc and the trajectory file of the plan have it"
+    "setpoints of an extruder are no part of this export: --for klipper and --for marlin keep the program's E words, and the "
+    "trajectory file of the plan has the columns of e"
 )
 
 
@@ -140,8 +141,6 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
             "give the directory that 'plan -o' wrote: the program is needed too", source=str(plan)
         )
     saved, _, _ = saved_plan(plan)
-    if saved.toolpath.extrusion is not None:
-        raise InputError(_NO_EXTRUDER, source=str(plan))
     allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
     new = output.with_name(f".{output.name}.{os.getpid()}")
     try:

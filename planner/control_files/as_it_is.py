@@ -152,7 +152,7 @@ def _rs274_why_not(row: Row, source: Source) -> str:
         return "two codes that use the coordinates"
     own = "".join(codes.WORDS.get((word.letter, word.code), "") for word in row.words if word.letter in "GM")
     own += codes.WORDS.get(("G", row.motion), "")
-    unused = next((word for word in row.words if word.letter in "DH" and word.letter not in own), None)
+    unused = next((word for word in row.words if word.letter in "DEH" and word.letter not in own), None)
     return f"{unused} without a code that uses it" if unused is not None else ""
 
 

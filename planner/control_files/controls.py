@@ -66,6 +66,11 @@ class Control:
     end: str = "M2"
     jerk: bool = False
 
+    @property
+    def extruder(self) -> bool:
+        """Whether its E is an extruder's."""
+        return self.one_command and "E" in self.letters
+
 
 _CYCLES_OFF = {"G80": _STRAIGHT, "G98": _STRAIGHT, "G99": _STRAIGHT}
 _IDLE_ON_MILLS = {

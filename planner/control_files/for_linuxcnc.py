@@ -80,4 +80,4 @@ def _time(job: Candidates, line: Polyline, p: float, q: float) -> float:
     moving = linuxcnc_time(
         line.points[kept], feed[kept[:-1]], stands[kept], plan.machine, plan.toolpath.axes, p
     )
-    return moving + float(plan.program.dwell.sum())
+    return moving + float(plan.toolpath.dwell.sum())

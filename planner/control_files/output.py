@@ -21,7 +21,7 @@ from planner.nc.events import plain
 from planner.nc.writer import round_down
 
 INCH_DECIMALS = DECIMALS + 2  # a hundredth of an inch is about a quarter of a millimetre
-_LENGTHS = frozenset("XYZIJKRUVWQ")
+_LENGTHS = frozenset("XYZIJKRUVWQE")
 
 
 class Output:
@@ -34,6 +34,7 @@ class Output:
     programmed_feed, feed_inch : the program's last F word, and whether it was given in inches
     speed        : an S word that waits for its line
     spindle      : 3 or 4 after M3 and M4, 0 after M5
+    extrudes     : E words move an extruder of the control
     """
 
     def __init__(self, source: Source, control: Control, machine: Machine):
@@ -47,6 +48,7 @@ class Output:
         self.feed_inch = False
         self.speed: Word | None = None
         self.spindle = 0
+        self.extrudes = control.extruder and any(row.feeds for row in source.rows)
 
     def _say_move(self, row: Row, distance: list[str], words: list[str]) -> None:
         """A line of a move, with the speed that waits for it."""

@@ -127,4 +127,4 @@ def _predicted(job: Candidates, one: Candidate) -> float:
     moving = predicted_time(
         line.points, feed, standing(plan, line), plan.machine, plan.toolpath.axes, MODELS[job.control.name]
     )
-    return moving + float(plan.program.dwell.sum())
+    return moving + float(plan.toolpath.dwell.sum())

@@ -109,6 +109,13 @@ class Row:
         return "".join(word.letter for word in self.words if word.letter in AXES)
 
     @property
+    def feeds(self) -> bool:
+        """Whether its E is an extruder's: not that of G76 and of M66 to M68."""
+        return self.value("E") is not None and not any(
+            "E" in codes.WORDS.get((word.letter, word.code), "") for word in self.words
+        )
+
+    @property
     def moves(self) -> bool:
         """Whether it makes blocks that have a motion code."""
         return self.motion >= 0 and self.last > self.first
@@ -223,6 +230,7 @@ class _Follower:
         self.plane, self.radius, self.leaving = 170, False, False  # leaving: no move has come after G40
         self.factor = 100.0  # of F, in percent
         self.placed: frozenset[str] = frozenset()
+        self.extrudes = False
         self.simple = np.isin(program.kind, MOVES)
         self.simple[program.synchronised] = False
         before = np.vstack([program.start, program.end])
@@ -234,6 +242,7 @@ class _Follower:
 
     def follow(self, rows: list[Row]) -> None:
         """Fill in the rows."""
+        self.extrudes = any(row.feeds for row in rows)
         for row in rows:
             row.inch_before, row.placed = self.inch, self.placed
             for other in row.others:
@@ -279,7 +288,7 @@ class _Follower:
         elif one_shot == G53:
             row.motion = self.motion
             self.placed -= named
-        elif one_shot == -1 and (named or (self.motion in codes.ARCS and _is_arc(row, g))):
+        elif one_shot == -1 and (named or row.feeds or (self.motion in codes.ARCS and _is_arc(row, g))):
             row.motion = self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
@@ -304,6 +313,7 @@ class _Follower:
             and (self.simple[blocks] | (cycle & (self.program.kind[blocks] >= Kind.DWELL))).all()
             and not any(self.turns[letter][blocks].any() for letter in self.turns)
             and row.value("E") is None
+            and (self.absolute or not self.extrudes)  # G90 and G91 between chords would change what E is
             and self.ignored.isdisjoint(named)
         )
 
@@ -327,7 +337,7 @@ def groups(rows: list[Row], replaced: Array) -> list[Group]:
     parted = True
     for row, chords in zip(rows, replaced.tolist(), strict=True):
         shifts = any(codes.G_GROUP[code] in ("one-shot", "work offset", "tool length") for code in row.g())
-        parted |= shifts or bool(row.text)
+        parted |= shifts or bool(row.text) or row.feeds
         if row.last == row.first:
             continue
         last = found[-1] if found else None

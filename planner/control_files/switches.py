@@ -118,6 +118,8 @@ class Switches(Output):
         said = []
         for code in row.g():
             group, name = codes.G_GROUP[code], f"G{codes.number(code)}"
+            if group == "distance mode" and self.extrudes:
+                self._say_distance(row, name)
             if group in ("motion", "one-shot", "distance mode"):
                 continue
             if code == _G80 and not self.control.cycles:
@@ -146,6 +148,13 @@ class Switches(Output):
                 self._refuse(row, name)
         for text in [" ".join(said)] if said and not self.control.one_command else said:
             self._say(text)
+
+    def _say_distance(self, row: Row, name: str) -> None:
+        """G90 or G91 where they stand: after G91 E is a step, and Marlin's G90 ends M83."""
+        if row.others:
+            self._refuse(row, f"{name} beside other codes")
+        self._say(name)
+        self.absolute = row.absolute
 
     def _know_diameter(self, row: Row, code: int) -> None:
         """Refuse the radius of a tool that the machine file does not have: its centre would go along the contour."""

@@ -21,7 +21,7 @@ from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.events import plain
 from planner.nc.program import Kind
-from planner.nc.reading import ABSOLUTE, FANUC
+from planner.nc.reading import ABSOLUTE, FANUC, IGNORE
 from planner.nc.settings import AXES
 from planner.nc.writer import FEED_MIN
 
@@ -74,6 +74,8 @@ class Translator(Switches):
             return
         for other in row.others:
             self._other(row, other)
+        if row.feeds and not self.control.extruder:
+            self._no_extruder(row)
         feed = row.value("F")
         if feed is not None:
             self.programmed_feed, self.feed_inch = feed, row.inch_before
@@ -84,7 +86,7 @@ class Translator(Switches):
             self._dwell(row)
         if chords:
             self._chords(row)
-        elif row.named or row.moves or _one_shot(row) >= 0:
+        elif row.named or row.moves or _one_shot(row) >= 0 or (row.feeds and self.control.extruder):
             self._move(row)
         self._pass(row)
         self._stops(row)
@@ -114,7 +116,7 @@ class Translator(Switches):
         used = self._used(row)
         words = []
         for word in row.words:
-            if word.letter in "GMFSTNE" and not (word.letter == "E" and "E" in letters):
+            if word.letter in "GMFSTN":
                 continue
             if word.letter in AXES and word.letter not in letters:
                 self._parked(row, word)
@@ -157,7 +159,7 @@ class Translator(Switches):
         if code != self.motion or self.control.one_command or name or row.motion > 30:
             said.append(code)
         self.motion = code
-        return said, row.motion != 0
+        return said, row.motion != 0 or row.feeds
 
     def _arc_is_known(self, row: Row) -> bool:
         if self.control.name == LINUXCNC.name:
@@ -187,8 +189,17 @@ class Translator(Switches):
         if row.motion in codes.ARCS:  # many programs write K0 in G17, which is an error on LinuxCNC
             motion -= {"IJK"["XYZ".index(axis)] for axis in "XYZ" if axis not in row.plane}
         return (
-            (set(AXES + "E") | shot | motion) - (modal - motion - shot) - ({"P"} if G4 in row.g() else set())
+            (set(AXES + "E" * (row.feeds and self.control.extruder)) | shot | motion)
+            - (modal - motion - shot)
+            - ({"P"} if G4 in row.g() else set())
         )
+
+    def _no_extruder(self, row: Row) -> None:
+        """E on a control without an extruder: left out if the user says so."""
+        word = row.value("E")
+        if self.program.reading.extruder != IGNORE:
+            self._refuse(row, f"{word}: an extruder")
+        self._note("E", f"{word} is left out, as --extruder ignore says", row)
 
     def _parked(self, row: Row, word: Word) -> None:
         """An axis that the control does not have: its words may go where it stands still."""

@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.export_judge import OFFSETS, STARTS, alike, path, readable, unknown_words
-from benchmarks.export_programs import TOLERANCE, machine, random_program
+import planner
+from benchmarks.export_judge import OFFSETS, STARTS, alike, filament, path, readable, unknown_words
+from benchmarks.export_programs import AXIS, TOLERANCE, machine, random_print, random_program
 from benchmarks.export_rows import judged, of_file
+from planner.base.errors import InputError
+from planner.control_files.candidates import Candidates
 from planner.control_files.controls import CONTROLS
-from planner.machine import load_machine
+from planner.machine import Axis, load_machine
+from planner.nc.reading import Reading
 
 QUICK, MANY = 24, 300
 
@@ -35,6 +39,54 @@ def test_law() -> None:
 @pytest.mark.slow
 def test_law_on_many_programs() -> None:
     law(range(10_000, 10_000 + MANY), 3)
+
+
+@pytest.mark.parametrize("extruder", ["refuse", "ignore"])
+@pytest.mark.parametrize("control", ["klipper", "marlin"])
+def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:
+    """The same filament at the same places, at the same F, by the control's own rules; whether the plan knows the extruder or not."""
+    axis = Axis(velocity=60.0, acceleration=3000.0, jerk=100000.0)
+    mill = machine()
+    printer = mill.model_copy(update={"axes": mill.axes | {"e": axis}}) if extruder == "refuse" else mill
+    chords = 0
+    for seed in range(30):
+        text = random_print(seed)
+        program = planner.read_program(text=text, machine=printer, reading=Reading(extruder=extruder))
+        plan = planner.plan(program, printer, method="kinematic")
+        job = Candidates(plan, CONTROLS[control], TOLERANCE)
+        found = [*job.own(0.01), *job.chords(0.01, "chords")]
+        chords += len(found) > 1
+        for one in found:
+            out = job.written(one)[0].decode()
+            assert not unknown_words(out, control)
+            assert filament(out, control) == pytest.approx(filament(text, control), abs=1e-4), seed
+    assert chords > 10
+
+
+def test_filament_is_counted_as_printers_do() -> None:
+    text = "G90\nM83\nG1 X1 E1 F60\nG90\nG1 E1\nG92 E0\nG91\nG1 X2 E0.5\n"
+    assert filament(text, "klipper")[:, [0, 3]].tolist() == [[1, 1], [1, 2], [3, 2.5]]
+    assert filament(text, "marlin")[:, [0, 3]].tolist() == [[1, 1], [1, 1], [3, 1.5]]
+
+
+@pytest.mark.parametrize("control", ["grbl", "linuxcnc"])
+def test_controls_without_an_extruder_say_what_they_leave_out(control: str) -> None:
+    text = "G21 G90\nG0 X0 Y0\nG1 X9 E1 F600\nG1 E-1\nY9\nM2\n"
+    plan = planner.plan(
+        planner.read_program(text=text, machine=machine(), reading=Reading(extruder="ignore")),
+        machine(),
+        method="stop",
+    )
+    job = Candidates(plan, CONTROLS[control], TOLERANCE)
+    assert job.why_not.startswith("line 3: E1")
+    data, notes = job.written(job.own(0.01)[0])
+    assert b"E" not in data.split(b"hold.")[1]
+    assert any(note.startswith("line 3: E1 is left out") for note in notes)
+    fed = machine().model_copy(update={"axes": machine().axes | {"e": Axis(**AXIS)}})
+    plan = planner.plan(planner.read_program(text=text, machine=fed), fed, method="stop")
+    job = Candidates(plan, CONTROLS[control], TOLERANCE)
+    with pytest.raises(InputError, match="E1: an extruder"):
+        job.written(job.own(0.01)[0])
 
 
 def test_the_judge_sees_what_is_lost() -> None:

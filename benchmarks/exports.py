@@ -4,10 +4,10 @@
 
 Random programs (export_programs.py) are planned, a tenth of them with the default method, and exported to the four controls as each
 candidate that the exporter has: the program as it is, its own path in the control's words, the planned path as chords. Each is read
-back from three starts, in turn with two sets of work offsets, for LinuxCNC also by `rs274` where it is installed (export_judge.py). With
-`--programs`, the programs of a folder are exported as they would be; large ones are planned with less work and read back from one start
-(export_rows.py), as results/RESULT.md says of each. `--rows` keeps the rows of every job in a file, so that a run that is cut off goes
-on where it ended; rows of another state of the planner are made anew.
+back from three starts, in turn with two sets of work offsets, for LinuxCNC also by `rs274` where it is installed (export_judge.py).
+With `--programs`, the programs of a folder are exported as they would be; large ones are planned with less work and read back from one
+start (export_rows.py), as results/RESULT.md says of each. `--rows` keeps the rows of every job in a file, so that a run that is cut off
+goes on where it ended; rows of another state of the planner are made anew.
 """
 
 from __future__ import annotations

@@ -317,12 +317,14 @@ _CODES_OF_GRBL = frozenset((
     *(f"M{code}" for code in (0, 1, 2, 30, 3, 4, 5, 7, 8, 9)),
 ))  # fmt: skip
 _PRINTERS = (
-    r"M400|G21|G90|G91|G28|G4 P[\d.]+|G92( [XYZE]-?[\d.]+)+|G[01]( [XYZEF]-?[\d.]+)+|"
+    r"M400|G1[01]|G21|G90|G91|G28|G4 P[\d.]+|G92( [XYZE]-?[\d.]+)+|G[01]( [XYZEF]-?[\d.]+)+|"
     r"M(18|84|8[23]|10[4-79]|11[4-9]|140|190|204|22[01])\b.*"
 )
 _LINES = {
     "klipper": re.compile(f"PAUSE|{_PRINTERS}"),
-    "marlin": re.compile(rf"G[23]( [XYZIJRF]-?[\d.]+)+|M[01]|M[34]( S[\d.]+)?|M[5789]|M17|{_PRINTERS}"),
+    "marlin": re.compile(
+        rf"G[23]( [XYZIJRF]-?[\d.]+)+|M[01]|M(7[567]|155|30[12]|420|900)\b.*|M[34]( S[\d.]+)?|M[5789]|M17|{_PRINTERS}"
+    ),
 }
 MILLISECONDS = frozenset(_LINES)  # controls whose G4 P counts them
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.units import MILLISECOND
-from planner.control_files.controls import Control, is_command
+from planner.control_files.controls import Control, is_command, is_setting, takes_move
 from planner.control_files.rows import G4, G10, G92, HOMES, Row, Source, Word, sets_tools
+from planner.control_files.source import same_places
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.leader import without_leader
@@ -19,7 +20,7 @@ from planner.nc.program import FEED_MOVES
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, INCREMENTAL, LINUXCNC
 
-SAME_PLACE = 1e-6  # of end points [mm], and of feeds by their size: what writing a program out rounds
+SAME_FEED = 1e-6  # by its size: what writing a program out rounds
 SAME_DWELL = 1e-9  # [s], the rounding of milliseconds
 # The words of commands that stand alone on their lines.
 _OWN = {
@@ -91,26 +92,15 @@ def _row_why_not(row: Row, source: Source, control: Control) -> str:
 
 def _is_known(words: list[Word], source: Source, control: Control) -> bool:
     """Whether the control knows a code that is none of moves and modes."""
-    word = words[0]
-    if word.letter == "M" and word.code // 10 in control.settings:
-        return True
-    if control.percent:
-        return (
-            word.letter == "%" or f"{word.letter}{codes.number(word.code)}" in source.program.reading.ignore
-        )
-    return (
-        control.one_command
-        and word.letter == "G"
-        and word.code == G92
-        and {w.letter for w in words} <= set("GE")
-    )
+    name = f"{words[0].letter}{codes.number(words[0].code)}"
+    left_out = control.percent and (name[0] == "%" or name in source.program.reading.ignore)
+    return left_out or is_setting(words, control)
 
 
 def _dwells_otherwise(row: Row, source: Source, control: Control) -> bool:
-    word, program = row.value("P"), source.program
-    planned = max((float(program.dwell[k]) for k in range(row.first, row.last)), default=0.0)
+    word = row.value("P")
     lasts = 0.0 if word is None else word.value * (MILLISECOND if control.milliseconds else 1.0)
-    return abs(lasts - planned) > SAME_DWELL
+    return abs(lasts - source.dwell(row)) > SAME_DWELL
 
 
 def _line_why_not(row: Row) -> str:
@@ -127,8 +117,7 @@ def _line_why_not(row: Row) -> str:
 
 
 def _grbl_why_not(row: Row, source: Source, control: Control) -> str:
-    absolute = source.program.reading.arc_centres == ABSOLUTE
-    if row.motion in codes.ARCS and (row.value("P") is not None or absolute):
+    if row.motion in codes.ARCS and not takes_move(row, control, source.program.reading):
         return "an arc with P, or with absolute centres"
     if sets_tools(row):
         return "G10 or G43.1 with more than grbl's"
@@ -165,10 +154,8 @@ def _reads_otherwise(source: Source, text: bytes, machine: Machine) -> bool:
     except InputError:
         return True
     return not (
-        again.end.shape == program.end.shape
-        and again.axes == program.axes
-        and np.array_equal(again.kind, program.kind)
-        and np.allclose(again.end, program.end, rtol=0.0, atol=SAME_PLACE)
+        again.axes == program.axes
+        and same_places(again, program)
         and np.allclose(again.dwell, program.dwell, rtol=0.0, atol=SAME_DWELL)
-        and np.allclose(again.feed, program.feed, rtol=SAME_PLACE, atol=0.0)
+        and np.allclose(again.feed, program.feed, rtol=SAME_FEED, atol=0.0)
     )

@@ -20,20 +20,20 @@ from planner.control_files.as_it_is import why_not
 from planner.control_files.chords import (
     DECIMALS,
     Polyline,
+    breaks,
+    groups,
     off_the_path,
     planned_polyline,
     programmed_polyline,
     spliced,
 )
-from planner.control_files.controls import Control
+from planner.control_files.controls import Control, takes_move
 from planner.control_files.header import head_of
-from planner.control_files.rows import Row, Source, breaks, groups
+from planner.control_files.rows import Row, Source
 from planner.control_files.source import source_of, text_of
 from planner.control_files.translate import Translator
 from planner.job.plan import Plan
 from planner.machine import Machine
-from planner.nc import codes
-from planner.nc.reading import ABSOLUTE
 
 ROUNDING = 2.0 * 10.0**-DECIMALS  # room that coordinates need [mm]
 LESS = 0.9  # of the tolerance: what a plan should take that leaves room for chords
@@ -136,13 +136,9 @@ class Candidates:
 
     def _is_replaced(self, row: Row, *, planned: bool) -> bool:
         control = self.control
-        if row.radius or row.motion > 30:
-            return not (control.cycles and (row.radius or row.motion in control.g))
-        absolute = self.source.program.reading.arc_centres == ABSOLUTE
-        arc = row.motion in codes.ARCS
-        return planned or (
-            arc and (not control.arcs or absolute or (row.value("P") is not None and not control.cycles))
-        )
+        if row.radius:  # which the control would reckon with once more
+            return not control.cycles
+        return (planned and row.motion <= 30) or not takes_move(row, control, self.source.program.reading)
 
     @cached_property
     def feed_in_force(self) -> FloatArray:

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.control_files.rows import Group
+from planner.control_files.rows import Row
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
 from planner.job.plan import Plan
 from planner.motion.trajectory import Trajectory
+from planner.nc import codes
 from planner.nc.program import Kind, Program
 
 ROUNDS = 30  # of raising the density, each by a tenth at least: far more than curvature between setpoints can ask for
@@ -43,6 +44,16 @@ class Polyline:
     block: Array
     rapid: Array
     miss: float
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed before them."""
+
+    first: int
+    last: int
+    replaced: bool
+    placed: frozenset[str]
 
 
 def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
@@ -137,6 +148,36 @@ def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence
         rapid=np.concatenate(rapid),
         miss=max(planned.miss, own.miss),
     )
+
+
+def groups(rows: list[Row], replaced: Array) -> list[Group]:
+    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words; `replaced` (R,)."""
+    found: list[Group] = []
+    parted = True
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        shifts = any(codes.G_GROUP[code] in ("one-shot", "work offset", "tool length") for code in row.g())
+        parted |= shifts or bool(row.text) or row.feeds
+        if row.last == row.first:
+            continue
+        last = found[-1] if found else None
+        if last is not None and last.replaced == chords and not (parted and chords):
+            found[-1] = Group(last.first, row.last, last.replaced, last.placed)
+        else:
+            found.append(Group(row.first, row.last, chords, row.placed))
+        parted = shifts
+    return found
+
+
+def breaks(rows: list[Row], replaced: Array) -> Array:
+    """(K,) the blocks before which something else than a chord stands, ascending.
+
+    replaced : (R,) True for rows that chords replace
+    """
+    found: set[int] = set()
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:
+            found |= {row.first, row.last}
+    return np.array(sorted(found), dtype=np.int64)
 
 
 def off_the_path(line: Polyline, plan: Plan, groups: Sequence[Group]) -> float:

@@ -12,9 +12,11 @@ A word that stands in no table is refused with its line. Where the tables come f
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from planner.control_files.rows import G92, RETRACTIONS, Row, Word
 from planner.nc import codes
+from planner.nc.reading import ABSOLUTE, Reading
 
 _STAYS = "this control always stays on the path"
 _ONE_ZERO = "this control has no work offsets: its zero is the program's"
@@ -42,7 +44,6 @@ class Control:
     number, percent, paren : lines may begin with N, hold %, hold comments in parentheses
     line_max      : longest line without blanks and comments; 0 for no limit
     end           : the last line of a program that has none, or whose M2 or M30 it does not know
-    jerk          : its own planner limits the jerk
     """
 
     name: str
@@ -64,7 +65,6 @@ class Control:
     paren: bool = True
     line_max: int = 0
     end: str = "M2"
-    jerk: bool = False
 
     @property
     def extruder(self) -> bool:
@@ -72,7 +72,6 @@ class Control:
         return self.one_command and "E" in self.letters
 
 
-_CYCLES_OFF = {"G80": _STRAIGHT, "G98": _STRAIGHT, "G99": _STRAIGHT}
 _IDLE_ON_MILLS = {
     "G8": _NOT_USED,
     "G97": _RPM,
@@ -83,9 +82,7 @@ _IDLE_ON_MILLS = {
 }
 _IDLE_ON_PRINTERS = {
     **_IDLE_ON_MILLS,
-    **_CYCLES_OFF,
-    **{f"G{plane}": _STRAIGHT for plane in (17, 18, 19)},
-    "G91.1": _STRAIGHT,
+    **dict.fromkeys(("G17", "G18", "G19", "G80", "G91.1", "G98", "G99"), _STRAIGHT),
     "G61": _STAYS,
     "G54": _ONE_ZERO,
     "G40": _NOT_USED,
@@ -125,22 +122,13 @@ KLIPPER = Control(
     paren=False,
     end="M400",
 )
-MARLIN = Control(
+MARLIN = replace(
+    KLIPPER,
     name="marlin",
-    g=frozenset((0, 10, 40, 210, 280, 900, 910, 920)),
     m=frozenset((0, 1, 3, 4, 5, 7, 8, 9)),
-    settings=_PRINTER | {73, 85, 110, 111, 112, 113, 201, 203, 205, 851},
-    idle=_IDLE_ON_PRINTERS,
+    settings=_PRINTER | {73, 75, 76, 77, 85, 110, 111, 112, 113, 155, 201, 203, 205, 301, 302, 420, 851, 900},
     instead={"M60": "M0", "M6": "M0"},
-    letters="FXYZE",
-    one_command=True,
-    rapid_feed=True,
-    milliseconds=True,
-    inch=False,
-    speed_by_code=True,
     number=False,  # a line number needs a checksum on the serial line
-    paren=False,
-    end="M400",
 )
 LINUXCNC = Control(
     name="linuxcnc",
@@ -168,11 +156,36 @@ def is_command(line: str, control: Control) -> bool:
     return known is not None and known.fullmatch(line) is not None
 
 
+def is_setting(words: list[Word], control: Control) -> bool:
+    """Whether the control knows a code that moves no axis, with its words: a setting, a retraction, G92 E."""
+    first, letters = words[0], {word.letter for word in words}
+    if first.letter == "M":
+        return first.code % 10 == 0 and first.code // 10 in control.settings
+    retracts = first.code in RETRACTIONS and letters == {"G"}
+    return control.one_command and (retracts or (first.code == G92 and letters <= set("GE")))
+
+
+def takes_move(row: Row, control: Control, reading: Reading) -> bool:
+    """Whether the control is given a move in the program's own words: no arcs with turns for grbl, none with absolute centres."""
+    if row.radius and not control.cycles:
+        return False
+    if row.motion in codes.ARCS:
+        known = control.arcs and reading.arc_centres != ABSOLUTE
+        return known and (control.cycles or row.value("P") is None)
+    return row.motion <= 30 or (control.cycles and row.motion in control.g)
+
+
 CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
 # Codes that mean the same on every control, but that need a build of it with an option: what is said of them.
 OPTIONS = {
     ("grbl", "M7"): "M7 needs a grbl built with ENABLE_M7",
     ("klipper", "PAUSE"): "PAUSE needs [pause_resume] in printer.cfg",
     ("marlin", "M3"): "M3, M4 and M5 need a Marlin built with SPINDLE_FEATURE or LASER_FEATURE",
-    ("marlin", "M8"): "M7, M8 and M9 need a Marlin built with COOLANT_CONTROL",
+    ("marlin", "M420"): "M420 needs a Marlin built with bed leveling",
+    ("marlin", "M900"): "M900 needs a Marlin built with LIN_ADVANCE",
+    **{
+        ("marlin", f"M{code}"): "M7, M8 and M9 need a Marlin built with COOLANT_CONTROL" for code in (7, 8, 9)
+    },
+    **{("klipper", code): "G10 and G11 need [firmware_retraction] in printer.cfg" for code in ("G10", "G11")},
+    **{("marlin", code): "G10 and G11 need a Marlin built with FWRETRACT" for code in ("G10", "G11")},
 }

@@ -29,7 +29,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.control_files.models import along, move_times, reachable
+from planner.control_files.models import along, move_times, reachable, stoppable
 from planner.machine import Machine
 
 NORMAL = np.sqrt(3.0) / 2.0  # share of the acceleration that an arc takes across, at most
@@ -114,7 +114,7 @@ def _moving_time(
     bound = np.append(np.append(0.0, np.minimum(tops[1:], tops[:-1]) ** 2), 0.0)
     gain = 2.0 * accels * pieces
     seen = _alternate(np.where(swallowed, 0, 1), np.where(kinks, 0, 1))
-    v_sq = reachable(np.minimum(bound, _stoppable(gain, seen)), gain)
+    v_sq = reachable(np.minimum(bound, stoppable(gain, BLOCKS, seen)), gain)
     peak = np.minimum(tops**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
     return float(move_times(pieces, accels, v_sq[:-1], peak, v_sq[1:]).sum())
 
@@ -169,16 +169,3 @@ def _corners(
         np.where(is_kink, kink, speed),
         left,
     )
-
-
-def _stoppable(gain: FloatArray, seen: FloatArray) -> FloatArray:
-    """(n+1,) squares of speeds from which the motion can stand within `BLOCKS` moves.
-
-    gain : (n,) 2 a l of the pieces
-    seen : (n,) 1 where a piece is a move, 0 where it belongs to the one after it
-    """
-    s = np.append(0.0, np.cumsum(gain))
-    number = np.append(0, np.cumsum(seen))
-    ahead = np.searchsorted(number, number + BLOCKS)
-    found: FloatArray = np.where(ahead < len(s), s[np.minimum(ahead, len(s) - 1)] - s, np.inf)
-    return found

@@ -155,7 +155,7 @@ def predicted_time(
     gain = 2.0 * accel * length
     v_sq = reachable(bound, gain)
     if control.blocks is not None:
-        v_sq = reachable(np.minimum(v_sq, stoppable(gain, control.blocks)), gain)
+        v_sq = reachable(np.minimum(v_sq, stoppable(gain, control.blocks, np.ones(len(gain)))), gain)
     peak = np.minimum(top**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
     return float(move_times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
 
@@ -219,11 +219,15 @@ def reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
     return np.maximum(found, 0.0)
 
 
-def stoppable(gain: FloatArray, blocks: int) -> FloatArray:
-    """(n+1,) squares of speeds from which the motion can stand within so many blocks, gain (n,)."""
-    s = np.append(0.0, np.cumsum(gain))
-    ahead = np.minimum(np.arange(len(s)) + blocks, len(s) - 1)
-    found: FloatArray = np.where(np.arange(len(s)) + blocks < len(s), s[ahead] - s, np.inf)
+def stoppable(gain: FloatArray, blocks: int, seen: Array) -> FloatArray:
+    """(n+1,) squares of speeds from which the motion can stand within so many blocks.
+
+    gain : (n,) 2 a l of the pieces
+    seen : (n,) 1 where a piece is a block, 0 where it belongs to the one after it
+    """
+    s, number = np.append(0.0, np.cumsum(gain)), np.append(0, np.cumsum(seen))
+    ahead = np.searchsorted(number, number + blocks)
+    found: FloatArray = np.where(ahead < len(s), s[np.minimum(ahead, len(s) - 1)] - s, np.inf)
     return found
 
 

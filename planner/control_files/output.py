@@ -123,9 +123,9 @@ class Output:
         return comment(text, self.control)
 
     def _option(self, name: str, row: Row) -> None:
-        key = "M8" if name in ("M7", "M9") and self.control.name == "marlin" else name
-        if (self.control.name, key) in OPTIONS:
-            self._note(key, OPTIONS[self.control.name, key], row)
+        said = OPTIONS.get((self.control.name, name))
+        if said is not None:
+            self._note(said, said, row)
 
     def _note(self, key: str, text: str, row: Row) -> None:
         self.notes.setdefault(key, (text, row.line))

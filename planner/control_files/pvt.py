@@ -16,7 +16,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.base.units import MM_PER_INCH, RAD_PER_DEG
+from planner.base.units import RAD_PER_DEG
+from planner.control_files.stream import scale_of
 from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 
@@ -36,17 +37,14 @@ def write_pvt(
 
     Raises InputError for another unit than mm or inch, and for a distance that is not above 0.
     """
-    if unit not in ("mm", "inch"):
-        raise InputError(f"no unit '{unit}'; there are mm, inch")
+    scale = scale_of(trajectory, unit)
     if not within > 0:
         raise InputError(f"--within must be above 0 mm, found {within:g}")
-    linear = 1.0 / MM_PER_INCH if unit == "inch" else 1.0
     rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
     periods, miss = longest_interval(
         trajectory, np.where(rotary, within * RAD_PER_DEG * trajectory.radius, within)
     )
     rows = _rows(len(trajectory), periods)
-    scale = np.where(rotary, trajectory.in_degrees, linear)
     names = [f"{kind}{axis}" for axis in trajectory.axes for kind in ("", "v")]
     table = np.empty((len(rows), 1 + len(names)))
     table[:, 0] = trajectory.t[rows]

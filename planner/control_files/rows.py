@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import Array
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.integers import integers_of
@@ -32,6 +31,7 @@ LINEAR = "XYZ"
 # G codes in tenths.
 G4, G10, G53, G52, G92 = 40, 100, 530, 520, 920
 HOMES = (280, 300)
+RETRACTIONS = (G10, 110)  # without L
 # Beside work offsets: what shifts the coordinates that follow (G52, G92.1 to G92.3, G10, tool lengths).
 SHIFTS = frozenset((G52, 921, 922, 923, G10, 430, 431, 432, 434, 490))
 COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
@@ -121,16 +121,6 @@ class Row:
         return self.motion >= 0 and self.last > self.first
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed before them."""
-
-    first: int
-    last: int
-    replaced: bool
-    placed: frozenset[str]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Source:
     """The rows of a program up to its end.
@@ -142,6 +132,10 @@ class Source:
     program: Program
     data: bytes
     rows: list[Row]
+
+    def dwell(self, row: Row) -> float:
+        """How long a row dwells [s]."""
+        return float(self.program.dwell[row.first : row.last].max(initial=0.0))
 
 
 def rows_of(data: bytes, program: Program, machine: Machine | None) -> Source:
@@ -329,33 +323,3 @@ def sets_tools(row: Row) -> bool:
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
     lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)
     return (G10 in row.g() and more) or lengths
-
-
-def groups(rows: list[Row], replaced: Array) -> list[Group]:
-    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words; `replaced` (R,)."""
-    found: list[Group] = []
-    parted = True
-    for row, chords in zip(rows, replaced.tolist(), strict=True):
-        shifts = any(codes.G_GROUP[code] in ("one-shot", "work offset", "tool length") for code in row.g())
-        parted |= shifts or bool(row.text) or row.feeds
-        if row.last == row.first:
-            continue
-        last = found[-1] if found else None
-        if last is not None and last.replaced == chords and not (parted and chords):
-            found[-1] = Group(last.first, row.last, last.replaced, last.placed)
-        else:
-            found.append(Group(row.first, row.last, chords, row.placed))
-        parted = shifts
-    return found
-
-
-def breaks(rows: list[Row], replaced: Array) -> Array:
-    """(K,) the blocks before which something else than a chord stands, ascending.
-
-    replaced : (R,) True for rows that chords replace
-    """
-    found: set[int] = set()
-    for row, chords in zip(rows, replaced.tolist(), strict=True):
-        if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:
-            found |= {row.first, row.last}
-    return np.array(sorted(found), dtype=np.int64)

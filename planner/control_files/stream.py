@@ -38,19 +38,20 @@ def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> N
 
     Raises InputError for another unit than mm or inch.
     """
-    if unit not in UNITS:
-        raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
+    scale = scale_of(trajectory, unit)
     with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
         file.write(f"# {' '.join(trajectory.axes)} [{unit}, deg], one row every {trajectory.dt:g} s\n")
-        position = np.asarray(trajectory.position) * _scale(trajectory, unit)
+        position = np.asarray(trajectory.position) * scale
         for first in range(0, len(position), _ROWS_AT_ONCE):
             np.savetxt(file, position[first : first + _ROWS_AT_ONCE], fmt="%.9f")
     (directory / "stream.hal").write_text(_stream_hal(trajectory), encoding="ascii")
     (directory / "try.hal").write_text(_try_hal(trajectory), encoding="ascii")
 
 
-def _scale(trajectory: Trajectory, unit: str) -> FloatArray:
-    """(A,) file units per unit of the positions."""
+def scale_of(trajectory: Trajectory, unit: str) -> FloatArray:
+    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for another unit."""
+    if unit not in UNITS:
+        raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
     degrees = trajectory.in_degrees
     return np.array(
         [degrees[k] if axis in ROTARY_AXES else 1.0 / UNITS[unit] for k, axis in enumerate(trajectory.axes)]

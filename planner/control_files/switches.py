@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from planner.base.units import MILLISECOND
-from planner.control_files.controls import is_command
+from planner.control_files.controls import is_command, is_setting
 from planner.control_files.output import Output, called
-from planner.control_files.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, G92, Row, Word
+from planner.control_files.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, Row, Word
 from planner.nc import codes
 from planner.nc.events import plain
 
@@ -36,19 +36,13 @@ class Switches(Output):
         macro = self.machine.macros.get(name)
         if macro is not None:
             self._say(called(macro, words[1:]))
-        elif self._is_setting(words):
+        elif is_setting(words, self.control):
+            self._option(name, row)
             self._say(text)
         elif name in self.program.reading.ignore:
             self._note(name, f"{name} is left out, as --ignore says", row)
         else:
             self._refuse(row, text)
-
-    def _is_setting(self, words: list[Word]) -> bool:
-        """Whether the control knows a code that moves nothing: a setting, or G92 E."""
-        first, letters = words[0], {word.letter for word in words}
-        if first.letter == "M":
-            return first.code % 10 == 0 and first.code // 10 in self.control.settings
-        return self.control.one_command and first.code == G92 and letters <= set("GE")
 
     def _switches(self, row: Row) -> None:
         """T, M6, the spindle, coolant and the other M codes that come before a move."""
@@ -131,8 +125,9 @@ class Switches(Output):
                 elif code != COMPENSATION_OFF or code in self.control.g:
                     said.append(name)
                 continue
-            if code == _G96 or (group == "spindle mode" and code in self.control.g):
-                self._surface_speed(row, name)
+            if group == "spindle mode" and code in self.control.g:
+                self._say(" ".join([name, *(str(word) for word in row.words if word.letter in "SD")]))
+                self.speed = None if row.value("S") is not None else self.speed
                 continue
             if code in self.control.g:
                 own = codes.WORDS.get(("G", code), "")
@@ -164,17 +159,6 @@ class Switches(Output):
         given = code in (411, 421) and word is not None  # the diameter itself
         if not given and (tool is None or not tool.diameter):
             self._refuse(row, f"G{codes.number(code)} of a tool whose diameter the machine file does not say")
-
-    def _surface_speed(self, row: Row, name: str) -> None:
-        if name not in {f"G{codes.number(code)}" for code in self.control.g}:
-            self._refuse(row, name)
-        words = [word for word in row.words if word.letter in "SD"]
-        self._say(" ".join([name, *map(str, words)]))
-        self.speed = None if row.value("S") is not None else self.speed
-
-    def _dwell(self, row: Row) -> None:
-        seconds = max((float(self.program.dwell[k]) for k in range(row.first, row.last)), default=0.0)
-        self._say_dwell(seconds)
 
     def _say_dwell(self, seconds: float) -> None:
         self._flush_speed()

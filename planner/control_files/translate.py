@@ -13,7 +13,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.control_files.chords import DECIMALS, Polyline
-from planner.control_files.controls import GRBL, LINUXCNC, Control
+from planner.control_files.controls import GRBL, Control, takes_move
 from planner.control_files.output import INCH_DECIMALS
 from planner.control_files.rows import G4, G10, G53, HOMES, Row, Source, Word, sets_tools
 from planner.control_files.switches import Switches
@@ -21,7 +21,7 @@ from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.events import plain
 from planner.nc.program import Kind
-from planner.nc.reading import ABSOLUTE, FANUC, IGNORE
+from planner.nc.reading import FANUC, IGNORE
 from planner.nc.settings import AXES
 from planner.nc.writer import FEED_MIN
 
@@ -83,7 +83,7 @@ class Translator(Switches):
         self._switches(row)
         self._modes(row, chords=chords)
         if G4 in row.g():
-            self._dwell(row)
+            self._say_dwell(self.source.dwell(row))
         if chords:
             self._chords(row)
         elif row.named or row.moves or _one_shot(row) >= 0 or (row.feeds and self.control.extruder):
@@ -143,16 +143,9 @@ class Translator(Switches):
         if row.motion < 0:
             self._refuse(row, "coordinates without a motion code")
         code = f"G{codes.number(row.motion)}"
-        splines = row.motion in codes.SPLINES
-        if row.motion in codes.ARCS:
-            known = self.control.arcs and self._arc_is_known(row)
-        elif row.motion > 30:
-            known = self.control.cycles and row.motion in self.control.g
-            if splines and not known and not row.moves:
+        if not takes_move(row, self.control, self.program.reading):
+            if row.motion in codes.SPLINES and not row.moves:
                 return None, False  # a further line of a spline that is written as straight moves
-        else:
-            known = True
-        if not known or (row.radius and not self.control.cycles):
             what = code if not row.radius else f"{code} under cutter radius compensation"
             self._refuse(row, f"{what} (it cannot be written as straight moves here: {self._why_kept(row)})")
         said = [name] if name else []
@@ -160,11 +153,6 @@ class Translator(Switches):
             said.append(code)
         self.motion = code
         return said, row.motion != 0 or row.feeds
-
-    def _arc_is_known(self, row: Row) -> bool:
-        if self.control.name == LINUXCNC.name:
-            return self.program.reading.arc_centres != ABSOLUTE
-        return row.value("P") is None and self.program.reading.arc_centres != ABSOLUTE
 
     def _why_kept(self, row: Row) -> str:
         if not row.per_minute:
@@ -184,7 +172,7 @@ class Translator(Switches):
             if codes.G_GROUP[code] not in ("motion", "one-shot")
             for letter in codes.WORDS.get(("G", code), "")
         }
-        shot = {letter for code in row.g() if code in (G10,) for letter in codes.WORDS.get(("G", code), "")}
+        shot = set(codes.WORDS["G", G10]) if G10 in row.g() else set()
         motion = set(codes.WORDS.get(("G", row.motion), "")) if row.motion >= 0 else set()
         if row.motion in codes.ARCS:  # many programs write K0 in G17, which is an error on LinuxCNC
             motion -= {"IJK"["XYZ".index(axis)] for axis in "XYZ" if axis not in row.plane}

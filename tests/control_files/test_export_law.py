@@ -14,7 +14,7 @@ from benchmarks.export_programs import AXIS, TOLERANCE, machine, random_print, r
 from benchmarks.export_rows import judged, of_file
 from planner.base.errors import InputError
 from planner.control_files.candidates import Candidates
-from planner.control_files.controls import CONTROLS
+from planner.control_files.controls import CONTROLS, OPTIONS
 from planner.machine import Axis, load_machine
 from planner.nc.reading import Reading
 
@@ -61,6 +61,26 @@ def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:
             assert not unknown_words(out, control)
             assert filament(out, control) == pytest.approx(filament(text, control), abs=1e-4), seed
     assert chords > 10
+
+
+@pytest.mark.parametrize(
+    ("control", "noted"), [("klipper", "[firmware_retraction]"), ("marlin", "FWRETRACT")]
+)
+def test_retractions_by_the_control_are_kept(control: str, noted: str) -> None:
+    """G10 and G11 alone are the extruder's there; with L they set offsets, which these controls do not have."""
+    text = "G21\nG90\nG0 X0 Y0\nG1 X9 E1 F600\nG10\nG0 X20 Y5\nG11\nG1 X30 E2\n"
+    program = planner.read_program(text=text, machine=machine(), reading=Reading(extruder="ignore"))
+    job = Candidates(planner.plan(program, machine(), method="stop"), CONTROLS[control], TOLERANCE)
+    assert not job.why_not
+    (chords,) = job.chords(0.01, "chords")
+    data, notes = job.written(chords)
+    lines = [line.split(" F")[0] for line in data.decode().splitlines() if line[0] != ";"]
+    assert lines[-5:-1] == ["G10", "G0 X20 Y5", "G11", "G1 X30 E2"]
+    assert [note for note in notes if noted in note] == [f"line 5: {OPTIONS[control, 'G10']}"]
+    program = planner.read_program(text="G21 G90\nG0 X0 Y0\nG10 L2 P1 X3\nG1 X9 F60\n", machine=machine())
+    job = Candidates(planner.plan(program, machine(), method="stop"), CONTROLS[control], TOLERANCE)
+    with pytest.raises(InputError, match="G10"):
+        job.written(job.own(0.01)[0])
 
 
 def test_filament_is_counted_as_printers_do() -> None:

@@ -205,7 +205,7 @@ def interpreted(text: str, start: tuple[float, ...], offset: tuple[float, ...]) 
             env={**os.environ, "HOME": folder},  # where it shares its tool table with whatever else runs
         )
     if ran.returncode:
-        return (ran.stdout + ran.stderr).strip().splitlines()[-1] if ran.stdout + ran.stderr else "refused"
+        return " ".join((ran.stdout + ran.stderr).strip().splitlines()[-2:]) or "refused"
     return _canonical(ran.stdout, start)
 
 

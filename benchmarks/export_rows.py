@@ -42,6 +42,7 @@ DEFAULT_EVERY = (
     10  # of the random programs is planned with the default method; the others by one of closed form
 )
 CLOSED_FORM = "kinematic"
+NEEDS_TOOL = "cutter compensation"
 ROUNDING = 0.01  # that rs274 prints lengths with, in inches at worst [mm]
 HAS_RS274 = shutil.which("rs274") is not None
 # Sizes of a folder's programs [bytes], above which less work and a coarser period of the setpoints [s] make them cheap enough.
@@ -113,8 +114,7 @@ class Original:
             return f"words that {control} does not know: {words}"
         linuxcnc = control == "linuxcnc" and HAS_RS274 and self.program is None
         if out == self.text:
-            said = self.interpreted(places[0]) if linuxcnc else ""
-            return f"rs274: {said}" if isinstance(said, str) and said else ""
+            return _refused(self.interpreted(places[0])) if linuxcnc else ""
         out = readable(out, control)
         try:
             for place in places:
@@ -131,10 +131,15 @@ class Original:
         for place in places[-2:]:  # a process each
             found, before = interpreted(out, *place), self.interpreted(place)
             if isinstance(found, str):
-                return f"rs274: {found}"
+                return _refused(found)
             if not isinstance(before, str) and not alike(before, found, TOLERANCE + ROUNDING):
                 return f"rs274: other places from {place[0]} with {place[1]}"
         return ""
+
+
+def _refused(said: FloatArray | str) -> str:
+    """What rs274 refuses, but for what it says of the radius of a tool: that is its own tool table's, which is not the job's."""
+    return f"rs274: {said}" if isinstance(said, str) and NEEDS_TOOL not in said else ""
 
 
 def judged(seed: int, *, starts: int = len(STARTS)) -> list[Row]:

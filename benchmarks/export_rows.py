@@ -46,9 +46,9 @@ NEEDS_TOOL = "cutter compensation"
 ROUNDING = 0.01  # that rs274 prints lengths with, in inches at worst [mm]
 HAS_RS274 = shutil.which("rs274") is not None
 # Sizes of a folder's programs [bytes], above which less work and a coarser period of the setpoints [s] make them cheap enough.
-QUICK_ABOVE, CLOSED_ABOVE = 45_000, 250_000
-COARSE_DT = 0.004
-ONE_PLACE_ABOVE = 250_000  # bytes; smaller ones are read back from all starts with all offsets
+QUICK_ABOVE, CLOSED_ABOVE = 5_000, 45_000
+COARSE_ABOVE, COARSE_DT = 250_000, 0.004
+ONE_PLACE_ABOVE = 250_000  # bytes; smaller ones are read back from all starts
 TURN = Axis(
     velocity=360.0, acceleration=3600.0, jerk=72000.0
 )  # for programs that turn a rotary axis [deg/s ...]
@@ -246,8 +246,10 @@ def _read(file: Path, machine: Machine, reading: Reading) -> tuple[Program, Mach
 
 def _work(size: int) -> tuple[dict[str, Any], str, float]:
     """Settings of `plan` for a program of so many bytes, what the table says of them, and the least period of the setpoints [s]."""
-    if size > CLOSED_ABOVE:
+    if size > COARSE_ABOVE:
         return {"method": CLOSED_FORM}, f"{CLOSED_FORM}, {COARSE_DT * 1e3:g} ms", COARSE_DT
+    if size > CLOSED_ABOVE:
+        return {"method": CLOSED_FORM}, CLOSED_FORM, 0.0
     if size > QUICK_ABOVE:
         return {"effort": "quick"}, "optimal, quick", 0.0
     return {}, "optimal", 0.0

@@ -34,6 +34,7 @@ HOMES = (280, 300)
 RETRACTIONS = (G10, 110)  # without L
 # Beside work offsets: what shifts the coordinates that follow (G52, G92.1 to G92.3, G10, tool lengths).
 SHIFTS = frozenset((G52, 921, 922, 923, G10, 430, 431, 432, 434, 490))
+LENGTHS = frozenset((431, 432))  # whose axis words are lengths of tools
 COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
 ENDS = frozenset((20, 300))  # M2 and M30, in tenths
 _ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
@@ -282,11 +283,21 @@ class _Follower:
         elif one_shot == G53:
             row.motion = self.motion
             self.placed -= named
-        elif one_shot == -1 and (named or row.feeds or (self.motion in codes.ARCS and _is_arc(row, g))):
+        elif (
+            one_shot == -1
+            and LENGTHS.isdisjoint(g)
+            and (named or row.feeds or (self.motion in codes.ARCS and _is_arc(row, g)))
+        ):
             row.motion = self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
-            self.placed |= named if self.absolute else frozenset()
+            self.placed |= self._told(row, named) if self.absolute else frozenset()
+
+    def _told(self, row: Row, named: frozenset[str]) -> frozenset[str]:
+        """Axes of which the words of a row tell where they are after it: a cycle's depth does not, the tool comes back."""
+        if row.motion <= 30 or row.motion in codes.SPLINES:
+            return named
+        return named & frozenset(row.plane) if row.motion in codes.CYCLES else frozenset()
 
     def _is_plain(self, row: Row, named: frozenset[str]) -> bool:
         blocks = slice(row.first, row.last)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from planner.base.units import MILLISECOND
 from planner.control_files.controls import is_command, is_setting
 from planner.control_files.output import Output, called
-from planner.control_files.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, Row, Word
+from planner.control_files.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, LENGTHS, Row, Word
 from planner.nc import codes
 from planner.nc.events import plain
 
@@ -131,7 +131,7 @@ class Switches(Output):
                 continue
             if code in self.control.g:
                 own = codes.WORDS.get(("G", code), "")
-                own += "XYZ" if code in (431, 432) and not row.moves else ""
+                own += "XYZ" if code in LENGTHS else ""
                 said.append(" ".join([name, *(str(word) for word in row.words if word.letter in own)]))
                 self.inch = code == 200 if group == "units" else self.inch
                 self.feed = None if group in ("units", "feed mode") else self.feed

@@ -15,7 +15,7 @@ from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.control_files.chords import DECIMALS, Polyline
 from planner.control_files.controls import GRBL, Control, takes_move
 from planner.control_files.output import INCH_DECIMALS
-from planner.control_files.rows import G4, G10, G53, HOMES, Row, Source, Word, sets_tools
+from planner.control_files.rows import G4, G10, G53, HOMES, LENGTHS, Row, Source, Word, sets_tools
 from planner.control_files.switches import Switches
 from planner.machine import Machine
 from planner.nc import codes
@@ -97,7 +97,7 @@ class Translator(Switches):
         one_shot = _one_shot(row)
         if self.control.name == GRBL.name and sets_tools(row):
             self._refuse(row, "G10 or G43.1 with more than an origin, or a length in Z")
-        if {431, 432} & set(g) and not row.moves:
+        if not LENGTHS.isdisjoint(g):
             return  # the coordinates are those of the tool length
         if one_shot == G10 and self.program.reading.dialect == FANUC:
             self._refuse(row, "G10, which other controls read otherwise than Fanuc's")

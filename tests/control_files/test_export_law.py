@@ -41,6 +41,24 @@ def test_law_on_many_programs() -> None:
     law(range(10_000, 10_000 + MANY), 3)
 
 
+@pytest.mark.parametrize(
+    "told",
+    ["G43.1 Z2", "G98 G81 X4 Y3 Z-2 R1 F300\nG80", "G91 G98 G81 X4 Y3 Z-2 R1 F300\nG80 G90"],
+)
+def test_words_that_do_not_tell_where_an_axis_is(told: str) -> None:
+    """After G53 nothing tells where Z is in the program's coordinates: a tool's length and a cycle's depth, from which it comes back,
+    do not. A chord down from there began where the plan did."""
+    text = f"G21 G90\nG53 G0 Z20\nG0 X0 Y0\n{told}\nG1 Y14.5 F1500\nZ-2\nX8\nX1 Y3\nM2\n"
+    mill = machine()
+    plan = planner.plan(planner.read_program(text=text, machine=mill), mill, method="kinematic")
+    job = Candidates(plan, CONTROLS["linuxcnc"], TOLERANCE)
+    for one in job.chords(1e-3, "chords"):
+        out = readable(job.written(one)[0].decode())
+        for start in STARTS:
+            there, back = (path(each, mill, start, (0.0, 0.0, 60.0)) for each in (text, out))
+            assert alike(there, back, TOLERANCE)
+
+
 @pytest.mark.parametrize("extruder", ["refuse", "ignore"])
 @pytest.mark.parametrize("control", ["klipper", "marlin"])
 def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:

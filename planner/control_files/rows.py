@@ -6,6 +6,7 @@ of axes that an absolute coordinate has placed before. Everything else stays a l
 
     the first moves of each axis           wherever the machine stands, they lead to the same place
     G53, G28, G30, homing                  machine coordinates; what they move has no place in the program's coordinates afterwards
+    M6                                     the control may go to where it changes tools, or the operator may move it
     G54 to G59.3, G10, G52, G92, G43, G49  they shift those coordinates: all axes are placed anew (G92 places those that it names)
     rotary and second axes, E              chords have X, Y and Z only
 """
@@ -37,6 +38,7 @@ SHIFTS = frozenset((G52, 921, 922, 923, G10, 430, 431, 432, 434, 490))
 LENGTHS = frozenset((431, 432))  # whose axis words are lengths of tools
 COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
 ENDS = frozenset((20, 300))  # M2 and M30, in tenths
+_TOOL_CHANGE = 6
 _ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
 _IN_PLANE = {170: "XY", 180: "XZ", 190: "YZ"}
 
@@ -256,6 +258,8 @@ class _Follower:
             if any(codes.G_GROUP[code] == "work offset" or code in SHIFTS for code in g):
                 self.placed = row.placed = frozenset()
             self._place(row, g)
+            if _TOOL_CHANGE in row.m():
+                self.placed = frozenset()
             self.radius = row.radius and not (self.leaving and row.moves)
 
     def _modes(self, g: list[int]) -> None:

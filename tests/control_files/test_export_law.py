@@ -15,6 +15,7 @@ from benchmarks.export_rows import judged, of_file
 from planner.base.errors import InputError
 from planner.control_files.candidates import Candidates
 from planner.control_files.controls import CONTROLS, OPTIONS
+from planner.job.plan import Plan
 from planner.machine import Axis, load_machine
 from planner.nc.reading import Reading
 
@@ -30,6 +31,11 @@ def law(seeds: range, starts: int) -> None:
         (control, outcome) for control in CONTROLS for outcome in ("chords", "own path", "refused")
     } <= outcomes
     assert {("grbl", "as it is"), ("linuxcnc", "as it is")} <= outcomes
+
+
+def _planned(text: str) -> Plan:
+    mill = machine()
+    return planner.plan(planner.read_program(text=text, machine=mill), mill, method="kinematic")
 
 
 def test_law() -> None:
@@ -50,13 +56,18 @@ def test_words_that_do_not_tell_where_an_axis_is(told: str) -> None:
     do not. A chord down from there began where the plan did."""
     text = f"G21 G90\nG53 G0 Z20\nG0 X0 Y0\n{told}\nG1 Y14.5 F1500\nZ-2\nX8\nX1 Y3\nM2\n"
     mill = machine()
-    plan = planner.plan(planner.read_program(text=text, machine=mill), mill, method="kinematic")
-    job = Candidates(plan, CONTROLS["linuxcnc"], TOLERANCE)
+    job = Candidates(_planned(text), CONTROLS["linuxcnc"], TOLERANCE)
     for one in job.chords(1e-3, "chords"):
         out = readable(job.written(one)[0].decode())
         for start in STARTS:
             there, back = (path(each, mill, start, (0.0, 0.0, 60.0)) for each in (text, out))
             assert alike(there, back, TOLERANCE)
+
+
+def test_after_a_tool_change_the_first_moves_are_the_programs_own() -> None:
+    text = "G21 G90\nG0 X0 Y0 Z5\nG1 X9 F900\nT2 M6\nG1 Y4\nG0 X2 Y2\nZ1\nG1 X8 Y3\n"
+    job = Candidates(_planned(text), CONTROLS["grbl"], TOLERANCE)
+    assert [row.line for row in job.source.rows if row.plain] == [3, 8]
 
 
 @pytest.mark.parametrize("extruder", ["refuse", "ignore"])

@@ -19,7 +19,7 @@ from planner.job.plan import Plan
 from planner.machine import Axis, load_machine
 from planner.nc.reading import Reading
 
-QUICK, MANY = 24, 300
+QUICK, MANY = 24, 40
 
 
 def law(seeds: range, starts: int) -> None:

@@ -101,7 +101,6 @@ class Sizes:
     searched_most: int = _size(EFFORT, 1_000_000, 200)  # steps: what takes a minute or two on two processors
     # points of a plan, and of each corner shape: about as many as get the finest grid
     rivals_planned: int = _size(EFFORT, 40_000, 100)
-    instead_planned: int = _size(EFFORT, 50_000, 100)  # points: 10 blocks with tight jerks can have 22,000
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
     # points: beyond, only where it is worth solving again (optimal/tighten.py)
     tightened_everywhere: int = _size(EFFORT, 50_000, 10)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from planner.base.names import KINEMATIC, OPTIMAL
-from planner.base.sizes import SIZES
 from planner.constraints.extruder import with_extruder_limit
 from planner.constraints.limits import JERK
 from planner.delivery import periods
@@ -40,8 +38,6 @@ CORNER_ROUNDS = 4
 # those on which it finds something then.
 ALONE_MOST, ALONE_ROUNDS = 0.1, 3
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
-# Other methods are tried then on jobs with up to so many grid points: 10 blocks with tight jerks can have 22,000.
-INSTEAD_POINTS = SIZES.instead_planned
 # Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the mean as seven were, for
 # 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
@@ -54,11 +50,8 @@ class Method(ABC):
     ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
               `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
     measures_filters : whether filters make its motions slower only where they are measured to leave the tolerance
-    instead : methods that are tried as well if the chords between samples need some of the tolerance, because another one may then be
-              faster, and where the verdict fails
     """
 
-    instead: Sequence[Method] = ()
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
     measures_filters: ClassVar[bool] = False
 
@@ -127,9 +120,7 @@ class Method(ABC):
     def plan_within_periods(self, job: Job) -> Plan:
         """Plan a job such that the chords between its samples keep the tolerance too (delivery/periods.py).
 
-        Where they take some of it, or the verdict fails, the other methods are tried before the job is planned again with less
-        tolerance: on 19 of 31 such random jobs one of them is the fastest. A motion that takes longer than `job.most`, or than
-        theirs, is not planned again: with less tolerance it would hardly be faster.
+        A motion that takes longer than `job.most` is not planned again: with less tolerance it would hardly be faster.
         """
         made = self.plan_job(job)
         if made.verdict is None or (made.verdict.passed and (_inside(made) or not self.keeps_tolerance)):
@@ -137,26 +128,10 @@ class Method(ABC):
         return faster(self._planned_again(job, made), _slower_in_places(made))
 
     def _planned_again(self, job: Job, made: Plan) -> Plan:
-        """The plan of another method, or with less tolerance, in the place of one that leaves it."""
+        """The plan with the runs that leave the tolerance planned by themselves, or with less tolerance."""
         if (alone := self._runs_alone(job, made)) is not None:
             return alone
-        rival = self._rival(job, made) if made.grid_points <= INSTEAD_POINTS else None
-        if self.keeps_tolerance:
-            made = self._with_less(made, job if rival is None else _faster_than(rival, job))
-        if rival is None or faster(rival, made) is made:
-            return made
-        what = f"method {rival.method} loses"
-        if rival.method == made.method:
-            what = (
-                "the plan of less effort loses"
-                if rival.corner == made.corner
-                else f"{rival.corner} corners lose"
-            )
-        said = f"{what} less to the period"
-        if made.verdict is not None and made.verdict.faults and made.cycle_time <= rival.cycle_time:
-            said = f"another motion failed: {made.verdict.faults[0]}"
-        said = f"{said}; {rival.sentence}"
-        return dataclasses.replace(rival, method=made.method, corner=made.corner, sentence=said)
+        return self._with_less(made, job) if self.keeps_tolerance else made
 
     def _runs_alone(self, job: Job, made: Plan) -> Plan | None:
         """The plan with the runs on which its verdict finds something planned each by itself, and all others as they are; None where
@@ -233,25 +208,6 @@ class Method(ABC):
         said = _said(made, programmed, planned)
         making = made.making and made.making._replace(pricing=None)
         return dataclasses.replace(made, prices=None, making=making, notes=(*made.notes, said))
-
-    def _rival(self, job: Job, made: Plan) -> Plan | None:
-        """The fastest of the plans of the other methods that pass; None where there is none."""
-        best: Plan | None = None
-        for other in self.instead:
-            again = job.afresh()
-            rival = other.plan_within_periods(again if best is None else _faster_than(best, again))
-            wins = _passed(rival) and (best is None or faster(best, rival) is rival)
-            job.tell(
-                "another method",
-                found=_time(rival),
-                before=_time(best or made),
-                kept=wins,
-                method=rival.method,
-                corner=rival.corner or "none",
-            )
-            if wins:
-                best = rival
-        return best
 
     def _in_step(self, made: Plan) -> str:
         """What to do about a thread that this method does not keep in step."""

@@ -29,8 +29,6 @@ from planner.geometry.toolpath import Joint
 from planner.job.job import Job
 from planner.job.method import Method, faster
 from planner.job.plan import Plan
-from planner.methods.kinematic import KinematicMethod
-from planner.methods.stop import StopMethod
 from planner.optimal.compare_plans import Stopped, with_closed_forms
 from planner.optimal.effort import EFFORTS
 from planner.optimal.loop import Settings, fastest_plan, first_motion
@@ -68,16 +66,6 @@ class OptimalMethod(Method):
     shaped: bool = False
 
     ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
-
-    @property
-    def instead(self) -> tuple[Method, ...]:  # type: ignore[override]
-        """Full stops, method kinematic, less effort and single corners, where chords between samples take tolerance from splines. The
-        first two have closed forms: what takes longer than they do is not planned to the end."""
-        if self.corner != AUTO or self.shaped:
-            return ()
-        corners = (dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir", "kinematic"))
-        quick = () if self.effort == QUICK else (dataclasses.replace(self, effort=QUICK),)
-        return (StopMethod(join_lines=True), KinematicMethod(), *quick, *corners)
 
     def plan_job(self, job: Job) -> Plan:
         settings = Settings(

@@ -44,8 +44,7 @@ FORCE = 0.5  # of the pull in `corridor_prices`
 GAUSS = 0.5 - np.sqrt(3.0) / 6.0  # place of Gauss's rule of two points, from each end of an interval [-]
 PULLED = 0.5  # share of the jerk in which the pull counts, without jerk limits [-]
 GAP = 1e-4  # of the convex problem with the multipliers, share of the run's time [-]
-# Times at most in windows around sites that are tightened. Of 32 plans (benchmarks/retries.py at 2ad8a9c), 0 makes 24 longer or
-# shorter, 4.2e-4 longer on the mean and 6e-3 at most; 1 makes 14 so, 9e-5 longer on the mean and 1.8e-3 at most.
+# Times at most in windows around sites that are tightened.
 AGAIN = 2
 UNBOUNDED = 1e12  # stands for a feed or an acceleration that nothing bounds [mm/s], [mm/s2]
 

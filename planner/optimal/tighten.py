@@ -33,8 +33,7 @@ from planner.optimal.order import Order, solve_again
 
 # The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
 PEAK_MORE = 1.2
-# Tightening pays while a run is slowed down by more than this [-], and not for long: the first round gains 3e-3 of the
-# time, the second 7e-5, a third gained 1e-6 (means over 345 plans, benchmarks/retries.py).
+# Tightening pays while a run is slowed down by more than this [-], and not for long.
 TIGHTENED_EXCESS = 1e-5
 TIGHTENING_ROUNDS = 2
 # Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more than the first of `WORTH` [-]
@@ -42,8 +41,7 @@ TIGHTENING_ROUNDS = 2
 # 100,000 blocks 0.35 is solved again in the second round, with the first everywhere 0.82. Few places are left to the later rounds.
 TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
 SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps, by 5e-9 a round on SheepTile
-# What is slowed down is slowed down by this much more [-]: of 928 motions none needed it twice (benchmarks/retries.py). Less is
-# rounding.
+# What is slowed down is slowed down by this much more [-]; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places

@@ -42,8 +42,7 @@ STRAIGHT = 1e-4
 # Of the tolerance that sites may use at first [-]. With 0.99 six random jobs end 2e-4 to 2e-3 slower after three rounds of
 # reshaping; with 0.9999 one ends 3e-3 slower, and the others change by at most 2.4e-4.
 USED = 0.9995
-# Of tightening, in windows around the sites that need it; 2 are the rule. With 3, a run of each of 10 plans that need
-# more gets no spline; 7 of them take longer, up to 2.7e-2 (benchmarks/retries.py at 2ad8a9c).
+# Of tightening, in windows around the sites that need it; 2 are the rule. A run that needs more gets no spline.
 ROUNDS = 20
 SPANS_SHARED = SIZES.relaxed_shared
 RANGE = SIZES.relaxed_range

@@ -28,10 +28,7 @@ _HARMLESS = re.compile(
     r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
 )
 _OTHER_SETTING = Assumption(
-    "setting of grbl",
-    "settings of grbl",
-    "assumed not to change the motion",
-    changes=True,
+    "setting of grbl", "settings of grbl", "assumed not to change the motion", changes=True
 )
 _SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
 _VALUE = re.compile(r"(\w+)=([-+]?\d+\.?\d*)")

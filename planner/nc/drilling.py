@@ -148,11 +148,7 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
 
 
 def _meaning(letter: str) -> str:
-    what = {
-        "R": "R, where its feed begins",
-        "P": "P, its dwell in seconds",
-        "Q": "Q, the depth of a peck",
-    }
+    what = {"R": "R, where its feed begins", "P": "P, its dwell in seconds", "Q": "Q, the depth of a peck"}
     return what.get(letter, f"its depth as {letter}" if letter in "XYZ" else f"{letter}: the offsets I J K")
 
 

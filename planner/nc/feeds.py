@@ -53,8 +53,7 @@ def set_feed(state: State, block: Block, found: Findings) -> None:
     if code is not None and (code == 200) != (state.unit != 1.0):
         unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
         found.note(
-            f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line",
-            block.line,
+            f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line", block.line
         )
 
 

@@ -73,10 +73,7 @@ def thread_passes(thread: LatheThread) -> Iterator[Pass]:
     """The moves of the cycle, from its start and back to it. Raises ThreadFault."""
     _require(thread)
     start, end = thread.start, thread.end
-    out, ahead = (
-        math.copysign(1.0, start.imag - end.imag),
-        math.copysign(1.0, end.real - start.real),
-    )
+    out, ahead = (math.copysign(1.0, start.imag - end.imag), math.copysign(1.0, end.real - start.real))
     slope = math.tan(math.radians(thread.angle / 2.0))
     for depth in lathe_depths(thread):
         begin = start.real + ahead * depth * slope

@@ -36,12 +36,7 @@ class Mover:
     """
 
     def __init__(
-        self,
-        state: State,
-        store: Store,
-        assumed: Assumed,
-        feed_default: float | None,
-        found: Findings,
+        self, state: State, store: Store, assumed: Assumed, feed_default: float | None, found: Findings
     ):
         self.state, self.store, self.assumed = state, store, assumed
         self.feed_default, self.found = feed_default, found

@@ -55,10 +55,7 @@ WAIT_M = Assumption(
     changes=True,
 )
 CORNER_M = Assumption(
-    "speed of corners (M205, M566)",
-    "speeds of corners (M205, M566)",
-    CORNERS,
-    changes=True,
+    "speed of corners (M205, M566)", "speeds of corners (M205, M566)", CORNERS, changes=True
 )
 SCALE_M = Assumption(
     "code of a 3-D printer that shifts or scales its axes, or changes how they move",

@@ -26,15 +26,7 @@ from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl.arcs import circle_through
 from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point
-from planner.nc.hpgl.instructions import (
-    ALLOWED,
-    CHANGING,
-    FORMS,
-    IGNORED,
-    PAGE_ENDS,
-    REFUSED,
-    WITH_NUMBERS,
-)
+from planner.nc.hpgl.instructions import ALLOWED, CHANGING, FORMS, IGNORED, PAGE_ENDS, REFUSED, WITH_NUMBERS
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError
 from planner.nc.program import Kind, Program

@@ -15,16 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planner.nc.integers import LENGTHS
-from planner.nc.language.tree import (
-    Exists,
-    Expression,
-    Named,
-    Number,
-    Numbered,
-    Operation,
-    Parameter,
-    Word,
-)
+from planner.nc.language.tree import Exists, Expression, Named, Number, Numbered, Operation, Parameter, Word
 
 NESTED_MAX = (
     40  # brackets in brackets; the line of 255 characters of RS274NGC holds no more that means anything

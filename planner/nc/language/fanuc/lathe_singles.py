@@ -13,16 +13,7 @@ from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.lathe_cycles import name_of
 from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE, LatheWords
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import (
-    Expression,
-    Line,
-    Message,
-    Named,
-    Operation,
-    ProgramFault,
-    Turning,
-    Word,
-)
+from planner.nc.language.tree import Expression, Line, Message, Named, Operation, ProgramFault, Turning, Word
 
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")

@@ -34,9 +34,7 @@ X_HERE, Z_HERE = (
 )  # parameters that hold the end of the last block
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Codes that are not read, and why.
-_REFUSED = {
-    **dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are"),
-}
+_REFUSED = {**dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are")}
 
 
 class LatheAsked(FanucAsked):

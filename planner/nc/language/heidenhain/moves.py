@@ -32,15 +32,7 @@ from planner.nc.language.heidenhain.items import (
     absolute,
     word,
 )
-from planner.nc.language.heidenhain.text import (
-    ConversationalBlock,
-    minus,
-    of,
-    own,
-    plus,
-    quotient,
-    times,
-)
+from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, plus, quotient, times
 from planner.nc.language.spelling import NEGATIVE
 from planner.nc.language.tree import (
     ONE,

@@ -18,17 +18,7 @@ from planner.nc.language.siemens.calls import Calls
 from planner.nc.language.siemens.commands import as_word
 from planner.nc.language.siemens.text import TokenReader, operation, position
 from planner.nc.language.source import Source
-from planner.nc.language.tree import (
-    ONE,
-    TWO,
-    ZERO,
-    Expression,
-    Line,
-    MadeRows,
-    Number,
-    Parameter,
-    Word,
-)
+from planner.nc.language.tree import ONE, TWO, ZERO, Expression, Line, MadeRows, Number, Parameter, Word
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}

@@ -26,14 +26,7 @@ from planner.nc.language.siemens import codes, patterns
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import TokenReader, variable
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import (
-    ZERO,
-    Line,
-    PlainRows,
-    Procedure,
-    ProgramFault,
-    SourcePlace,
-)
+from planner.nc.language.tree import ZERO, Line, PlainRows, Procedure, ProgramFault, SourcePlace
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _COMPENSATES = re.compile(rb"G4[12]\b")
@@ -193,8 +186,5 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
     "PROC": SiemensParser._procedure,
     "CALL": SiemensParser._call_text,
     "RET": SiemensParser._return,
-    **dict.fromkeys(
-        codes.REFUSED,
-        SiemensParser._refused,
-    ),
+    **dict.fromkeys(codes.REFUSED, SiemensParser._refused),
 }

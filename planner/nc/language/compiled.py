@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from planner.base.sizes import SIZES
+from planner.nc.language.arithmetic import FUNCTIONS
 from planner.nc.language.basic_blocks import BasicBlocks
 from planner.nc.language.endless import never_ends
 from planner.nc.language.expressions import Expressions
@@ -95,7 +96,7 @@ def compile_procedures(
         for line, place in _Function(procedure, language, rows).source(f"p{k}"):
             text.append(line)
             found.places.append(place)
-    namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, **language.functions}
+    namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, **FUNCTIONS}
     exec(compile("\n".join(text), marker, "exec"), namespace)
     for k, procedure in enumerate(procedures):
         found.functions[procedure.name] = namespace[f"p{k}"]  # type: ignore[assignment]

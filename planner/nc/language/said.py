@@ -3,7 +3,7 @@ names under which statements carry them (`assumed_row`)."""
 
 from __future__ import annotations
 
-from planner.nc.language.tree import ZERO, MadeRows, SourcePlace
+from planner.nc.language.tree import ZERO, MadeRows, SourcePlace, made
 
 ASSUMED = {
     "acceleration": "BRISK and DRIVE are not followed: acceleration and jerk are those of the machine file",
@@ -20,4 +20,4 @@ ASSUMED = {
 def assumed_row(place: SourcePlace, name: str) -> MadeRows:
     """The statement that says a sentence of ASSUMED, and is refused by strict reading."""
     assert name in ASSUMED
-    return MadeRows(place, "assume", ((name, ZERO),))
+    return made(place, "assume", **{name: ZERO})

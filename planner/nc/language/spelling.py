@@ -15,20 +15,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planner.nc.integers import LENGTHS
-from planner.nc.language.tree import Exists, Expression, Named, Number, Numbered, Operation, Parameter, Word
-
-NESTED_MAX = (
-    40  # brackets in brackets; the line of 255 characters of RS274NGC holds no more that means anything
+from planner.nc.language.expression_reader import ExpressionReader
+from planner.nc.language.tree import (
+    Assignments,
+    Exists,
+    Expression,
+    Named,
+    Number,
+    Numbered,
+    Parameter,
+    Word,
+    op,
 )
-OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets than 200
 
 _NUMBER = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?")
 _NAME = re.compile(r"<([^<>#()\n]+)>")
 _LETTERS = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 _BLANK = re.compile(r"[ \t\r\x1a]")
-NEGATIVE = "-"
 LINE = Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
+
+
+_IN_LINES = "; write the expression in several lines"
 
 
 class Unspelled(Exception):
@@ -51,15 +59,15 @@ class Spelling:
     long_values: bool = False
 
 
-class LineReader:
+class LineReader(ExpressionReader):
     """Reads one line from left to right. `text` starts at byte `start` of the source; `at` counts its characters without blanks and
     comments.
     """
 
     def __init__(self, text: str, start: int, spelling: Spelling, line: int):
         self.start, self.spelling, self.line = start, spelling, line
+        self.ranks = spelling.ranks
         self.at = 0
-        self.nested = 0
         self.comments: list[str] = []
         self.places: list[int] | None = None  # of the characters that are left, in `text`
         self.text = (
@@ -99,9 +107,9 @@ class LineReader:
             return at
         return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
-    def refused(self, at: int, message: str) -> Unspelled:
-        """What to raise about the character at `at`."""
-        return Unspelled(self.column(at), message)
+    def refused(self, message: str, at: int | None = None) -> Unspelled:
+        """What to raise about the character at `at`, or the next one."""
+        return Unspelled(self.column(self.at if at is None else at), message)
 
     @property
     def ended(self) -> bool:
@@ -123,7 +131,7 @@ class LineReader:
         """Go past the character. Raises Unspelled if another one comes."""
         if not self.take(character):
             found = f"{self.peek()!r}" if not self.ended else "the end of the line"
-            raise self.refused(self.at, f"{character} is missing after {after}; {found} comes instead")
+            raise self.refused(f"{character} is missing after {after}; {found} comes instead")
 
     def keyword(self) -> str:
         """The letters that come next, in lower case; empty if none."""
@@ -137,10 +145,10 @@ class LineReader:
         """A name between < and >."""
         found = _NAME.match(self.text, self.at)
         if found is None:
-            raise self.refused(self.at, "a name is < characters >, such as <depth>")
+            raise self.refused("a name is < characters >, such as <depth>")
         name = found.group(1).lower()
         if name.startswith(("_hal[", "_ini[")):
-            raise self.refused(self.at, "a signal or setting that only the control knows; write its value")
+            raise self.refused("a signal or setting that only the control knows; write its value")
         self.at = found.end()
         return name
 
@@ -159,12 +167,10 @@ class LineReader:
         c = self.peek()
         if c == "-" or c == "+":
             self.at += 1
-            self._deeper()
+            self.deeper(_IN_LINES)
             operand = self.value()
             self.nested -= 1
-            if c == "+":
-                return operand
-            return Number(-operand.value) if isinstance(operand, Number) else Operation(NEGATIVE, (operand,))
+            return operand if c == "+" else -operand
         if c == "#":
             parameter = self.parameter()
             return Number(float(self.line)) if parameter == LINE else parameter
@@ -176,26 +182,16 @@ class LineReader:
         if c.isalpha():
             return self._function()
         found = f"{c!r}" if c else "the end of the line"
-        raise self.refused(
-            self.at, f"a number, parameter, function or [expression] was expected; {found} comes"
-        )
+        raise self.refused(f"a number, parameter, function or [expression] was expected; {found} comes")
 
     def bracket(self) -> Expression:
         """[expression]"""
         self.expect("[", "this")
-        self._deeper()
+        self.deeper(_IN_LINES)
         found = self.expression()
         self.nested -= 1
         self.expect("]", "the expression")
         return found
-
-    def _deeper(self) -> None:
-        self.nested += 1
-        if self.nested > NESTED_MAX:
-            raise self.refused(
-                self.at,
-                f"more than {NESTED_MAX} brackets in each other; write the expression in several lines",
-            )
 
     def parameter(self) -> Parameter:
         """#number, #[expression], ##number or #<name>."""
@@ -204,52 +200,39 @@ class LineReader:
         if self.peek() == "<":
             name = self.name()
             return Named(name, name.startswith("_"))
-        self._deeper()
+        self.deeper(_IN_LINES)
         index = self.value()
         self.nested -= 1
         if isinstance(index, Number) and index.value != int(index.value):
-            raise self.refused(at, "the number of a parameter is a whole number")
+            raise self.refused("the number of a parameter is a whole number", at)
         return Numbered(index)
 
     def _function(self) -> Expression:
         at = self.at
         name = self.keyword().upper()
-        if name == "EXISTS" and name in self.spelling.functions:
+        if name not in self.spelling.functions:
+            known = ", ".join(sorted(self.spelling.functions))
+            raise self.refused(f"{name} is no function; there are {known}", at)
+        if name == "EXISTS":
             self.expect("[", name)
             parameter = self.parameter()
             self.expect("]", "the parameter")
             return Exists(parameter)
-        if name not in self.spelling.functions:
-            known = ", ".join(sorted(self.spelling.functions))
-            raise self.refused(at, f"{name} is no function; there are {known}")
         operand = self.bracket()
-        if name == "ATAN" and self.take("/"):
-            return Operation(name, (operand, self.bracket()))
-        return Operation(name, (operand,))
+        return op(name, operand, self.bracket()) if name == "ATAN" and self.take("/") else op(name, operand)
 
-    def expression(self, rank: int = 0) -> Expression:
-        """Values with operators of at least that rank between them."""
-        left, count = self.value(), 0
-        while self.text[self.at : self.at + 1] != "]":
-            found = _OPERATOR.match(self.text, self.at)
-            operator = found.group().upper() if found else ""
-            its = self.spelling.ranks.get(operator, -1)
-            if found is None or its < rank:
-                break
-            self.at = found.end()
-            left = Operation(operator, (left, self.expression(its + 1)))
-            count += 1
-            if count > OPERATIONS_MAX:
-                raise self.refused(
-                    self.at, f"more than {OPERATIONS_MAX} operations in a row; write them in several lines"
-                )
-        return left
+    def operator(self) -> str:
+        """The operator that comes next; empty for none."""
+        found = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
+        return found.group().upper() if found else ""
+
+    def skip(self, operator: str) -> None:
+        """Go past the operator."""
+        self.at += len(operator)
 
     # --- words --------------------------------------------------------------------------------------------------------------
 
-    def words_and_assignments(
-        self, scale: float = 1.0
-    ) -> tuple[tuple[Word, ...], tuple[tuple[Parameter, Expression], ...]]:
+    def words_and_assignments(self, scale: float = 1.0) -> tuple[tuple[Word, ...], Assignments]:
         """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
         words: list[Word] = []
         assignments: list[tuple[Parameter, Expression]] = []
@@ -271,5 +254,5 @@ class LineReader:
                     value = Number(value.value * scale)
                 words.append(Word(letter, self.start + self.column(at), value))
             else:
-                raise self.refused(at, f"{c!r} starts neither a word nor an assignment")
+                raise self.refused(f"{c!r} starts neither a word nor an assignment", at)
         return tuple(words), tuple(assignments)

@@ -6,8 +6,8 @@ split them and are named by their numbers (`PlainRows`): a program of 100,000 li
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 
@@ -22,36 +22,61 @@ class SourcePlace(NamedTuple):
 # --- expressions ------------------------------------------------------------------------------------------------------------
 
 
-class Number(NamedTuple):
+class Value:
+    """What has a value when the program runs; + - * / of two of them are operations, computed here where both are numbers."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Expression) -> Expression:
+        if isinstance(self, Number) and isinstance(other, Number):
+            return Number(self.value + other.value)
+        return op("+", self, other)
+
+    def __sub__(self, other: Expression) -> Expression:
+        return op("-", self, other)
+
+    def __mul__(self, other: Expression) -> Expression:
+        return op("*", self, other)
+
+    def __truediv__(self, other: Expression) -> Expression:
+        return op("/", self, other)
+
+    def __neg__(self) -> Expression:
+        return Number(-self.value) if isinstance(self, Number) else op(NEGATIVE, self)
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Value):
     """A number as it is written."""
 
     value: float
 
 
-ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
-
-
-class Numbered(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Numbered(Value):
     """A parameter by its number, which may be computed."""
 
-    index: Expression  # type: ignore[assignment]  # hides tuple.index, which nobody asks for
+    index: Expression
 
 
-class Named(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Named(Value):
     """A parameter by its name; `shared` ones are the same in all calls."""
 
     name: str
     shared: bool
 
 
-class Operation(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Operation(Value):
     """An operator or function of the language, by its name there, on its operands."""
 
     name: str
     operands: tuple[Expression, ...]
 
 
-class Exists(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Exists(Value):
     """1 if the parameter has a value, else 0."""
 
     parameter: Numbered | Named
@@ -59,6 +84,14 @@ class Exists(NamedTuple):
 
 Expression = Number | Numbered | Named | Operation | Exists
 Parameter = Numbered | Named
+Assignments = tuple[tuple[Parameter, Expression], ...]
+ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
+NEGATIVE = "-"
+
+
+def op(name: str, *operands: Value) -> Operation:
+    """An operation of the language."""
+    return Operation(name, operands)  # type: ignore[arg-type]
 
 
 # --- statements -------------------------------------------------------------------------------------------------------------
@@ -86,7 +119,22 @@ class Line(NamedTuple):
 
     place: SourcePlace
     words: tuple[Word, ...]
-    assignments: tuple[tuple[Parameter, Expression], ...] = ()
+    assignments: Assignments = ()
+
+
+def word(letter: str, at: int, value: Expression | float) -> Word:
+    """A word of a row."""
+    return Word(ord(letter), at, value if isinstance(value, Value) else Number(value))
+
+
+def row(place: SourcePlace, *words: tuple[str, Expression | float], assigned: Assignments = ()) -> Line:
+    """A row of letters and values, all of them at one place."""
+    return Line(place, tuple(word(letter, place.at, value) for letter, value in words), assigned)
+
+
+def assign(place: SourcePlace, *assigned: tuple[Parameter, Expression]) -> Line:
+    """Values of parameters."""
+    return Line(place, (), assigned)
 
 
 class If(NamedTuple):
@@ -188,6 +236,12 @@ class MadeRows(NamedTuple):
     given: tuple[tuple[str, Expression], ...] = ()
 
 
+def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRows:
+    """Rows of a maker of values by name."""
+    values = ((name, v if isinstance(v, Value) else Number(float(v))) for name, v in given.items())
+    return MadeRows(place, maker, tuple(values))
+
+
 Statement = (
     PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | MadeRows
 )  # fmt: skip
@@ -210,28 +264,25 @@ class Procedure:
 class Language:
     """What the operators and parameters of a language mean.
 
-    name       : for messages
     operations : Python text by operator or function and number of operands, with {0} and {1} for the operands
     conditions : those among them that are true or false rather than a number
-    functions  : what the Python texts call, by name
     locals     : parameters 1 to `locals` are a call's own
     largest    : largest number of a parameter
     vacant     : the value of a parameter that was never assigned; None where "no value" differs from 0
     asked      : numbers of the parameters that hold the state of the control
     read       : the Python text of a parameter's value in an expression, with {0} for what was stored
+    raw        : operators that tell a parameter without a value from 0
     """
 
-    name: str
     operations: Mapping[tuple[str, int], str]
     conditions: frozenset[str]
-    functions: Mapping[str, Callable[..., object]]
     locals: int
     largest: int
     vacant: float | None
     asked: frozenset[int]
     asked_names: frozenset[str] = frozenset()
     read: str = "{0}"
-    raw: frozenset[str] = field(default_factory=frozenset)
+    raw: frozenset[str] = frozenset()
 
 
 class Parser(Protocol):

@@ -25,7 +25,7 @@ class FanucControl:
         condition = reader.bracket()
         at = reader.at
         if reader.keyword() != "do":
-            raise reader.refused(at, "WHILE [condition] is followed by DO and a number")
+            raise reader.refused("WHILE [condition] is followed by DO and a number", at)
         self._do(reader, line, condition)
 
     def _do(self, reader: LineReader, line: SourceLine, condition: Expression = _ALWAYS) -> None:
@@ -51,5 +51,5 @@ def _loop_number(reader: LineReader) -> int:
     at = reader.at
     value = reader.number()
     if value is None or value != int(value):
-        raise reader.refused(at, "DO and END are followed by a whole number")
+        raise reader.refused("DO and END are followed by a whole number", at)
     return int(value)

@@ -208,7 +208,7 @@ class FanucParser(FanucControl):
             self.body.append(Message(line.place, (reader.text,)))
             return
         if not reader.ended:
-            raise reader.refused(reader.at, f"nothing may follow {keyword} on its line")
+            raise reader.refused(f"nothing may follow {keyword} on its line")
 
     def _if(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
@@ -223,7 +223,7 @@ class FanucParser(FanucControl):
             self._words(*reader.words_and_assignments(line.scale), line)
             body, self.body = self.body, outside
         else:
-            raise reader.refused(at, "IF [condition] is followed by GOTO or THEN")
+            raise reader.refused("IF [condition] is followed by GOTO or THEN", at)
         self.body.append(If(line.place, ((condition, body),), []))
 
     # --- words and calls ------------------------------------------------------------------------------------------------------

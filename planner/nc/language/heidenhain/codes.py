@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from planner.nc.codes import M_GROUP
 from planner.nc.language.heidenhain.definitions import Definitions
-from planner.nc.language.heidenhain.items import Items, items, looked_up, word
+from planner.nc.language.heidenhain.items import Items, items, looked_up
 from planner.nc.language.heidenhain.text import ConversationalBlock
 from planner.nc.language.said import assumed_row
 from planner.nc.language.source import Source
-from planner.nc.language.tree import ZERO, Line, Number, Return, Statement
+from planner.nc.language.tree import ZERO, Line, Return, Statement, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
 
 REMEDY = "let the CAM system write the moves out as L, C and CC"
@@ -76,7 +76,8 @@ class Codes(Definitions):
         after: list[Statement] = []
         machine = False
         for code, column in given.codes:
-            row = Line(block.place, (word("M", block.byte(column), Number(float(code))),))
+            at = block.byte(column)
+            own = Line(block.place, (word("M", at, float(code)),))
             if code == 99:
                 after += self._call_cycle(block)
             elif code == 91 and not straight:
@@ -84,15 +85,10 @@ class Codes(Definitions):
             elif code == 91:
                 machine = True
             elif code in (13, 14):
-                spindle = Number(3.0 if code == 13 else 4.0)
-                before.append(
-                    Line(
-                        block.place,
-                        (word("M", block.byte(column), spindle), word("M", block.byte(column), Number(8.0))),
-                    )
-                )
+                spindle = word("M", at, 3.0 if code == 13 else 4.0)
+                before.append(Line(block.place, (spindle, word("M", at, 8.0))))
             elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
-                before += [row, looked_up(block)]
+                before += [own, looked_up(block)]
             elif code in REFUSED:
                 raise block.fault(f"M{code} is not read: {REFUSED[code]}; {REMEDY}", column)
             elif code in NOTHING:
@@ -100,10 +96,10 @@ class Codes(Definitions):
             elif code in AT_END and self.file:
                 after.append(Return(block.place))
             elif code in (0, 1, 5, 9, *AT_END):
-                after.append(row)
+                after.append(own)
             else:
                 # planned and flat programs do not have it: whoever read them would take it for another
-                before.append(assumed_row(block.place, "machine code") if is_of_the_builder(code) else row)
+                before.append(assumed_row(block.place, "machine code") if is_of_the_builder(code) else own)
         return before, after, machine
 
     def _codes_alone(
@@ -123,4 +119,4 @@ class Codes(Definitions):
 
     def _stop(self, block: ConversationalBlock, column: int) -> list[Statement]:
         before, after = self._codes_alone(block, column)
-        return [*before, Line(block.place, (word("M", block.place.at, ZERO),)), *after]
+        return [*before, row(block.place, ("M", ZERO)), *after]

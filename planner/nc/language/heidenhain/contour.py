@@ -14,7 +14,7 @@ from dataclasses import replace
 from planner.nc.language.approach import KINDS
 from planner.nc.language.heidenhain.items import POSITION, Items, absolute, items, looked_up
 from planner.nc.language.heidenhain.text import ConversationalBlock, value
-from planner.nc.language.tree import ZERO, Expression, Line, MadeRows, Number, Statement
+from planner.nc.language.tree import ZERO, Expression, MadeRows, Number, Statement, assign, made
 
 _KIND = re.compile(r"\s*(P?)(LT|LN|CT|LCT)\b", re.IGNORECASE)
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
@@ -33,7 +33,7 @@ def side_rows(block: ConversationalBlock, given: Items) -> list[Statement]:
     """What RL, RR or R0 of a block does before its move."""
     if given.side is None:
         return []
-    return [MadeRows(block.place, "compensate", (("side", Number(float(given.side))),))]
+    return [made(block.place, "compensate", side=given.side)]
 
 
 def approach_rows(
@@ -74,7 +74,7 @@ def approach_rows(
         return [MadeRows(block.place, "depart", tuple(given)), looked_up(block)], found
     given.append(("side", Number(float(found.side or 0))))
     rows: list[Statement] = [MadeRows(block.place, "approach", tuple(given))]
-    rows.append(Line(block.place, (), tuple((POSITION[axis], end) for axis, end in ends.items())))
+    rows.append(assign(block.place, *((POSITION[axis], end) for axis, end in ends.items())))
     return rows, found
 
 

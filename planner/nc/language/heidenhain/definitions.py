@@ -7,21 +7,23 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.heidenhain import contour, cycles, drilling, patterns
 from planner.nc.language.heidenhain.flow import NAMED, Flow
-from planner.nc.language.heidenhain.items import looked_up, word
+from planner.nc.language.heidenhain.items import looked_up
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import ConversationalBlock, of, own, parameter, value
+from planner.nc.language.heidenhain.text import ConversationalBlock, own, parameter, value
 from planner.nc.language.tree import (
     ONE,
     ZERO,
     Expression,
     If,
-    Line,
-    MadeRows,
     Message,
     Number,
     Parameter,
     Return,
     Statement,
+    assign,
+    made,
+    op,
+    row,
 )
 
 _PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
@@ -68,15 +70,14 @@ class Definitions(Flow):
     def _begin(self, block: ConversationalBlock, column: int) -> list[Statement]:
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
-        at = block.place.at
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        rows: list[Statement] = [Line(block.place, tuple(word("G", at, Number(code)) for code in codes))]
+        rows: list[Statement] = [row(block.place, *(("G", code) for code in codes))]
         return [*rows, looked_up(block)] if self.file else rows
 
     def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
         if self.file:
             return [Return(block.place)]
-        return [Line(block.place, (word("M", block.place.at, Number(30.0)),))]
+        return [row(block.place, ("M", 30.0))]
 
     def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = _TOOL_CALL.match(block.text, column)
@@ -86,7 +87,6 @@ class Definitions(Flow):
         axis, feed = found.group(3), found.group(5)
         if axis and axis.upper() != "Z":
             raise block.fault(f"tool axis {axis.upper()}; Z is planned", found.start(3))
-        at = block.place.at
         more_of = _named(block, _OVERSIZE, *found.span(6))
         if more_of.pop("DR2", ZERO) != ZERO:
             raise block.fault("DR2, of a tool's corner radius, is not read; write 0", found.start(6))
@@ -95,19 +95,19 @@ class Definitions(Flow):
         rows: list[Statement] = []
         if tool is not None:
             number = Number(float(tool))
-            rows.append(Line(block.place, (word("T", at, number), word("M", at, Number(6.0)))))
-            rows.append(Line(block.place, (word("G", at, Number(43.0)), word("H", at, number))))
+            rows.append(row(block.place, ("T", number), ("M", 6.0)))
+            rows.append(row(block.place, ("G", 43.0), ("H", number)))
             if more_of.get("DL", ZERO) != ZERO:
-                rows.append(Line(block.place, (word("G", at, Number(43.2)), word("Z", at, more_of["DL"]))))
+                rows.append(row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
             if self.oversizes:
-                rows.append(MadeRows(block.place, "oversize", (("DR", more_of.get("DR", ZERO)),)))
+                rows.append(made(block.place, "oversize", DR=more_of.get("DR", ZERO)))
         if found.group(4):
             speed, _ = value(block, found.start(4))
-            rows.append(Line(block.place, (word("S", at, speed),)))
+            rows.append(row(block.place, ("S", speed)))
         self.moves.automatic = None
         if feed and feed.upper() != "MAX":
             self.moves.automatic, _ = value(block, found.start(5))
-            rows.append(Line(block.place, (word("F", at, self.moves.scaled(self.moves.automatic)),)))
+            rows.append(row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
         if tool is not None:
             rows.append(looked_up(block))
         return rows
@@ -129,10 +129,8 @@ class Definitions(Flow):
         tool = self._tool_number(found.group(1), found.group(2))
         if tool is None:
             raise block.fault("TOOL DEF with L or R needs the number of the tool", column)
-        at = block.place.at
-        words = [word("G", at, Number(10.0)), word("L", at, ONE), word("P", at, Number(float(tool)))]
-        words += [word({"L": "Z", "R": "R"}[name], at, given) for name, given in data.items()]
-        return [Line(block.place, tuple(words))]
+        words = (({"L": "Z", "R": "R"}[name], given) for name, given in data.items())
+        return [row(block.place, ("G", 10.0), ("L", ONE), ("P", float(tool)), *words)]
 
     def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
@@ -151,11 +149,10 @@ class Definitions(Flow):
             given.append((self._q(block, int(entry.group(1))), number))
         if cycle in patterns.PATTERNS:
             called = [*self._call_cycle(block), looked_up(block)]
-            return [Line(block.place, (), tuple(given)), *patterns.pattern(block, cycle, called)]
-        return [Line(block.place, (), (*given, (own("cycle"), Number(float(cycle)))))]
+            return [assign(block.place, *given), *patterns.pattern(block, cycle, called)]
+        return [assign(block.place, *given, (own("cycle"), Number(float(cycle))))]
 
     def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
-        at = block.place.at
         if cycle in (9, 32, *contour.TITLES) and part == 0:
             return []
         if cycle in contour.TITLES:
@@ -165,50 +162,47 @@ class Definitions(Flow):
             if found is None and part != 1:
                 return []  # 32.2: filter and rotary axes
             if found is None:  # the machine's tolerance again
-                return [Line(block.place, (word("G", at, Number(64.0)),))]
+                return [row(block.place, ("G", 64.0))]
             tolerance, _ = value(block, column + found.end())
-            return [Line(block.place, (word("G", at, Number(64.0)), word("P", at, tolerance)))]
+            return [row(block.place, ("G", 64.0), ("P", tolerance))]
         if cycle == 9:
             found = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
             seconds, _ = value(block, column + (found.end() if found else 0))
-            return [Line(block.place, (word("G", at, Number(4.0)), word("P", at, seconds)))]
+            return [row(block.place, ("G", 4.0), ("P", seconds))]
         if cycle == 1:
             return self._pecking(block, part, column)
         raise block.fault(_not_read(cycle), column)
 
     def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[Statement]:
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
-        cycle: list[tuple[Parameter, Expression]] = [(own("cycle"), Number(1.0))]
         if part == 0:
-            return [Line(block.place, (), tuple(cycle))]
+            return [assign(block.place, (own("cycle"), ONE))]
         found = _PECKING.match(block.text, column)
         if found is None or not 1 <= part <= len(drilling.PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
         number, _ = value(block, found.end())
-        return [Line(block.place, (), ((parameter(drilling.PECKING[part - 1]), number),))]
+        return [assign(block.place, (parameter(drilling.PECKING[part - 1]), number))]
 
     def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:
         known = sorted(self.cycles & {*drilling.CYCLES, *cycles.PARAMETERS})
         if not known:
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
         branches = tuple(
-            (of("EQ", own("cycle"), Number(float(cycle))), self._one_cycle(block, cycle)) for cycle in known
+            (op("EQ", own("cycle"), Number(float(cycle))), self._one_cycle(block, cycle)) for cycle in known
         )
-        nothing: list[Statement] = [
-            Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
-        ]
-        return [If(block.place, branches, nothing)]
+        nothing = Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
+        return [If(block.place, branches, [nothing])]
 
     def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[Statement]:
         """A cycle at the present place, and the feed as it was before."""
-        keep, back = MadeRows(block.place, "keep"), MadeRows(block.place, "bring back", (("feed", ONE),))
+        keep, back = made(block.place, "keep"), made(block.place, "bring back", feed=ONE)
         if cycle in drilling.CYCLES:
             return [keep, *drilling.drilled(block, cycle, self.moves, self.unit), back]
-        given: list[tuple[str, Expression]] = [
-            (f"Q{q}", self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q))
+        given = {
+            f"Q{q}": self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q)
             for q in cycles.PARAMETERS[cycle]
-        ]
-        return [keep, MadeRows(block.place, f"cycle {cycle}", tuple(given)), back, looked_up(block)]
+        }
+        return [keep, made(block.place, f"cycle {cycle}", **given), back, looked_up(block)]
 
 
 READ = (*drilling.CYCLES, *cycles.PARAMETERS, *patterns.PATTERNS)

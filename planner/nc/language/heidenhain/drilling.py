@@ -11,10 +11,11 @@ clearance above the depth already drilled, but not deeper than 0.2 mm above it.
 
 from __future__ import annotations
 
-from planner.nc.language.heidenhain.items import Z, word
+from planner.nc.language.heidenhain.items import Z
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, parameter, plus
-from planner.nc.language.tree import ONE, ZERO, Expression, If, Line, Loop, Number, Statement
+from planner.nc.language.heidenhain.text import ConversationalBlock, own
+from planner.nc.language.heidenhain.text import parameter as q
+from planner.nc.language.tree import ONE, ZERO, Expression, If, Line, Loop, Number, Statement, assign, op, row
 
 CYCLES = (1, 200, 201, 240)  # that are read
 # Q parameters (module text).
@@ -30,58 +31,35 @@ def drilled(block: ConversationalBlock, cycle: int, moves: Moves, unit: float) -
 
     unit : mm per unit of the program
     """
-    at, place = block.place.at, block.place
-    surface, clear = parameter(_SURFACE), plus(parameter(_SURFACE), parameter(_CLEARANCE))
-    depth, done = of("ABS", parameter(_DEPTH)), own("done")
-    feed = moves.scaled(parameter(_FEED))
+    place, surface, clear = block.place, q(_SURFACE), q(_SURFACE) + q(_CLEARANCE)
+    depth, done, infeed = op("ABS", q(_DEPTH)), own("done"), own("infeed")
+    feed = moves.scaled(q(_FEED))
 
     def go(z: Expression, how: Expression | None = None) -> Line:
-        words = [word("G", at, ZERO if how is None else ONE)]
-        words += [word("F", at, how)] if how is not None else []
-        return Line(place, (*words, word("Z", at, z)), ((Z, z),))
+        fed = [("G", ZERO)] if how is None else [("G", ONE), ("F", how)]
+        return row(place, *fed, ("Z", z), assigned=((Z, z),))
 
     def dwell(seconds: int) -> Statement:
-        row = Line(place, (word("G", at, Number(4.0)), word("P", at, parameter(seconds))))
-        return If(place, ((of("GT", parameter(seconds), ZERO), [row]),), [])
+        return If(place, ((op("GT", q(seconds), ZERO), [row(place, ("G", 4.0), ("P", q(seconds)))]),), [])
 
     found: list[Statement] = [go(clear)]
     if cycle == 1:
-        found = [Line(place, (), ((surface, minus(Z, parameter(_CLEARANCE))), (parameter(_SECOND), ZERO)))]
-    bottom = minus(surface, depth)
+        found = [assign(place, (surface, Z - q(_CLEARANCE)), (q(_SECOND), ZERO))]
     if cycle in (201, 240):
-        out = If(
-            place,
-            ((of("GT", parameter(_FEED_OUT), ZERO), [go(clear, moves.scaled(parameter(_FEED_OUT)))]),),
-            [go(clear)],
-        )
-        found += [go(bottom, feed), dwell(_DWELL_BELOW), out if cycle == 201 else go(clear)]
+        slowly = go(clear, moves.scaled(q(_FEED_OUT)))
+        out = If(place, ((op("GT", q(_FEED_OUT), ZERO), [slowly]),), [go(clear)])
+        found += [go(surface - depth, feed), dwell(_DWELL_BELOW), out if cycle == 201 else go(clear)]
     else:
-        infeed = own("infeed")
-        step = of("MIN", plus(done, infeed), depth)
-        last = of("GE", done, depth)
-        found += [
-            Line(place, (), ((done, ZERO), (infeed, parameter(_INFEED)))),
-            If(place, ((of("LE", infeed, ZERO), [Line(place, (), ((infeed, depth),))]),), []),
-            Loop(
-                place,
-                "do",
-                f"holes {at}",
-                of("LT", done, depth),
-                [
-                    Line(place, (), ((done, step),)),
-                    go(minus(surface, done), feed),
-                    If(
-                        place,
-                        ((last, [dwell(_DWELL_BELOW), go(clear)]),),
-                        [
-                            go(clear),
-                            dwell(_DWELL_ABOVE),
-                            go(minus(plus(surface, Number(_BEFORE / unit)), done)),
-                        ],
-                    ),
-                ],
-            ),
+        between = [go(clear), dwell(_DWELL_ABOVE), go(surface + Number(_BEFORE / unit) - done)]
+        turn: list[Statement] = [
+            assign(place, (done, op("MIN", done + infeed, depth))),
+            go(surface - done, feed),
+            If(place, ((op("GE", done, depth), [dwell(_DWELL_BELOW), go(clear)]),), between),
         ]
-    second = plus(surface, parameter(_SECOND))
-    found.append(If(place, ((of("GT", parameter(_SECOND), parameter(_CLEARANCE)), [go(second)]),), []))
-    return found
+        found += [
+            assign(place, (done, ZERO), (infeed, q(_INFEED))),
+            If(place, ((op("LE", infeed, ZERO), [assign(place, (infeed, depth))]),), []),
+            Loop(place, "do", f"holes {place.at}", op("LT", done, depth), turn),
+        ]
+    high = op("GT", q(_SECOND), q(_CLEARANCE))
+    return [*found, If(place, ((high, [go(surface + q(_SECOND))]),), [])]

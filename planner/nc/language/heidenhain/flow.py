@@ -9,10 +9,8 @@ from planner.nc.language.heidenhain.text import (
     PARAMETERS,
     ConversationalBlock,
     Formula,
-    of,
     own,
     parameter,
-    plus,
     value,
 )
 from planner.nc.language.tree import (
@@ -23,10 +21,11 @@ from planner.nc.language.tree import (
     Goto,
     If,
     Label,
-    Line,
     Number,
     Parameter,
     Statement,
+    assign,
+    op,
 )
 
 _LABEL = re.compile(r'\s*(?:(\d+)|"([^"]*)")')
@@ -87,21 +86,18 @@ class Flow:
         counter = own(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
         again: list[Statement] = [
-            Line(block.place, (), ((counter, plus(counter, ONE)),)),
+            assign(block.place, (counter, counter + ONE)),
             Goto(block.place, Number(float(label))),
         ]
-        end: list[Statement] = [Line(block.place, (), ((counter, ZERO),))]
-        return [If(block.place, ((of("LT", counter, Number(float(repeat.group(1)))), again),), end)]
+        more = op("LT", counter, Number(float(repeat.group(1))))
+        return [If(block.place, ((more, again),), [assign(block.place, (counter, ZERO))])]
 
     def _parameter(self, block: ConversationalBlock, column: int) -> list[Statement]:
         found = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
         if found is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
-        return [
-            Line(
-                block.place, (), ((self._q(block, int(found.group(1))), Formula(block, found.end()).read()),)
-            )
-        ]
+        formula = Formula(block, found.end())
+        return [assign(block.place, (self._q(block, int(found.group(1))), formula.read()))]
 
     def _q(self, block: ConversationalBlock, number: int) -> Parameter:
         if number >= PARAMETERS:
@@ -121,17 +117,17 @@ class Flow:
         if number in _FN_ONE:
             word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)
             given, column = value(block, column + (word_of.end() if word_of else 0))
-            operation: Expression = of(_FN_ONE[number], given) if _FN_ONE[number] else given
+            operation: Expression = op(_FN_ONE[number], given) if _FN_ONE[number] else given
         else:
             left, column = value(block, column)
             sign = re.match(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
             if sign is None:
                 raise block.fault("+, -, *, DIV, LEN or ANG and a second value are expected", column)
             right, column = value(block, column + sign.end())
-            operation = of(_FN_TWO[number], left, right)
+            operation = op(_FN_TWO[number], left, right)
         if block.text[column:].strip():
             raise block.fault("nothing may follow here", column)
-        return [Line(block.place, (), ((q, operation),))]
+        return [assign(block.place, (q, operation))]
 
     def _jump(self, block: ConversationalBlock, column: int, number: int) -> list[Statement]:
         start = _IF.match(block.text, column)
@@ -145,7 +141,7 @@ class Flow:
             raise block.fault("GOTO LBL is expected here", column)
         label, _ = self._label(block, then.end())
         then_go: list[Statement] = [Goto(block.place, Number(float(label)))]
-        return [If(block.place, ((of(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
+        return [If(block.place, ((op(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
 
 
 def procedure_name(label: int, file: int = 0) -> str:

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass, field
 
 from planner.nc.language.asked import FIRST_POSITION
-from planner.nc.language.heidenhain.text import ConversationalBlock, own, plus, value
-from planner.nc.language.tree import Expression, Line, Number, Numbered, Word
+from planner.nc.language.heidenhain.text import ConversationalBlock, own, value
+from planner.nc.language.tree import Expression, Line, Number, Numbered, assign
 
 _ITEM = re.compile(
     r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
@@ -93,18 +93,13 @@ def items(block: ConversationalBlock, column: int, turning: bool = False) -> Ite
 
 def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
     """The absolute coordinate."""
-    return plus(POSITION[axis], given[0]) if given[1] else given[0]
-
-
-def word(letter: str, at: int, given: Expression) -> Word:
-    """A word of a row."""
-    return Word(ord(letter), at, given)
+    return POSITION[axis] + given[0] if given[1] else given[0]
 
 
 def looked_up(block: ConversationalBlock) -> Line:
     """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
     where = [Numbered(Number(float(FIRST_POSITION + k))) for k in range(3)]
-    return Line(block.place, (), tuple(zip((X, Y, Z), where, strict=True)))
+    return assign(block.place, *zip((X, Y, Z), where, strict=True))
 
 
 def refuse_arc_axes(block: ConversationalBlock, given: Items) -> None:

@@ -30,24 +30,26 @@ from planner.nc.language.heidenhain.items import (
     X,
     Y,
     absolute,
-    word,
 )
-from planner.nc.language.heidenhain.text import ConversationalBlock, minus, of, own, plus, quotient, times
-from planner.nc.language.spelling import NEGATIVE
+from planner.nc.language.heidenhain.text import ConversationalBlock, own
 from planner.nc.language.tree import (
     ONE,
     TWO,
     ZERO,
     Expression,
     If,
-    Line,
     MadeRows,
     Number,
     Parameter,
     Statement,
-    Word,
+    assign,
+    op,
+    row,
 )
 
+Words = list[tuple[str, Expression]]
+Assigned = list[tuple[Parameter, Expression]]
+Ends = dict[str, Expression]  # absolute coordinates by axis
 _AXES = "XYZ"
 _WORKING = 2  # normal of the working plane: the tool axis is Z
 _PLANE_CODES = {0: 19.0, 1: 18.0}
@@ -65,41 +67,32 @@ class Moves:
         self.tilted = False
         self.automatic: Expression | None = None  # F of the tool call
 
-    def feed_words(self, block: ConversationalBlock, given: Items) -> list[Word]:
+    def feed_words(self, block: ConversationalBlock, given: Items) -> Words:
         """The F word of a block, if it has one. Raises ProgramFault for F AUTO without a feed in the tool call."""
         feed = given.feed
         if given.automatic:
             feed = self.automatic
             if feed is None:
                 raise block.fault("F AUTO, and the tool call before has no F")
-        if feed is None:
-            return []
-        return [word("F", block.place.at, self.scaled(feed))]
+        return [] if feed is None else [("F", self.scaled(feed))]
 
     def scaled(self, feed: Expression) -> Expression:
         """A feed in mm or inch per minute."""
-        return feed if self.feed_scale == 1.0 else times(feed, Number(self.feed_scale))
+        return feed if self.feed_scale == 1.0 else feed * Number(self.feed_scale)
 
     def straight(
-        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression], machine: bool = False
+        self, block: ConversationalBlock, given: Items, ends: Ends, machine: bool = False
     ) -> list[Statement]:
         """L and LP: a straight move to absolute coordinates."""
-        at = block.place.at
-        words = [word("G", at, Number(53.0))] if machine else []
-        words.append(word("G", at, ZERO if given.fast else ONE))
-        words += self.feed_words(block, given)
-        words += [word(axis, at, end) for axis, end in ends.items()]
-        assigned: list[tuple[Parameter, Expression]] = [
-            (POSITION[axis], end) for axis, end in ends.items() if axis in POSITION
-        ]
+        feed = self.feed_words(block, given)
+        assigned = _assigned(ends)
         if "X" in ends or "Y" in ends:
-            assigned += [
-                (DIRECTION[0], minus(ends.get("X", X), X)),
-                (DIRECTION[1], minus(ends.get("Y", Y), Y)),
-            ]
+            assigned += [(DIRECTION[0], ends.get("X", X) - X), (DIRECTION[1], ends.get("Y", Y) - Y)]
         if not ends:
-            words = self.feed_words(block, given)
-        return [Line(block.place, tuple(words), tuple(assigned))] if words else []
+            return [row(block.place, *feed)] if feed else []
+        codes: Words = [("G", Number(53.0))] if machine else []
+        codes.append(("G", ZERO if given.fast else ONE))
+        return [row(block.place, *codes, *feed, *ends.items(), assigned=tuple(assigned))]
 
     def by_plane(
         self, block: ConversationalBlock, rows: Callable[[int], list[Statement] | None]
@@ -112,30 +105,25 @@ class Moves:
                 raise block.fault(f"a coordinate that lies {OUT_OF_PLANE}")
             return found
         planes = [rows(normal) or [MadeRows(block.place, "out of plane")] for normal in (0, 1)]
-        branches = tuple((of("EQ", PLANE, Number(float(n))), rows) for n, rows in enumerate(planes))
+        branches = tuple((op("EQ", PLANE, Number(float(n))), rows) for n, rows in enumerate(planes))
         return [If(block.place, branches, found or [MadeRows(block.place, "out of plane")])]
 
-    def circle(
-        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
-    ) -> list[Statement]:
+    def circle(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
         """C: an arc about the pole, in its plane."""
-        if not given.turn:
-            raise block.fault("an arc needs its direction: DR+ or DR-")
-        code = Number(3.0 if given.turn > 0 else 2.0)
-        return self.by_plane(
-            block,
-            lambda normal: (
-                None
-                if _AXES[normal] in ends
-                else self._arc(block, given, ends, code, POLE, given.turn, normal=normal)
-            ),
-        )
+        code = _arc_code(block, given)
+
+        def rows(normal: int) -> list[Statement] | None:
+            if _AXES[normal] in ends:
+                return None
+            return self._arc(block, given, ends, code, POLE, given.turn, normal=normal)
+
+        return self.by_plane(block, rows)
 
     def _arc(
         self,
         block: ConversationalBlock,
         given: Items,
-        ends: dict[str, Expression],
+        ends: Ends,
         code: Expression,
         centre: Sequence[Expression],
         turn: int | Expression,
@@ -145,94 +133,75 @@ class Moves:
         """An arc about centre, which is a place by axis."""
         if given.fast:
             raise block.fault(_FAST_ARC)
-        at = block.place.at
-        words = [word("G", at, code), *self.feed_words(block, given)]
-        words += [word(axis, at, end) for axis, end in ends.items()]
-        first, second = IN_PLANE[normal]
-        words += [word("IJK"[a], at, minus(centre[a], POSITION[_AXES[a]])) for a in (first, second)]
+        words: Words = [("G", code), *self.feed_words(block, given), *ends.items()]
+        words += [("IJK"[a], centre[a] - POSITION[_AXES[a]]) for a in IN_PLANE[normal]]
         if turns is not None:
-            words.append(word("P", at, turns))
-        assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
+            words.append(("P", turns))
+        assigned = _assigned(ends)
         if normal != _WORKING:
-            assigned += [(DIRECTION[0], ZERO), (DIRECTION[1], ZERO)]
-            plane, back = (
-                Line(block.place, (word("G", at, Number(g)),)) for g in (_PLANE_CODES[normal], 17.0)
-            )
-            return [plane, Line(block.place, tuple(words), tuple(assigned)), back]
-        out = minus(ends.get("X", X), centre[0]), minus(ends.get("Y", Y), centre[1])
+            assigned += _NO_DIRECTION
+            plane, back = (row(block.place, ("G", g)) for g in (_PLANE_CODES[normal], 17.0))
+            return [plane, row(block.place, *words, assigned=tuple(assigned)), back]
+        out = ends.get("X", X) - centre[0], ends.get("Y", Y) - centre[1]
         sign = Number(float(turn)) if isinstance(turn, int) else turn
-        assigned += [(DIRECTION[0], of(NEGATIVE, times(sign, out[1]))), (DIRECTION[1], times(sign, out[0]))]
-        return [Line(block.place, tuple(words), tuple(assigned))]
+        assigned += [(DIRECTION[0], -(sign * out[1])), (DIRECTION[1], sign * out[0])]
+        return [row(block.place, *words, assigned=tuple(assigned))]
 
-    def radius_arc(
-        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
-    ) -> list[Statement]:
+    def radius_arc(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
         """CR: an arc of a given radius."""
         if given.radius is None or not given.turn:
             raise block.fault("CR needs R and its direction, DR+ or DR-")
         if given.fast:
             raise block.fault(_FAST_ARC)
-        at = block.place.at
-        words = [word("G", at, Number(3.0 if given.turn > 0 else 2.0)), *self.feed_words(block, given)]
-        words += [word(axis, at, end) for axis, end in ends.items()] + [word("R", at, given.radius)]
-        assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
-        assigned += [(DIRECTION[0], ZERO), (DIRECTION[1], ZERO)]
-        return [Line(block.place, tuple(words), tuple(assigned))]
+        words = [
+            ("G", _arc_code(block, given)),
+            *self.feed_words(block, given),
+            *ends.items(),
+            ("R", given.radius),
+        ]
+        return [row(block.place, *words, assigned=(*_assigned(ends), *_NO_DIRECTION))]
 
-    def tangent_arc(
-        self, block: ConversationalBlock, given: Items, ends: dict[str, Expression]
-    ) -> list[Statement]:
+    def tangent_arc(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
         """CT: the arc that goes on in the direction of the last move."""
-        v = minus(ends.get("X", X), X), minus(ends.get("Y", Y), Y)
-        length = of("LEN", *DIRECTION)
-        normal = quotient(of(NEGATIVE, DIRECTION[1]), length), quotient(DIRECTION[0], length)
-        squared = plus(times(v[0], v[0]), times(v[1], v[1]))
-        radius, centre = own("r"), (own("tx"), own("ty"))
-        first = Line(
-            block.place,
-            (),
-            ((radius, quotient(squared, times(TWO, plus(times(normal[0], v[0]), times(normal[1], v[1]))))),),
-        )
-        second = Line(
-            block.place,
-            (),
-            ((centre[0], plus(X, times(radius, normal[0]))), (centre[1], plus(Y, times(radius, normal[1])))),
-        )
-        left = of("GT", radius, ZERO)
-        turn = own("turn")
-        third = Line(block.place, (), ((turn, minus(times(TWO, left), ONE)),))
+        v = ends.get("X", X) - X, ends.get("Y", Y) - Y
+        length = op("LEN", *DIRECTION)
+        normal = -DIRECTION[1] / length, DIRECTION[0] / length
+        radius, centre, turn = own("r"), (own("tx"), own("ty")), own("turn")
+        left = op("GT", radius, ZERO)
         known: list[Statement] = [
-            first, second, third, *self._arc(block, given, ends, plus(TWO, left), centre, turn)
-        ]  # fmt: skip
-        words = [(chr(one.letter), one.value) for one in self.feed_words(block, given)]
-        assigned: list[tuple[Parameter, Expression]] = [(POSITION[axis], end) for axis, end in ends.items()]
+            assign(
+                block.place,
+                (radius, (v[0] * v[0] + v[1] * v[1]) / (TWO * (normal[0] * v[0] + normal[1] * v[1]))),
+            ),
+            assign(block.place, (centre[0], X + radius * normal[0]), (centre[1], Y + radius * normal[1])),
+            assign(block.place, (turn, TWO * left - ONE)),
+            *self._arc(block, given, ends, TWO + left, centre, turn),
+        ]
         looked: list[Statement] = [
-            MadeRows(block.place, "tangent arc", (*ends.items(), *words)), Line(block.place, (), tuple(assigned))
-        ]  # fmt: skip
-        return [If(block.place, ((of("EQ", length, ZERO), looked),), known)]
+            MadeRows(block.place, "tangent arc", (*ends.items(), *self.feed_words(block, given))),
+            assign(block.place, *_assigned(ends)),
+        ]
+        return [If(block.place, ((op("EQ", length, ZERO), looked),), known)]
 
     def polar(self, block: ConversationalBlock, given: Items) -> list[Statement]:
         """The statement that finds the polar coordinates of LP and CTP."""
-        radius, angle = POLAR
-        change: list[tuple[Parameter, Expression]] = []
-        for name, variable in (("PR", radius), ("PA", angle)):
+        change: Assigned = []
+        for name, variable in zip(("PR", "PA"), POLAR, strict=True):
             if name in given.polar:
                 change.append((variable, given.polar[name]))
             elif "I" + name in given.polar:
-                change.append((variable, plus(variable, given.polar["I" + name])))
-        return [Line(block.place, (), tuple(change))] if change else []
+                change.append((variable, variable + given.polar["I" + name]))
+        return [assign(block.place, *change)] if change else []
 
-    def polar_ends(
-        self, block: ConversationalBlock, given: Items, normal: int = _WORKING
-    ) -> dict[str, Expression] | None:
+    def polar_ends(self, block: ConversationalBlock, given: Items, normal: int = _WORKING) -> Ends | None:
         """The coordinates from the polar ones, and that along the normal; None where the block has a coordinate in the plane."""
         radius, angle = POLAR
         if set(given.axes) & {"X", "Y", "Z"} - {_AXES[normal]}:
             return None
         first, second = IN_PLANE[normal]
-        ends: dict[str, Expression] = {
-            _AXES[first]: plus(POLE[first], times(radius, of("COS", angle))),
-            _AXES[second]: plus(POLE[second], times(radius, of("SIN", angle))),
+        ends: Ends = {
+            _AXES[first]: POLE[first] + radius * op("COS", angle),
+            _AXES[second]: POLE[second] + radius * op("SIN", angle),
         }
         ends |= {axis: absolute(axis, end) for axis, end in given.axes.items() if axis == _AXES[normal]}
         return dict(sorted(ends.items()))
@@ -257,23 +226,18 @@ class Moves:
 
     def polar_arc(self, block: ConversationalBlock, given: Items) -> list[Statement]:
         """CP: an arc or a helix about the pole to a polar angle, or by an angle of any number of turns."""
-        if not given.turn:
-            raise block.fault("an arc needs its direction: DR+ or DR-")
-        by = given.polar.get("IPA")
+        code, by = _arc_code(block, given), given.polar.get("IPA")
         if isinstance(by, Number) and by.value * given.turn < 0.0:
             raise block.fault("IPA and DR of CP have the same sign")
         if by is None and "PA" not in given.polar:
             raise block.fault("CP needs PA or IPA")
         radius, angle = POLAR
-        turns: Expression | None = None
-        if by is not None:
-            turns = of("UP", minus(quotient(of("ABS", by), Number(360.0)), Number(1e-9)))
-        code = Number(3.0 if given.turn > 0 else 2.0)
+        turns = None if by is None else op("FUP", op("ABS", by) / Number(360.0) - Number(1e-9))
 
         def rows(normal: int) -> list[Statement] | None:
-            first, second = (minus(POSITION[_AXES[a]], POLE[a]) for a in IN_PLANE[normal])
-            to = given.polar["PA"] if by is None else plus(of("ATAN", second, first), by)
-            before = Line(block.place, (), ((radius, of("LEN", first, second)), (angle, to)))
+            first, second = (POSITION[_AXES[a]] - POLE[a] for a in IN_PLANE[normal])
+            to = given.polar["PA"] if by is None else op("ATAN", second, first) + by
+            before = assign(block.place, (radius, op("LEN", first, second)), (angle, to))
             ends = self.polar_ends(block, given, normal)
             if ends is None:
                 return None
@@ -282,5 +246,18 @@ class Moves:
         return self.by_plane(block, rows)
 
 
+def _arc_code(block: ConversationalBlock, given: Items) -> Expression:
+    """G3 or G2. Raises ProgramFault without a direction."""
+    if not given.turn:
+        raise block.fault("an arc needs its direction: DR+ or DR-")
+    return Number(3.0 if given.turn > 0 else 2.0)
+
+
+def _assigned(ends: Ends) -> Assigned:
+    """The position at the end of a move."""
+    return [(POSITION[axis], end) for axis, end in ends.items() if axis in POSITION]
+
+
+_NO_DIRECTION = ((DIRECTION[0], ZERO), (DIRECTION[1], ZERO))  # behind arcs whose end has no direction here
 OUT_OF_PLANE = "out of the pole's plane, or in it beside polar coordinates, belongs to no such move"
 _FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"

@@ -34,7 +34,6 @@ from planner.nc.language.heidenhain.items import (
     items,
     looked_up,
     refuse_arc_axes,
-    word,
 )
 from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
@@ -43,8 +42,6 @@ from planner.nc.language.tree import (
     ZERO,
     Call,
     Expression,
-    Line,
-    MadeRows,
     Number,
     Parameter,
     Procedure,
@@ -52,6 +49,9 @@ from planner.nc.language.tree import (
     Return,
     SourcePlace,
     Statement,
+    assign,
+    made,
+    row,
 )
 
 _FUNCTION = re.compile(
@@ -109,7 +109,7 @@ class HeidenhainParser(Codes):
             set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")]
             set_up.append((PLANE, TWO))
         name = "file" if source.file else ""
-        return [Procedure(name, start, [Line(start, (), tuple(set_up)), *main]), *procedures]
+        return [Procedure(name, start, [assign(start, *set_up), *main]), *procedures]
 
     # --- labels -----------------------------------------------------------------------------------------------------------------
 
@@ -174,9 +174,9 @@ class HeidenhainParser(Codes):
         name = called_file(block.text[column:])
         if not name:
             raise block.fault("CALL PGM is followed by the name of a program", column)
-        units = word("G", block.place.at, Number(21.0 if self.unit == 1.0 else 20.0))
+        units = row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
         called = Call(block.place, name, None, block.text[column:].strip())
-        return [called, Line(block.place, (units,)), looked_up(block)]
+        return [called, units, looked_up(block)]
 
     def _nothing(self, block: ConversationalBlock, column: int) -> list[Statement]:
         return []
@@ -215,8 +215,7 @@ class HeidenhainParser(Codes):
             raise block.fault(
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
-        kind = Number(float(CORNERS.index("RND" if rounded else "CHR")))
-        return [MadeRows(block.place, "corner", (("kind", kind), ("size", number)))]
+        return [made(block.place, "corner", kind=CORNERS.index("RND" if rounded else "CHR"), size=number)]
 
     def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
         raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
@@ -263,11 +262,9 @@ class HeidenhainParser(Codes):
             raise block.fault(
                 "the plane of a pole is that of its two coordinates; write CC with both of them", column
             )
-        named: list[tuple[Parameter, Expression]] = [
-            (POLE["XYZ".index(axis)], end) for axis, end in ends.items()
-        ]
+        named = [(POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
-        return [Line(block.place, (), (*named, (PLANE, Number(float(normal)))))]
+        return [assign(block.place, *named, (PLANE, Number(float(normal))))]
 
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 

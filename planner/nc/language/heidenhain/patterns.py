@@ -8,80 +8,75 @@ Q200, Q203, Q204 replace those of the cycle; Q301 0: between the places at Q200,
 
 from __future__ import annotations
 
-from planner.nc.language.heidenhain.items import X, Y, Z, looked_up, word
-from planner.nc.language.heidenhain.text import (
-    ConversationalBlock,
-    minus,
-    of,
-    own,
-    parameter,
-    plus,
-    quotient,
-    times,
+from planner.nc.language.heidenhain.items import X, Y, Z, looked_up
+from planner.nc.language.heidenhain.text import ConversationalBlock, own
+from planner.nc.language.heidenhain.text import parameter as q
+from planner.nc.language.tree import (
+    ONE,
+    TWO,
+    ZERO,
+    Expression,
+    If,
+    Loop,
+    Number,
+    Parameter,
+    Statement,
+    assign,
+    op,
+    row,
 )
-from planner.nc.language.tree import ONE, TWO, ZERO, Expression, If, Line, Loop, Named, Number, Statement
 
 PATTERNS = (220, 221)  # cycles
 # A full turn [degrees], and what a computed whole number may be short of.
 _TURN, _WHOLE = Number(360.0), Number(1e-9)
+Steps = list[tuple[Parameter, Expression]]
 
 
 def pattern(block: ConversationalBlock, cycle: int, called: list[Statement]) -> list[Statement]:
     """Moves to the places with the statements of the cycle behind each."""
     place, n, second = block.place, own("hole"), own("second")
-    high = plus(parameter(203), of("MAX", parameter(204), parameter(200)))
-    at = place.at
-    count = parameter(241) if cycle == 220 else times(parameter(242), parameter(243))
-    before, ends = _circle(n) if cycle == 220 else _lines(n)
+    high = q(203) + op("MAX", q(204), q(200))
+    count = q(241) if cycle == 220 else q(242) * q(243)
+    steps, ends = _circle(n) if cycle == 220 else _lines(n)
     x, y = own("px"), own("py")
     turn: list[Statement] = [
-        *(Line(place, (), ((name, value),)) for name, value in before),
-        Line(place, (), ((x, ends[0]), (y, ends[1]))),
-        Line(place, (word("G", at, ZERO), word("X", at, x), word("Y", at, y)), ((X, x), (Y, y))),
+        *(assign(place, step) for step in steps),
+        assign(place, (x, ends[0]), (y, ends[1])),
+        row(place, ("G", ZERO), ("X", x), ("Y", y), assigned=((X, x), (Y, y))),
         *called,
-        Line(place, (), ((n, plus(n, ONE)),)),
+        assign(place, (n, n + ONE)),
     ]
-    up = Line(place, (word("G", at, ZERO), word("Z", at, high)), ((Z, high),))
-    low = of("EQ", parameter(301), ZERO)
+    up = If(place, ((op("LT", Z, high), [row(place, ("G", ZERO), ("Z", high), assigned=((Z, high),))]),), [])
     return [
-        If(place, ((of("LT", Z, high), [up]),), []),
-        Line(place, (), ((n, ZERO), (second, parameter(204)))),
-        If(place, ((low, [Line(place, (), ((parameter(204), ZERO),))]),), []),
-        Loop(place, "while", f"pattern {at}", of("LT", n, count), turn),
-        Line(place, (), ((parameter(204), second),)),
-        If(place, ((of("LT", Z, high), [up]),), []),
+        up,
+        assign(place, (n, ZERO), (second, q(204))),
+        If(place, ((op("EQ", q(301), ZERO), [assign(place, (q(204), ZERO))]),), []),
+        Loop(place, "while", f"pattern {place.at}", op("LT", n, count), turn),
+        assign(place, (q(204), second)),
+        up,
         looked_up(block),
     ]
 
 
-def _circle(n: Expression) -> tuple[list[tuple[Named, Expression]], tuple[Expression, Expression]]:
+def _circle(n: Expression) -> tuple[Steps, tuple[Expression, Expression]]:
     step, angle = own("step"), own("angle")
-    opening, more = minus(parameter(246), parameter(245)), minus(parameter(241), ONE)
-    whole = of("GE", of("ABS", opening), _TURN)
-    parts = of("MAX", plus(more, whole), ONE)
-    given = of("EQ", parameter(247), ZERO)
-    half = quotient(parameter(244), TWO)
-    before = [
-        (step, plus(parameter(247), times(given, quotient(opening, parts)))),
-        (angle, plus(parameter(245), times(n, step))),
+    opening, half = q(246) - q(245), q(244) / TWO
+    parts = op("MAX", q(241) - ONE + op("GE", op("ABS", opening), _TURN), ONE)
+    steps: Steps = [
+        (step, q(247) + op("EQ", q(247), ZERO) * (opening / parts)),
+        (angle, q(245) + n * step),
     ]
-    return before, (
-        plus(parameter(216), times(half, of("COS", angle))),
-        plus(parameter(217), times(half, of("SIN", angle))),
-    )
+    return steps, (q(216) + half * op("COS", angle), q(217) + half * op("SIN", angle))
 
 
-def _lines(n: Expression) -> tuple[list[tuple[Named, Expression]], tuple[Expression, Expression]]:
+def _lines(n: Expression) -> tuple[Steps, tuple[Expression, Expression]]:
     line, column, odd = own("line"), own("column"), own("odd")
-    before = [
-        (line, of("INT", plus(quotient(n, parameter(242)), _WHOLE))),
-        (odd, minus(line, times(TWO, of("INT", plus(quotient(line, TWO), _WHOLE))))),
-        (column, minus(n, times(line, parameter(242)))),
-        (column, plus(column, times(odd, minus(minus(parameter(242), ONE), times(TWO, column))))),
+    steps: Steps = [
+        (line, op("INT", n / q(242) + _WHOLE)),
+        (odd, line - TWO * op("INT", line / TWO + _WHOLE)),
+        (column, n - line * q(242)),
+        (column, column + odd * (q(242) - ONE - TWO * column)),
     ]
-    along, across = times(column, parameter(237)), times(line, parameter(238))
-    cosine, sine = of("COS", parameter(224)), of("SIN", parameter(224))
-    return before, (
-        plus(parameter(225), minus(times(along, cosine), times(across, sine))),
-        plus(parameter(226), plus(times(along, sine), times(across, cosine))),
-    )
+    along, across = column * q(237), line * q(238)
+    cosine, sine = op("COS", q(224)), op("SIN", q(224))
+    return steps, (q(225) + (along * cosine - across * sine), q(226) + (along * sine + across * cosine))

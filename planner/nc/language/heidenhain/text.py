@@ -14,51 +14,24 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.arithmetic import ARITHMETIC, DEGREES
+from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS
 from planner.nc.language.asked import FIRST_POSITION, PositionAsked
-from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
+from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.tree import (
     Expression,
     Language,
     Named,
     Number,
     Numbered,
-    Operation,
     ProgramFault,
     SourcePlace,
+    op,
 )
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
-
-# What operators and functions mean.
 LANGUAGE = Language(
-    name="heidenhain",
-    operations=ARITHMETIC
-    | {
-        ("**", 2): "power({0},{1})",
-        ("EQ", 2): "({0}=={1})",
-        ("NE", 2): "({0}!={1})",
-        ("ATAN", 2): "atan2({0},{1})",
-        ("LEN", 2): "hypot({0},{1})",
-        ("INT", 1): "float(trunc({0}))",
-        ("FRAC", 1): "({0}-trunc({0}))",
-        ("LOG", 1): "log10({0})",
-        ("MIN", 2): "min({0},{1})",
-        ("MAX", 2): "max({0},{1})",
-        ("UP", 1): "float(ceil({0}))",
-    },
-    conditions=frozenset(("EQ", "NE", "GT", "GE", "LT", "LE")),
-    functions={
-        **DEGREES,
-        "exp": math.exp,
-        "log": math.log,
-        "log10": math.log10,
-        "sqrt": math.sqrt,
-        "power": math.pow,
-        "hypot": math.hypot,
-        "trunc": math.trunc,
-        "ceil": math.ceil,
-    },
+    operations=ARITHMETIC,
+    conditions=COMPARISONS,
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
@@ -67,16 +40,9 @@ LANGUAGE = Language(
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
 _Q = re.compile(r"([+-]?)\s*Q(\d+)(?!\d)", re.IGNORECASE)
-_TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d*)?|\.\d+)|(Q[LRS]?\d*|[A-Z]+)|(.))", re.IGNORECASE)
-# Operators of a higher rank bind first.
-_RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 3}
-_NAMES = {"^": "**"}
-_FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP")
-
-
-def of(name: str, *operands: Expression) -> Operation:
-    """An operation of the language."""
-    return Operation(name, operands)
+_FUNCTIONS = frozenset(
+    ["SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP"]
+)
 
 
 def own(name: str) -> Named:
@@ -87,28 +53,6 @@ def own(name: str) -> Named:
 def parameter(number: int) -> Numbered:
     """Q of that number."""
     return Numbered(Number(float(number + 1)))
-
-
-def plus(a: Expression, b: Expression) -> Expression:
-    """The sum, put together where both are numbers."""
-    if isinstance(a, Number) and isinstance(b, Number):
-        return Number(a.value + b.value)
-    return of("+", a, b)
-
-
-def minus(a: Expression, b: Expression) -> Expression:
-    """The difference."""
-    return of("-", a, b)
-
-
-def times(a: Expression, b: Expression) -> Expression:
-    """The product."""
-    return of("*", a, b)
-
-
-def quotient(a: Expression, b: Expression) -> Expression:
-    """The quotient."""
-    return of("/", a, b)
 
 
 @dataclass(frozen=True)
@@ -181,87 +125,57 @@ def value(block: ConversationalBlock, column: int) -> tuple[Expression, int]:
         if number >= PARAMETERS:
             raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", column)
         q = parameter(number)
-        return (of(NEGATIVE, q) if found.group(1) == "-" else q), found.end()
+        return (-q if found.group(1) == "-" else q), found.end()
     found = _NUMBER.match(block.text, column)
     if found is None:
         raise block.fault("a number or a Q parameter is expected here, such as +12.5 or Q3", column)
     return Number(float(found.group())), found.end()
 
 
-class Formula:
+class Formula(TokenReader):
     """Reads a formula from a column of a block's text to its end."""
+
+    pattern = re.compile(
+        r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)|(?P<name>Q[LRS]?\d*|[A-Z]+)|(?P<sign>.))", re.IGNORECASE
+    )
+    ranks = ranked("+ -", "* /", "^")
+    meant = {"^": "**"}  # noqa: RUF012
+    pieces = "blocks"
+    ends = "the formula ends too early"
+    no_value = "is no value, Q parameter or function of a formula"
 
     def __init__(self, block: ConversationalBlock, column: int):
         self.block = block
-        self.tokens: list[tuple[str, int]] = []
-        text, at = block.text, column
-        while at < len(text):
-            found = _TOKEN.match(text, at)
-            if found is None:
-                break
-            self.tokens.append((found.group().strip().upper(), found.end() - len(found.group().strip())))
-            at = found.end()
-        self.next, self.nested = 0, 0
+        super().__init__(block.text, column)
 
     def read(self) -> Expression:
         """The formula. Raises ProgramFault."""
-        found = self._sum(0)
-        if self.next < len(self.tokens):
-            raise self.block.fault("an operator is expected here: + - * / ^", self.tokens[self.next][1])
+        found = self.expression()
+        if not self.ended:
+            raise self.fault("an operator is expected here: + - * / ^")
         return found
 
-    def _peek(self) -> str:
-        return self.tokens[self.next][0] if self.next < len(self.tokens) else ""
+    def fault(self, message: str, at: int | None = None) -> ProgramFault:
+        """A fault at a column of the block, or at the next token."""
+        return self.block.fault(message, self.column() if at is None else at)
 
-    def _fault(self, message: str) -> ProgramFault:
-        at = self.tokens[self.next][1] if self.next < len(self.tokens) else len(self.block.text)
-        return self.block.fault(message, at)
+    def expect(self, text: str) -> None:
+        """Go past the token. Raises ProgramFault if another one comes."""
+        if not self.take(text):
+            raise self.fault(f"{text} is missing")
 
-    def _sum(self, rank: int) -> Expression:
-        left, count = self._value(), 0
-        while (its := _RANKS.get(self._peek(), -1)) >= max(rank, 1):
-            operator = self._peek()
-            self.next += 1
-            left = of(_NAMES.get(operator, operator), left, self._sum(its + 1))
-            count += 1
-            if count > OPERATIONS_MAX:
-                raise self._fault(
-                    f"more than {OPERATIONS_MAX} operations in a row; write them in several blocks"
-                )
-        return left
-
-    def _value(self) -> Expression:
-        token = self._peek()
-        self.nested += 1
-        if self.nested > NESTED_MAX:
-            raise self._fault(f"more than {NESTED_MAX} brackets in each other")
-        if not token:
-            raise self._fault("the formula ends too early")
-        at = self.next
-        self.next += 1
-        if token in "+-":
-            found = self._value()
-            found = of(NEGATIVE, found) if token == "-" else found
-        elif token == "(":
-            found = self._sum(0)
-            if self._peek() != ")":
-                raise self._fault(") is missing")
-            self.next += 1
-        elif token[0].isdigit() or token[0] == ".":
-            found = Number(float(token))
-        elif re.fullmatch(r"Q\d+", token) and int(token[1:]) < PARAMETERS:
-            found = parameter(int(token[1:]))
-        elif token == "PI":
-            found = Number(math.pi)
-        elif token == "SQ":
-            operand = self._value()
-            found = times(operand, operand)
-        elif token == "NEG":
-            found = of(NEGATIVE, self._value())
-        elif token in _FUNCTIONS:
-            found = of(token, self._value())
-        else:
-            self.next = at
-            raise self._fault(f"{token} is no value, Q parameter or function of a formula")
-        self.nested -= 1
-        return found
+    def operand(self, token: Token) -> Expression | None:
+        """A number, parameter or function; None for anything else."""
+        text = token.text
+        if token.kind == "number":
+            return Number(float(text))
+        if re.fullmatch(r"Q\d+", text) and int(text[1:]) < PARAMETERS:
+            return parameter(int(text[1:]))
+        if text == "PI":
+            return Number(math.pi)
+        if text == "SQ":
+            operand = self.value()
+            return operand * operand
+        if text == "NEG":
+            return -self.value()
+        return op(text, self.value()) if text in _FUNCTIONS else None

@@ -146,7 +146,7 @@ class LinuxcncParser(LinuxcncControl):
             self._plain_program(label, line)
             return
         if keyword not in KEYWORDS:
-            raise reader.refused(at, f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected")
+            raise reader.refused(f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected", at)
         if keyword == "call":
             self._call(reader, line, label)
         elif not isinstance(label, str):
@@ -192,7 +192,7 @@ class LinuxcncParser(LinuxcncControl):
 
     def _nothing_left(self, reader: LineReader, after: str) -> None:
         if not reader.ended:
-            raise reader.refused(reader.at, f"nothing may follow {after} on its line")
+            raise reader.refused(f"nothing may follow {after} on its line")
 
 
 _FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")

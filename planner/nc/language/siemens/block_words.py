@@ -15,10 +15,21 @@ from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.said import assumed_row
 from planner.nc.language.siemens import codes, cycles, drilling
 from planner.nc.language.siemens.calls import Calls
-from planner.nc.language.siemens.commands import as_word
-from planner.nc.language.siemens.text import TokenReader, operation, position
+from planner.nc.language.siemens.text import LineTokens, position
 from planner.nc.language.source import Source
-from planner.nc.language.tree import ONE, TWO, ZERO, Expression, Line, MadeRows, Number, Parameter, Word
+from planner.nc.language.tree import (
+    ONE,
+    ZERO,
+    Expression,
+    Line,
+    MadeRows,
+    Number,
+    Parameter,
+    Word,
+    made,
+    row,
+    word,
+)
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
@@ -35,14 +46,13 @@ class BlockWords(Calls):
     circular = False
     centre_feed = False  # the program has CFTCP
 
-    def _words(self, reader: TokenReader) -> None:
+    def _words(self, reader: LineTokens) -> None:
         """A row of words, commands that move nothing, and assignments."""
         words: list[Word] = []
         assigned: list[tuple[Parameter, Expression]] = []
         found: set[float] = set()
-        wait: list[Word] = []
         stops = moved = False
-        made: list[MadeRows] = []  # corners and compensation, before the row
+        before: list[MadeRows] = []  # corners and compensation, before the row
         arc, through = "", {}
         while not reader.ended:
             token, at = reader.tokens[reader.next], reader.at()
@@ -55,15 +65,15 @@ class BlockWords(Calls):
                 arc, self.circular = name, True
             elif name in CORNERS:
                 reader.expect("=")
-                kind = Number(float(CORNERS.index(name)))
-                made.append(MadeRows(reader.place, "corner", (("kind", kind), ("size", reader.expression()))))
+                corner = made(reader.place, "corner", kind=CORNERS.index(name), size=reader.expression())
+                before.append(corner)
             elif name in ("I1", "J1", "K1") and arc == "CIP":
                 axis = "XYZ"["IJK".index(name[0])]
                 value = self._given(reader, axis, at)
                 assert value is not None
                 through[f"{axis}1"] = self._absolute(axis, value)
             elif name == "SUPA":
-                words.append(as_word("G", at, Number(53.0)))
+                words.append(word("G", at, 53.0))
             elif name in drilling.ARGUMENTS or name in cycles.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
                 self._cycle(reader, name)
             elif name == "KONT" and self.compensates:
@@ -71,7 +81,7 @@ class BlockWords(Calls):
             elif name == "STOPRE":  # the block before it ends in an exact stop, until the control has read on
                 stops = True
             elif name in codes.SAID:
-                made.append(assumed_row(reader.place, codes.SAID[name]))
+                before.append(assumed_row(reader.place, codes.SAID[name]))
                 _skip(reader)
             elif name in codes.IDLE or (name in codes.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
                 _skip(reader)
@@ -86,55 +96,48 @@ class BlockWords(Calls):
                 assert target is not None
                 assigned.append((target, reader.expression()))
             else:
-                for word in self._word(reader, name, at):
-                    letter = chr(word.letter)
-                    if letter == "G" and isinstance(word.value, Number):
-                        if word.value.value in _SIDES:
-                            side = Number(_SIDES[int(word.value.value)])
-                            made.insert(0, MadeRows(reader.place, "compensate", (("side", side),)))
+                for one in self._word(reader, name, at):
+                    letter, code = chr(one.letter), one.value
+                    if letter == "G" and isinstance(code, Number):
+                        if code.value in _SIDES:
+                            before.insert(0, made(reader.place, "compensate", side=_SIDES[int(code.value)]))
                             continue
-                        self.circular &= word.value.value not in (0.0, 1.0, 2.0, 3.0)
-                        found.add(word.value.value)
-                        stops |= word.value.value == 9.0
-                        if word.value.value == 9.0:
+                        self.circular &= code.value not in (0.0, 1.0, 2.0, 3.0)
+                        found.add(code.value)
+                        stops |= code.value == 9.0
+                        if code.value == 9.0:
                             continue
                     moved |= letter in "XY"
-                    words.append(word)
+                    words.append(one)
         if 4.0 in found:
-            wait = [word for word in words if chr(word.letter) in "FS"]
-            words = [word for word in words if chr(word.letter) not in "FS"]
-            words += [Word(ord("P"), word.at, word.value) for word in wait if chr(word.letter) == "F"]
-            if not any(chr(word.letter) == "P" for word in words):
+            seconds = [one._replace(letter=ord("P")) for one in words if one.letter == ord("F")]
+            words = [one for one in words if chr(one.letter) not in "FS"] + seconds
+            if not any(one.letter == ord("P") for one in words):
                 raise reader.fault(
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
         returns = (17.0, *(codes.RETURNS if self.source.file else ()))
         ended = [
-            word
-            for word in words
-            if chr(word.letter) == "M" and isinstance(word.value, Number) and word.value.value in returns
+            one
+            for one in words
+            if one.letter == ord("M") and isinstance(one.value, Number) and one.value.value in returns
         ]
-        words = [word for word in words if word not in ended]
-        words += [as_word("M", word.at, Number(30.0)) for word in ended if not self.source.file]
-        self.body += made
-        if self.circular and any(chr(word.letter) in "XYZ" for word in words):
+        words = [one for one in words if one not in ended]
+        words += [word("M", one.at, 30.0) for one in ended if not self.source.file]
+        self.body += before
+        if self.circular and any(chr(one.letter) in "XYZ" for one in words):
             words = self._circle(reader, arc, words, through)
         if words or assigned:
             self.body.append(Line(reader.place, tuple(words), tuple(assigned)))
         if stops:
-            self.body.append(
-                Line(
-                    reader.place,
-                    (as_word("G", reader.place.at, Number(4.0)), as_word("P", reader.place.at, ZERO)),
-                )
-            )
+            self.body.append(row(reader.place, ("G", 4.0), ("P", ZERO)))
         if moved and self.cycle is not None:
             self.body += self.cycle
         if ended and self.source.file:
             self._return(reader)
 
     def _circle(
-        self, reader: TokenReader, arc: str, words: list[Word], through: dict[str, Expression]
+        self, reader: LineTokens, arc: str, words: list[Word], through: dict[str, Expression]
     ) -> list[Word]:
         """An arc of CIP or CT with the coordinates among the words; returns the other words."""
         if not arc:
@@ -142,18 +145,19 @@ class BlockWords(Calls):
                 "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3", 0
             )
         given = dict(through)
-        for word in words:
-            if chr(word.letter) in "XYZ":
-                given[chr(word.letter)] = self._absolute(chr(word.letter), word.value)
-            elif chr(word.letter) == "F":
-                given["F"] = word.value
-        self.body.append(MadeRows(reader.place, _ARCS[arc], tuple(given.items())))
-        return [word for word in words if chr(word.letter) not in "XYZF"]
+        for one in words:
+            letter = chr(one.letter)
+            if letter in "XYZ":
+                given[letter] = self._absolute(letter, one.value)
+            elif letter == "F":
+                given["F"] = one.value
+        self.body.append(made(reader.place, _ARCS[arc], **given))
+        return [one for one in words if chr(one.letter) not in "XYZF"]
 
     def _absolute(self, axis: str, given: Expression) -> Expression:
-        return given if self.absolute else operation("+", position(axis), given)
+        return given if self.absolute else position(axis) + given
 
-    def _word(self, reader: TokenReader, name: str, at: int) -> list[Word]:
+    def _word(self, reader: LineTokens, name: str, at: int) -> list[Word]:
         """The words of RS274NGC for one word. Raises ProgramFault."""
         number = float(name[1:]) if reader.tokens[reader.next - 1].kind == "word" else None
         letter = name[0] if number is not None else re.sub(r"\d+\Z", "", name)
@@ -162,13 +166,8 @@ class BlockWords(Calls):
         if name in ("CR", "TURN", "ADIS"):
             reader.expect("=")
             value = reader.expression()
-            return [
-                as_word(
-                    {"CR": "R", "TURN": "P", "ADIS": "P"}[name],
-                    at,
-                    operation("+", value, ONE) if name == "TURN" else value,
-                )
-            ]
+            letter = "R" if name == "CR" else "P"
+            return [word(letter, at, value + ONE if name == "TURN" else value)]
         if letter in ("A", "B", "C") and name != letter and number is None:
             raise reader.fault(f"{name}=, a direction of the tool, is not read; {_ANGLES}", at - reader.start)
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
@@ -177,9 +176,9 @@ class BlockWords(Calls):
         if letter == "D":
             self.body.append(assumed_row(reader.place, "tool offset"))
         # A tool by its name has no number.
-        return [] if given is None or letter == "D" else [as_word(letter, at, given)]
+        return [] if given is None or letter == "D" else [word(letter, at, given)]
 
-    def _code(self, reader: TokenReader, code: int, at: int) -> list[Word]:
+    def _code(self, reader: LineTokens, code: int, at: int) -> list[Word]:
         if code in (90, 91):
             self.absolute = code == 90
             if reader.peek() == "(":
@@ -195,22 +194,20 @@ class BlockWords(Calls):
         if code in (41, 42) and not self.centre_feed:
             self.body.append(assumed_row(reader.place, "tool centre feed"))
         if code == 500:
-            origin = [as_word("G", at, Number(10.0)), as_word("L", at, TWO), as_word("P", at, Number(9.0))]
-            self.body.append(Line(reader.place, (*origin, *(as_word(axis, at, ZERO) for axis in "XYZ")), ()))
-        if code in _SIDES:
-            return [as_word("G", at, Number(float(code)))]
-        if code == 9:
-            return [as_word("G", at, Number(9.0))]
+            origin = (("G", 10.0), ("L", 2.0), ("P", 9.0), ("X", 0.0), ("Y", 0.0), ("Z", 0.0))
+            self.body.append(Line(reader.place, tuple(word(letter, at, value) for letter, value in origin)))
+        if code in (*_SIDES, 9):
+            return [word("G", at, float(code))]
         if code == 641:
-            return [as_word("G", at, Number(64.0))]
+            return [word("G", at, 64.0)]
         if code in codes.CODES:
-            return [as_word("G", at, Number(one)) for one in codes.CODES[code]]
+            return [word("G", at, one) for one in codes.CODES[code]]
         if code in (*codes.SAME_CODES, 4):
-            return [as_word("G", at, Number(float(code)))]
+            return [word("G", at, float(code))]
         raise reader.fault(f"G{code} of Siemens is not read; {codes.REMEDY}", at - reader.start)
 
 
-def _skip(reader: TokenReader) -> None:
+def _skip(reader: LineTokens) -> None:
     """Go past what stands in brackets behind a command, or behind its equals sign."""
     if reader.take("="):
         reader.expression()

@@ -15,8 +15,8 @@ import re
 
 from planner.nc.language.siemens import codes
 from planner.nc.language.siemens.commands import TYPES, Commands
-from planner.nc.language.siemens.text import TokenReader, handed_over, variable
-from planner.nc.language.tree import ONE, ZERO, Call, Expression, Line, Number, Parameter, Return
+from planner.nc.language.siemens.text import LineTokens, handed_over, variable
+from planner.nc.language.tree import ONE, ZERO, Call, Expression, Number, Parameter, Return, assign
 
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
 # Commands and cycles of the control, which are no files.
@@ -31,7 +31,7 @@ _NAMES_MAX = 32  # parameters of a subprogram
 class Calls(Commands):
     """Calls and what they hand over."""
 
-    def _is_call(self, reader: TokenReader) -> bool:
+    def _is_call(self, reader: LineTokens) -> bool:
         """Whether the line is a call by a name."""
         name = reader.peek()
         if (
@@ -43,7 +43,7 @@ class Calls(Commands):
         behind = reader.peek(1)
         return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
 
-    def _call(self, reader: TokenReader) -> None:
+    def _call(self, reader: LineTokens) -> None:
         """NAME, NAME P3, NAME(values)."""
         name = reader.peek()
         reader.next += 1
@@ -56,7 +56,7 @@ class Calls(Commands):
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
 
-    def _call_text(self, reader: TokenReader) -> None:
+    def _call_text(self, reader: LineTokens) -> None:
         """CALL "NAME"."""
         text = reader.peek().strip('"')
         if reader.ended or reader.tokens[reader.next].kind != "text":
@@ -70,7 +70,7 @@ class Calls(Commands):
         self._append_call(reader, name.upper(), [], ONE)
 
     def _append_call(
-        self, reader: TokenReader, name: str, given: list[Expression | None], times: Expression
+        self, reader: LineTokens, name: str, given: list[Expression | None], times: Expression
     ) -> None:
         if len(given) > _NAMES_MAX:
             raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
@@ -79,10 +79,10 @@ class Calls(Commands):
             for k in range(_NAMES_MAX if given else 0)
         ]
         if handed:
-            self.body.append(Line(reader.place, (), tuple(handed)))
+            self.body.append(assign(reader.place, *handed))
         self.body.append(Call(reader.place, name.lower(), None, name, times))
 
-    def _procedure(self, reader: TokenReader) -> None:
+    def _procedure(self, reader: LineTokens) -> None:
         """PROC NAME(REAL A, INT B)."""
         if reader.ended or reader.tokens[reader.next].kind != "name":
             raise reader.fault("PROC is followed by the subprogram's name")
@@ -100,9 +100,9 @@ class Calls(Commands):
                     raise reader.fault(") is missing")
         reader.next = len(reader.tokens)  # SAVE, DISPLOF and others
         if taken:
-            self.body.append(Line(reader.place, (), tuple(taken)))
+            self.body.append(assign(reader.place, *taken))
 
-    def _return(self, reader: TokenReader) -> None:
+    def _return(self, reader: LineTokens) -> None:
         """RET."""
         self.body.append(Return(reader.place))
 

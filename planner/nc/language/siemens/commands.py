@@ -7,8 +7,8 @@ import re
 from planner.nc.language.frames import ADDED, SIEMENS
 from planner.nc.language.siemens import codes, cycles, drilling, patterns
 from planner.nc.language.siemens.control import SiemensControl
-from planner.nc.language.siemens.text import TokenReader, operation, position, variable
-from planner.nc.language.tree import ZERO, Expression, Line, MadeRows, Message, Number, Statement, Word
+from planner.nc.language.siemens.text import LineTokens, position, variable
+from planner.nc.language.tree import ZERO, Expression, Message, Number, Statement, assign, made, row
 
 TYPES = frozenset(("REAL", "INT", "BOOL"))
 
@@ -33,7 +33,7 @@ class Commands(SiemensControl):
         self.compensates = False
         self.at_tip = False
 
-    def _cycle(self, reader: TokenReader, name: str) -> None:
+    def _cycle(self, reader: LineTokens, name: str) -> None:
         place = reader.place
         given = self._arguments(reader)
         if name == "CYCLE800":
@@ -41,13 +41,11 @@ class Commands(SiemensControl):
                 raise reader.fault("CYCLE800 with angles tilts the part; axes that turn are not planned yet")
         elif name == "CYCLE832":
             if given and given[0] is not None and given[0] != ZERO:
-                self.body.append(
-                    Line(place, (as_word("G", place.at, Number(64.0)), as_word("P", place.at, given[0])))
-                )
+                self.body.append(row(place, ("G", 64.0), ("P", given[0])))
         else:
             self.body += self._drilled(reader, name, given)
 
-    def _drilled(self, reader: TokenReader, name: str, given: list[Expression | None]) -> list[Statement]:
+    def _drilled(self, reader: LineTokens, name: str, given: list[Expression | None]) -> list[Statement]:
         """A cycle, and what it keeps as it was. Raises ProgramFault."""
         place = reader.place
         known = (cycles.ARGUMENTS | drilling.ARGUMENTS)[name]
@@ -58,22 +56,16 @@ class Commands(SiemensControl):
                     0,
                 )
         try:
-            rows = (
-                [
-                    MadeRows(
-                        place,
-                        name,
-                        tuple((k, v) for k, v in zip(known, given, strict=False) if v is not None),
-                    )
-                ]
-                if name in cycles.ARGUMENTS
-                else drilling.drilled_rows(place, name, given, self.unit)
-            )
+            if name in cycles.ARGUMENTS:
+                values = {k: v for k, v in zip(known, given, strict=False) if v is not None}
+                rows: list[Statement] = [made(place, name, **values)]
+            else:
+                rows = drilling.drilled_rows(place, name, given, self.unit)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
-        return [MadeRows(place, "keep"), *rows, MadeRows(place, "bring back", (("feed", ZERO),))]
+        return [made(place, "keep"), *rows, made(place, "bring back", feed=ZERO)]
 
-    def _arguments(self, reader: TokenReader) -> list[Expression | None]:
+    def _arguments(self, reader: LineTokens) -> list[Expression | None]:
         """What stands in the brackets behind a cycle; None for what is left out or a text."""
         given: list[Expression | None] = []
         if not reader.take("("):
@@ -90,7 +82,7 @@ class Commands(SiemensControl):
                 raise reader.fault(") is missing")
         return given
 
-    def _pattern(self, reader: TokenReader) -> None:
+    def _pattern(self, reader: LineTokens) -> None:
         """HOLES1 and HOLES2: the modal cycle at every place of a pattern."""
         name = reader.peek(-1)
         if self.cycle is None:
@@ -101,7 +93,7 @@ class Commands(SiemensControl):
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
 
-    def _modal_call(self, reader: TokenReader) -> None:
+    def _modal_call(self, reader: LineTokens) -> None:
         if reader.ended:
             self.cycle = None
             return
@@ -112,7 +104,7 @@ class Commands(SiemensControl):
             raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
         self.cycle = self._drilled(reader, name, self._arguments(reader))
 
-    def _frame(self, reader: TokenReader) -> None:
+    def _frame(self, reader: LineTokens) -> None:
         """TRANS, ROT, SCALE, MIRROR: a frame; ATRANS and the others: one beside the one before."""
         name, place = reader.peek(-1), reader.place
         kind = SIEMENS.index(name.removeprefix("A")) + (ADDED if name.startswith("A") else 0)
@@ -128,10 +120,10 @@ class Commands(SiemensControl):
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
-        self.body.append(MadeRows(place, "siemens frame", (("kind", Number(float(kind))), *given.items())))
-        self.body.append(MadeRows(place, "frame in force"))
+        self.body.append(made(place, "siemens frame", kind=kind, **given))
+        self.body.append(made(place, "frame in force"))
 
-    def _define(self, reader: TokenReader) -> None:
+    def _define(self, reader: LineTokens) -> None:
         kind = reader.peek()
         reader.next += 1
         if kind not in TYPES:
@@ -143,22 +135,22 @@ class Commands(SiemensControl):
             reader.next += 1
             self.names.add(name)
             value = reader.expression() if reader.take("=") else ZERO
-            self.body.append(Line(reader.place, (), ((variable(name), value),)))
+            self.body.append(assign(reader.place, (variable(name), value)))
             if not reader.take(","):
                 return
 
-    def _message(self, reader: TokenReader) -> None:
+    def _message(self, reader: LineTokens) -> None:
         found = re.search(r'"([^"]*)"', reader.text)
         reader.next = len(reader.tokens)
         if found and found.group(1):
             self.body.append(Message(reader.place, (found.group(1),)))
 
-    def _refused(self, reader: TokenReader) -> None:
+    def _refused(self, reader: LineTokens) -> None:
         raise reader.fault(
             f"{reader.peek(-1)} is not read; {codes.REMEDY}", reader.tokens[reader.next - 1].at
         )
 
-    def _tool_point(self, reader: TokenReader) -> None:
+    def _tool_point(self, reader: LineTokens) -> None:
         """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for another one, and for TRAORI on
         a machine without kinematics."""
         name = reader.peek(-1)
@@ -166,17 +158,16 @@ class Commands(SiemensControl):
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
             raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
         if self.at_tip:
-            code = as_word("M", reader.place.at, Number(codes.TOOL_POINT[name]))
-            self.body.append(Line(reader.place, (code,), ()))
+            self.body.append(row(reader.place, ("M", codes.TOOL_POINT[name])))
         elif name == "TRAORI":
             raise reader.fault(
                 "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
             )
 
-    def _idle(self, reader: TokenReader) -> None:
+    def _idle(self, reader: LineTokens) -> None:
         reader.next = len(reader.tokens)
 
-    def _given(self, reader: TokenReader, letter: str, at: int) -> Expression | None:
+    def _given(self, reader: LineTokens, letter: str, at: int) -> Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
         reader.expect("=")
         if not reader.ended and reader.tokens[reader.next].kind == "text":
@@ -191,19 +182,12 @@ class Commands(SiemensControl):
         return reader.expression()
 
     def _coordinate(
-        self, letter: str, value: Expression, absolute: bool, reader: TokenReader, at: int
+        self, letter: str, value: Expression, absolute: bool, reader: LineTokens, at: int
     ) -> Expression:
         if letter in "IJK":
-            return operation("-", value, position("XYZ"["IJK".index(letter)])) if absolute else value
+            return value - position("XYZ"["IJK".index(letter)]) if absolute else value
         if letter not in "XYZ":
             raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
         if absolute == self.absolute:
             return value
-        return operation(
-            "-" if absolute else "+", *((value, position(letter)) if absolute else (position(letter), value))
-        )
-
-
-def as_word(letter: str, at: int, value: Expression) -> Word:
-    """A word of a row."""
-    return Word(ord(letter), at, value)
+        return value - position(letter) if absolute else position(letter) + value

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 
-from planner.nc.language.siemens.text import TokenReader, operation, variable
+from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.tree import (
     ONE,
     ZERO,
@@ -12,12 +13,14 @@ from planner.nc.language.tree import (
     Goto,
     If,
     Label,
-    Line,
     Loop,
+    Named,
     Number,
     Parameter,
     SourcePlace,
     Statement,
+    assign,
+    op,
 )
 
 _NESTED_MAX = 100  # loops and branches in each other
@@ -59,7 +62,7 @@ class SiemensControl:
     def _number_of(self, label: str) -> int:
         return self.labels.setdefault(label, len(self.labels) + 1)
 
-    def _begin(self, kind: str, reader: TokenReader, condition: Expression | None) -> _Open:
+    def _begin(self, kind: str, reader: LineTokens, condition: Expression | None) -> _Open:
         if len(self.open) >= _NESTED_MAX:
             raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
         opened = _Open(kind, reader.place, condition, [], [])
@@ -67,14 +70,14 @@ class SiemensControl:
         self.body = opened.body
         return opened
 
-    def _close(self, kind: str, reader: TokenReader) -> _Open:
+    def _close(self, kind: str, reader: LineTokens) -> _Open:
         if not self.open or self.open[-1].kind != kind:
             raise reader.fault(f"there is no {kind} open that this ends", 0)
         closed = self.open.pop()
         self.body = self.open[-1].body if self.open else self.main
         return closed
 
-    def _if(self, reader: TokenReader) -> None:
+    def _if(self, reader: LineTokens) -> None:
         condition = reader.expression()
         if reader.peek().startswith("GOTO"):
             reader.next += 1
@@ -84,7 +87,7 @@ class SiemensControl:
         else:
             self._begin("IF", reader, condition)
 
-    def _else(self, reader: TokenReader) -> None:
+    def _else(self, reader: LineTokens) -> None:
         if not self.open or self.open[-1].kind != "IF" or self.open[-1].condition is None:
             raise reader.fault("there is no IF open that this belongs to", 0)
         top = self.open[-1]
@@ -93,20 +96,20 @@ class SiemensControl:
         top.condition, top.body = None, []
         self.body = top.body
 
-    def _end_if(self, reader: TokenReader) -> None:
+    def _end_if(self, reader: LineTokens) -> None:
         closed = self._close("IF", reader)
         if closed.condition is not None:
             self.body.append(If(closed.place, ((closed.condition, closed.body),), []))
         else:
             self.body.append(If(closed.place, tuple(closed.branches), closed.body))
 
-    def _while(self, reader: TokenReader) -> None:
+    def _while(self, reader: LineTokens) -> None:
         self._begin("WHILE", reader, reader.expression())
 
-    def _loop(self, reader: TokenReader) -> None:
+    def _loop(self, reader: LineTokens) -> None:
         self._begin("LOOP", reader, ONE)
 
-    def _end_loop(self, reader: TokenReader) -> None:
+    def _end_loop(self, reader: LineTokens) -> None:
         kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
         closed = self._close(kind, reader)
         assert closed.condition is not None
@@ -114,7 +117,7 @@ class SiemensControl:
             Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
         )
 
-    def _for(self, reader: TokenReader) -> None:
+    def _for(self, reader: LineTokens) -> None:
         target = reader.parameter(reader.tokens[reader.next]) if not reader.ended else None
         if target is None:
             raise reader.fault("FOR needs a variable that is declared")
@@ -123,75 +126,68 @@ class SiemensControl:
         first = reader.expression()
         reader.expect("TO")
         last = reader.expression()
-        self.body.append(Line(reader.place, (), ((target, first),)))
+        self.body.append(assign(reader.place, (target, first)))
         self._begin("FOR", reader, None).count = (target, last)
 
-    def _end_for(self, reader: TokenReader) -> None:
+    def _end_for(self, reader: LineTokens) -> None:
         closed = self._close("FOR", reader)
         assert closed.count is not None
         target, last = closed.count
-        closed.body.append(Line(closed.place, (), ((target, operation("+", target, ONE)),)))
+        closed.body.append(assign(closed.place, (target, target + ONE)))
         self.body.append(
-            Loop(closed.place, "while", f"FOR {closed.place.at}", operation("<=", target, last), closed.body)
+            Loop(closed.place, "while", f"FOR {closed.place.at}", op("LE", target, last), closed.body)
         )
 
-    def _repeat(self, reader: TokenReader) -> None:
+    def _repeat(self, reader: LineTokens) -> None:
         """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here, n times more."""
         if reader.ended:
             self._begin("REPEAT", reader, None)
             return
-        label = reader.peek()
-        reader.next += 1
-        if label not in self.labels:
-            raise reader.fault(f"there is no label {label} above this line", 0)
-        times: Expression = ONE
-        if reader.take("P"):
-            reader.expect("=")
-            times = reader.expression()
-        counter = variable(f"_count{self.counters}")
-        self.counters += 1
+        label, counter, times = self._repeated(reader, self.labels)
         place = reader.place
         again: list[Statement] = [
-            Line(place, (), ((counter, operation("+", counter, ONE)),)),
+            assign(place, (counter, counter + ONE)),
             Goto(place, Number(float(self.labels[label]))),
         ]
-        end: list[Statement] = [Line(place, (), ((counter, ZERO),))]
-        self.body.append(If(place, ((operation("<", counter, times), again),), end))
+        self.body.append(If(place, ((op("LT", counter, times), again),), [assign(place, (counter, ZERO))]))
 
-    def _repeat_block(self, reader: TokenReader) -> None:
+    def _repeat_block(self, reader: LineTokens) -> None:
         """REPEATB label P=n: the line of the label, n times more."""
+        label, counter, times = self._repeated(reader, self.lines)
+        place = reader.place
+        self.body.append(assign(place, (counter, ZERO)))
+        body = [*self.lines[label], assign(place, (counter, counter + ONE))]
+        self.body.append(Loop(place, "while", f"REPEATB {place.at}", op("LT", counter, times), body))
+
+    def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, Named, Expression]:
+        """The label of a repeat, a counter of its own, and how often. Raises ProgramFault for a label that is not known."""
         label = reader.peek()
         reader.next += 1
-        if label not in self.lines:
+        if label not in known:
             raise reader.fault(f"there is no label {label} above this line", 0)
         times: Expression = ONE
         if reader.take("P"):
             reader.expect("=")
             times = reader.expression()
-        counter = variable(f"_count{self.counters}")
         self.counters += 1
-        place = reader.place
-        step = Line(place, (), ((counter, operation("+", counter, ONE)),))
-        self.body.append(Line(place, (), ((counter, ZERO),)))
-        body = [*self.lines[label], step]
-        self.body.append(Loop(place, "while", f"REPEATB {place.at}", operation("<", counter, times), body))
+        return label, variable(f"_count{self.counters - 1}"), times
 
-    def _until(self, reader: TokenReader) -> None:
+    def _until(self, reader: LineTokens) -> None:
         closed = self._close("REPEAT", reader)
         self.body.append(
             Loop(
                 closed.place,
                 "do",
                 f"REPEAT {closed.place.at}",
-                operation("NOT", reader.expression()),
+                op("NOT", reader.expression()),
                 closed.body,
             )
         )
 
-    def _goto(self, reader: TokenReader) -> None:
+    def _goto(self, reader: LineTokens) -> None:
         self._jump(reader, self.body)
 
-    def _jump(self, reader: TokenReader, body: list[Statement]) -> None:
+    def _jump(self, reader: LineTokens, body: list[Statement]) -> None:
         label = reader.peek()
         if not label:
             raise reader.fault("a label is expected here")

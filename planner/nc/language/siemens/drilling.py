@@ -10,10 +10,22 @@ FDEP, each of the others less by DAM, but not less than DAM, until the depth is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from planner.nc.language.siemens.text import operation, variable
-from planner.nc.language.tree import ZERO, Expression, If, Line, Loop, Number, SourcePlace, Statement, Word
+from planner.nc.language.siemens.text import variable
+from planner.nc.language.tree import (
+    ZERO,
+    Expression,
+    If,
+    Line,
+    Loop,
+    Number,
+    SourcePlace,
+    Statement,
+    assign,
+    op,
+    row,
+)
 
 ARGUMENTS = {
     "CYCLE81": ("RTP", "RFP", "SDIS", "DP", "DPR"),
@@ -38,61 +50,45 @@ def drilled_rows(
     for key in ("RTP", "RFP", "SDIS"):
         if key not in known:
             raise ValueError(f"{name} needs {key}")
-    clear = operation("+", known["RFP"], operation("ABS", known["SDIS"]))
-    if "DP" in known:
-        bottom: Expression = known["DP"]
-    elif "DPR" in known:
-        bottom = operation("-", known["RFP"], operation("ABS", known["DPR"]))
-    else:
-        raise ValueError(f"{name} needs DP or DPR")
+    clear = known["RFP"] + op("ABS", known["SDIS"])
+    bottom = _depth(known, name, "DP", "DPR")
 
     def go(z: Expression, code: float) -> Line:
-        return Line(place, (Word(ord("G"), place.at, Number(code)), Word(ord("Z"), place.at, z)))
+        return row(place, ("G", code), ("Z", z))
 
     def dwell(key: str) -> list[Statement]:
         if key not in known:
             return []
-        row = Line(place, (Word(ord("G"), place.at, Number(4.0)), Word(ord("P"), place.at, known[key])))
-        return [If(place, ((operation(">", known[key], ZERO), [row]),), [])]
+        return [If(place, ((op("GT", known[key], ZERO), [row(place, ("G", 4.0), ("P", known[key]))]),), [])]
 
-    found: list[Statement] = [go(clear, 0.0)]
-    if name == "CYCLE83":
-        found += _by_infeeds(place, known, clear, bottom, unit, go, dwell)
-    else:
-        found += [go(bottom, 1.0), *dwell("DTB")]
-    return [*found, go(known["RTP"], 0.0)]
-
-
-def _by_infeeds(place, known, clear, bottom, unit, go, dwell) -> list[Statement]:
+    if name != "CYCLE83":
+        return [go(clear, 0.0), go(bottom, 1.0), *dwell("DTB"), go(known["RTP"], 0.0)]
     depth, step = variable("_depth"), variable("_step")
-    if "FDEP" in known:
-        first = known["FDEP"]
-    elif "FDPR" in known:
-        first = operation("-", known["RFP"], operation("ABS", known["FDPR"]))
-    else:
-        raise ValueError("CYCLE83 needs FDEP or FDPR")
-    less = operation("ABS", known.get("DAM", ZERO))
-    out = known.get("VARI", ZERO)
-    above = [go(clear, 0.0), *dwell("DTS"), go(operation("+", depth, Number(_BEFORE / unit)), 0.0)]
-    chip = [go(operation("+", depth, Number(_BREAK / unit)), 0.0)]
-    smaller = operation("MAX", operation("-", step, less), less)
-    return [
-        Line(
-            place, (), ((depth, operation("MAX", first, bottom)), (step, operation("-", known["RFP"], first)))
-        ),
-        go(depth, 1.0),
-        Loop(
-            place,
-            "while",
-            f"holes {place.at}",
-            operation(">", depth, bottom),
-            [
-                *dwell("DTB"),
-                If(place, ((operation("<>", out, ZERO), above),), chip),
-                If(place, ((operation(">", less, ZERO), [Line(place, (), ((step, smaller),))]),), []),
-                Line(place, (), ((depth, operation("MAX", operation("-", depth, step), bottom)),)),
-                go(depth, 1.0),
-            ],
-        ),
+    first, less = _depth(known, name, "FDEP", "FDPR"), op("ABS", known.get("DAM", ZERO))
+    above = [go(clear, 0.0), *dwell("DTS"), go(depth + Number(_BEFORE / unit), 0.0)]
+    chip: list[Statement] = [go(depth + Number(_BREAK / unit), 0.0)]
+    smaller = assign(place, (step, op("MAX", step - less, less)))
+    turn: list[Statement] = [
         *dwell("DTB"),
+        If(place, ((op("NE", known.get("VARI", ZERO), ZERO), above),), chip),
+        If(place, ((op("GT", less, ZERO), [smaller]),), []),
+        assign(place, (depth, op("MAX", depth - step, bottom))),
+        go(depth, 1.0),
     ]
+    return [
+        go(clear, 0.0),
+        assign(place, (depth, op("MAX", first, bottom)), (step, known["RFP"] - first)),
+        go(depth, 1.0),
+        Loop(place, "while", f"holes {place.at}", op("GT", depth, bottom), turn),
+        *dwell("DTB"),
+        go(known["RTP"], 0.0),
+    ]
+
+
+def _depth(known: Mapping[str, Expression], name: str, absolute: str, below: str) -> Expression:
+    """A depth from the argument that has it, or the one that has it below the reference plane. Raises ValueError without either."""
+    if absolute in known:
+        return known[absolute]
+    if below not in known:
+        raise ValueError(f"{name} needs {absolute} or {below}")
+    return known["RFP"] - op("ABS", known[below])

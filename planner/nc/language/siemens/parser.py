@@ -24,9 +24,9 @@ import numpy as np
 from planner.nc.language.frames import SIEMENS
 from planner.nc.language.siemens import codes, patterns
 from planner.nc.language.siemens.block_words import BlockWords
-from planner.nc.language.siemens.text import TokenReader, variable
+from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import ZERO, Line, PlainRows, Procedure, ProgramFault, SourcePlace
+from planner.nc.language.tree import ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _COMPENSATES = re.compile(rb"G4[12]\b")
@@ -65,7 +65,7 @@ class SiemensParser(BlockWords):
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
         own = ["_depth", "_step", *(f"_count{k}" for k in range(self.counters))]
-        first = Line(start, (), tuple((variable(name), ZERO) for name in own))
+        first = assign(start, *((variable(name), ZERO) for name in own))
         return [Procedure("file" if self.source.file else "", start, [first, *self.main])]
 
     def _special(self) -> list[int]:
@@ -143,7 +143,7 @@ class SiemensParser(BlockWords):
             self.lines.update((name, body[first:]) for name in labels)
 
     def _statement(self, text: str, at: int, line: SourceLine) -> None:
-        reader = TokenReader(" " * at + text[at:], line.place, line.start, self.names)
+        reader = LineTokens(" " * at + text[at:], line.place, line.start, self.names)
         if reader.ended:
             return
         read = _STATEMENTS.get(reader.peek())
@@ -163,7 +163,7 @@ def _without_comment(text: str) -> str:
     return re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", text.rstrip("\r\n\x1a"))
 
 
-_STATEMENTS: dict[str, Callable[[SiemensParser, TokenReader], None]] = {
+_STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], None]] = {
     "DEF": SiemensParser._define,
     "IF": SiemensParser._if,
     "ELSE": SiemensParser._else,

@@ -10,8 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.nc.language.siemens.text import operation, variable
-from planner.nc.language.tree import ONE, ZERO, Expression, Line, Loop, Number, SourcePlace, Statement, Word
+from planner.nc.language.siemens.text import variable
+from planner.nc.language.tree import (
+    ONE,
+    ZERO,
+    Expression,
+    Loop,
+    Number,
+    SourcePlace,
+    Statement,
+    assign,
+    op,
+    row,
+)
 
 ARGUMENTS = {
     "HOLES1": ("SPCA", "SPCO", "STA1", "FDIS", "DBH", "NUM"),
@@ -32,26 +43,20 @@ def pattern_rows(
     if missing:
         raise ValueError(f"{name} needs {missing[0]}")
     n, angle, radius = variable("_hole"), variable("_angle"), variable("_radius")
-    along = (
-        operation("+", known["FDIS"], operation("*", n, known["DBH"])) if name == "HOLES1" else known["RAD"]
-    )
-    step = known.get("INDA", ZERO)
     if name == "HOLES1":
-        turned: Expression = known["STA1"]
+        along, turned = known["FDIS"] + n * known["DBH"], known["STA1"]
+        first = known["SPCA"], known["SPCO"]
     else:
-        even = operation("==", step, ZERO)  # 1 where the holes are spread evenly
-        by = operation("+", step, operation("*", even, operation("/", _TURN, known["NUM"])))
-        turned = operation("+", known["STA1"], operation("*", n, by))
-    first = ("SPCA", "SPCO") if name == "HOLES1" else ("CPA", "CPO")
-    words = [Word(ord("G"), place.at, ZERO)]
-    for letter, start, part in zip("XY", first, ("COS", "SIN"), strict=True):
-        reach = operation("*", radius, operation(part, angle))
-        words.append(Word(ord(letter), place.at, operation("+", known[start], reach)))
+        step = known.get("INDA", ZERO)
+        even = op("EQ", step, ZERO)  # 1 where the holes are spread evenly
+        along, turned = known["RAD"], known["STA1"] + n * (step + even * (_TURN / known["NUM"]))
+        first = known["CPA"], known["CPO"]
+    x, y = (start + radius * op(part, angle) for start, part in zip(first, ("COS", "SIN"), strict=True))
     turn: list[Statement] = [
-        Line(place, (), ((angle, turned), (radius, along))),
-        Line(place, tuple(words)),
+        assign(place, (angle, turned), (radius, along)),
+        row(place, ("G", ZERO), ("X", x), ("Y", y)),
         *drilled,
-        Line(place, (), ((n, operation("+", n, ONE)),)),
+        assign(place, (n, n + ONE)),
     ]
-    begin = Line(place, (), ((n, ZERO),))
-    return [begin, Loop(place, "while", f"{name} {place.at}", operation("<", n, known["NUM"]), turn)]
+    loop = Loop(place, "while", f"{name} {place.at}", op("LT", n, known["NUM"]), turn)
+    return [assign(place, (n, ZERO)), loop]

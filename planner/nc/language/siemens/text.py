@@ -13,88 +13,38 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
-from planner.nc.language.arithmetic import ARITHMETIC, DEGREES, rounded
+from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.asked import FIRST_POSITION, PositionAsked
-from planner.nc.language.spelling import NEGATIVE, NESTED_MAX, OPERATIONS_MAX
+from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.tree import (
+    ONE,
     Expression,
     Language,
     Named,
     Number,
     Numbered,
-    Operation,
     ProgramFault,
     SourcePlace,
+    op,
 )
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
-
-# What operators and functions mean.
 LANGUAGE = Language(
-    name="siemens",
-    operations=ARITHMETIC
-    | {
-        ("==", 2): "({0}=={1})",
-        ("<>", 2): "({0}!={1})",
-        (">", 2): "({0}>{1})",
-        (">=", 2): "({0}>={1})",
-        ("<", 2): "({0}<{1})",
-        ("<=", 2): "({0}<={1})",
-        ("AND", 2): "({0}!=0 and {1}!=0)",
-        ("OR", 2): "({0}!=0 or {1}!=0)",
-        ("XOR", 2): "(({0}!=0)!=({1}!=0))",
-        ("NOT", 1): "({0}==0)",
-        ("DIV", 2): "float(trunc({0}/{1}))",
-        ("MOD", 2): "fmod({0},{1})",
-        ("ATAN2", 2): "atan2({0},{1})",
-        ("POT", 1): "({0})**2",
-        ("TRUNC", 1): "float(trunc({0}))",
-        ("ROUND", 1): "rounded({0})",
-        ("MIN", 2): "min({0},{1})",
-        ("MAX", 2): "max({0},{1})",
-    },
-    conditions=frozenset(("==", "<>", ">", ">=", "<", "<=", "AND", "OR", "XOR", "NOT")),
-    functions={
-        **DEGREES,
-        "exp": math.exp,
-        "log": math.log,
-        "sqrt": math.sqrt,
-        "trunc": math.trunc,
-        "fmod": math.fmod,
-        "rounded": rounded,
-    },
+    operations=ARITHMETIC | {("MOD", 2): "fmod({0},{1})"},
+    conditions=COMPARISONS | LOGICAL,
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
     asked=PositionAsked.numbers,
 )
-
-# Operators of a higher rank bind first.
-_RANKS = {
-    **dict.fromkeys(("OR", "XOR"), 1),
-    "AND": 2,
-    **dict.fromkeys(("==", "<>", ">", ">=", "<", "<="), 3),
-    **dict.fromkeys(("+", "-"), 4),
-    **dict.fromkeys(("*", "/", "DIV", "MOD"), 5),
-}
-_FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP")
-_TWO = ("ATAN2", "MIN", "MAX")
+_FUNCTIONS = frozenset(
+    ["SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP"]
+)
+_TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values, by their names in the tree
 # Names of numbers.
 _CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
-_TOKEN = re.compile(
-    r"\s*(?:(?P<word>[XYZIJKFSTMDGHABC][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"
-    r"(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:EX[-+]?\d+)?)|(?P<name>\$?[A-Z_][A-Z0-9_]*)|(?P<text>\"[^\"]*\")|"
-    r"(?P<sign>==|<>|>=|<=|[-+*/()<>=,\[\]:]))",
-    re.IGNORECASE,
-)
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
-
-
-def operation(name: str, *operands: Expression) -> Operation:
-    """An operation of the language."""
-    return Operation(name, operands)
 
 
 def position(axis: str) -> Numbered:
@@ -112,120 +62,40 @@ def handed_over(number: int) -> Named:
     return Named(f"_value {number}", True)
 
 
-@dataclass(frozen=True)
-class Token:
-    """A piece of a line.
-
-    kind : "word" (a letter and its number), "number", "name", "text" or "sign"
-    text : as it is written, in capitals
-    at   : where it begins in the line
-    """
-
-    kind: str
-    text: str
-    at: int
-
-
-class TokenReader:
+class LineTokens(TokenReader):
     """Reads one line of a program from left to right.
 
     names : variables that the program has declared
     """
 
+    pattern = re.compile(
+        r"\s*(?:(?P<word>[XYZIJKFSTMDGHABC][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"
+        r"(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:EX[-+]?\d+)?)|(?P<name>\$?[A-Z_][A-Z0-9_]*)|(?P<text>\"[^\"]*\")|"
+        r"(?P<sign>==|<>|>=|<=|[-+*/()<>=,\[\]:]))",
+        re.IGNORECASE,
+    )
+    ranks = ranked("OR XOR", "AND", "== <> > >= < <=", "+ -", "* / DIV MOD")
+    meant = {"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"}  # noqa: RUF012
+
     def __init__(self, text: str, place: SourcePlace, start: int, names: set[str]):
-        self.text, self.place, self.start, self.names = text, place, start, names
-        self.tokens: list[Token] = []
-        self.next = self.nested = 0
-        at = 0
-        while at < len(text) and text[at:].strip():
-            found = _TOKEN.match(text, at)
-            if found is None:
-                at += len(text[at:]) - len(text[at:].lstrip())
-                raise self.fault(f"{text[at]!r} is not part of the language", at)
-            kind = str(found.lastgroup)
-            word = found.group(kind)
-            self.tokens.append(Token(kind, word if kind == "text" else word.upper(), found.start(kind)))
-            at = found.end()
+        self.place, self.start, self.names = place, start, names
+        super().__init__(text)
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
         """A fault at a character of the line; that of the next token if none is given."""
-        if at is None:
-            at = self.tokens[self.next].at if self.next < len(self.tokens) else len(self.text)
-        return ProgramFault(self.place._replace(at=self.start + at), message)
-
-    @property
-    def ended(self) -> bool:
-        """Whether nothing is left."""
-        return self.next >= len(self.tokens)
-
-    def peek(self, ahead: int = 0) -> str:
-        """The text of a token that comes; empty after the last."""
-        return self.tokens[self.next + ahead].text if self.next + ahead < len(self.tokens) else ""
-
-    def take(self, text: str) -> bool:
-        """Go past the token if it comes next."""
-        if self.peek() != text:
-            return False
-        self.next += 1
-        return True
-
-    def expect(self, text: str) -> None:
-        """Go past the token. Raises ProgramFault if another one comes."""
-        if not self.take(text):
-            raise self.fault(f"{text} is expected here; {self.peek() or 'the end of the line'} comes")
+        return ProgramFault(
+            self.place._replace(at=self.start + (self.column() if at is None else at)), message
+        )
 
     def at(self) -> int:
         """Byte offset of the next token."""
-        return self.start + (self.tokens[self.next].at if not self.ended else len(self.text))
-
-    def expression(self, rank: int = 1) -> Expression:
-        """Values with operators of at least that rank between them. Raises ProgramFault."""
-        left, count = self.value(), 0
-        while (its := _RANKS.get(self.peek(), -1)) >= rank:
-            operator = self.peek()
-            self.next += 1
-            left = operation(operator, left, self.expression(its + 1))
-            count += 1
-            if count > OPERATIONS_MAX:
-                raise self.fault(
-                    f"more than {OPERATIONS_MAX} operations in a row; write them in several lines"
-                )
-        return left
+        return self.start + self.column()
 
     def value(self) -> Expression:
         """A number, variable, function or bracket, with signs before it. Raises ProgramFault."""
-        self.nested += 1
-        if self.nested > NESTED_MAX:
-            raise self.fault(f"more than {NESTED_MAX} brackets in each other")
-        found = self._value()
-        self.nested -= 1
-        return found
-
-    def _value(self) -> Expression:
-        if self.ended:
-            raise self.fault("a value is expected here; the line ends")
-        if self.tokens[self.next].kind == "word":
+        if not self.ended and self.tokens[self.next].kind == "word":
             self._take_apart()
-        token = self.tokens[self.next]
-        self.next += 1
-        if token.text in ("+", "-"):
-            operand = self.value()
-            if token.text == "+":
-                return operand
-            return Number(-operand.value) if isinstance(operand, Number) else operation(NEGATIVE, operand)
-        if token.text == "NOT":
-            return operation("NOT", self.value())
-        if token.text == "(":
-            inner = self.expression()
-            self.expect(")")
-            return inner
-        if token.kind == "number":
-            mantissa, _, exponent = token.text.partition("EX")
-            return Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
-        if token.kind == "name":
-            return self._named(token)
-        self.next -= 1
-        raise self.fault(f"{token.text} is no value")
+        return super().value()
 
     def _take_apart(self) -> None:
         """What looks like a word is a variable and what follows it: A+1 in an expression."""
@@ -236,17 +106,24 @@ class TokenReader:
             parts += [Token("sign", word.text[1], word.at + 1), Token("number", word.text[2:], word.at + 2)]
         self.tokens[self.next : self.next + 1] = parts
 
-    def _named(self, token: Token) -> Expression:
+    def operand(self, token: Token) -> Expression | None:
+        """NOT, a number, a variable or a function; None for anything else. Raises ProgramFault."""
         name = token.text
+        if name == "NOT":
+            return op(name, self.value())
+        if token.kind == "number":
+            mantissa, _, exponent = name.partition("EX")
+            return Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
+        if token.kind != "name":
+            return None
         if name in _FUNCTIONS or name in _TWO:
             self.expect("(")
-            first = self.expression()
-            operands = (first,)
+            operands = [self.expression()]
             if name in _TWO:
                 self.expect(",")
-                operands = (first, self.expression())  # type: ignore[assignment]
+                operands.append(self.expression())
             self.expect(")")
-            return operation(name, *operands)
+            return op(_TWO.get(name, name), *operands)
         if name in _CONSTANTS:
             return Number(_CONSTANTS[name])
         if _SYSTEM.match(name) and self.take("["):
@@ -266,7 +143,7 @@ class TokenReader:
         if token.text == "R" and self.take("["):
             index = self.expression()
             self.expect("]")
-            return Numbered(operation("+", index, Number(1.0)))
+            return Numbered(index + ONE)
         if re.fullmatch(r"R\d+", token.text):
             number = int(token.text[1:])
             if number >= PARAMETERS:

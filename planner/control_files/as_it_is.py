@@ -15,7 +15,7 @@ from planner.control_files.rows import G4, G10, G92, HOMES, Row, Source, Word, s
 from planner.control_files.source import same_places
 from planner.machine import Machine
 from planner.nc import codes
-from planner.nc.leader import without_leader
+from planner.nc.lexer import without_leader
 from planner.nc.program import FEED_MOVES
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, INCREMENTAL, LINUXCNC

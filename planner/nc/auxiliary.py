@@ -1,4 +1,6 @@
-"""What a block says before it moves: spindle, tool, coolant and other codes that a control passes on; dwells; path control."""
+"""What a block says before it moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a control passes on; dwells;
+path control. Outputs are events; an input that is waited for is refused.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ import numpy as np
 
 from planner.base.units import MILLISECOND
 from planner.machine.parts import TOLERANCE_MIN
-from planner.nc import codes, signals
+from planner.nc import codes
 from planner.nc.assumed import Assumed
 from planner.nc.block import Block
 from planner.nc.faults import Findings
@@ -14,6 +16,27 @@ from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind, PathControl
 from planner.nc.state import State
 from planner.nc.store import Store
+
+# Ten times M codes: the one that reads an input, and the words that each needs.
+_READ_INPUT = 660
+_NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
+
+
+def signal(store: Store, block: Block) -> None:
+    """Execute the block's code. Raises WordFault if a word is missing, or for an input that is waited for."""
+    code = block.m["signals"]
+    for letter in _NEEDED[code]:
+        if letter not in block.value:
+            raise WordFault(
+                block.at["signals"], f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}"
+            )
+    if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
+        raise WordFault(
+            block.at["signals"],
+            "M66 waits for an input of the control, which only the machine knows; plan the parts before and after it",
+        )
+    store.add_event("M", code / 10, block.line)
+
 
 # By ten times the G code.
 _EXACT_PATH = 610
@@ -39,7 +62,7 @@ def events(state: State, store: Store, block: Block, found: Findings) -> None:
         state.tool_selected = integer(block, "T", 0)
         store.add_event("T", state.tool_selected, line)
     if "signals" in block.m:
-        signals.signal(store, block)
+        signal(store, block)
     if "tool number" in block.m:
         if "Q" not in block.value:
             raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")

@@ -19,8 +19,7 @@ from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter, OpenArc
 from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, has_two_axes, is_turned
-from planner.nc.leader import without_leader
-from planner.nc.lexer import Words, split_words, text_alone
+from planner.nc.lexer import Words, split_words, text_alone, without_leader
 from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, LATHE, SIEMENS, Reading

@@ -1,24 +1,164 @@
-"""Motion in step with the spindle: G33, G33.1 and the threading cycle G76 (thread_cycle.py).
+"""Motion in step with the spindle: G33, G33.1 and the threading cycle G76.
 
 The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan starts and ends at rest:
 with full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out, whose lengths the machine's
 acceleration and jerk give (geometry/run_in.py, which refuses a cut without room for them; the verdict looks at the feed between).
 LinuxCNC accelerates in the synchronised move, too. G33.1 taps: along the thread and back to its start.
+
+The threading cycle G76: from its words to passes.
+
+G76 cuts a thread on a lathe, from the drive line (x0, z0) to the depth K below the thread's peak at x0 + I, in passes of the depths
+
+    d_n = J n^(1/R)  while below K,   then K once and for each of the H spring passes
+
+so that with R = 2 every pass takes the same section of chip. In the direction s = sign(I) of x and t of z, pass d is the last pass
+moved back by K - d, at the compound angle Q along z:
+
+    from  z0 + t d tan Q  to  z1 - t (K - d) tan Q,   cut at x0 + s (|I| + d),   cleared at x0 - s (K - d)
+
+Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the peak line of the pass and its depth; on them the
+pitch along z stays P. Lengths are in programmed units. In diameter mode (G7) I, J and K are diameters too.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.nc import codes, moves, thread_cycle
+from planner.nc import codes, moves
 from planner.nc.block import Block
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault
+from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.store import Store
+
+PASSES_MAX = 10_000  # of a thread: more are a mistake in J or H
+ANGLE_MAX = 80.0  # of the compound slide [degrees], as LinuxCNC's manual has it
+_ENTRY, _END = 1, 2  # bits of L
+
+
+@dataclass(frozen=True)
+class Thread:
+    """A thread in programmed coordinates and units, x and depths as radii.
+
+    start, end  : (x, z) of the drive line and z of its end
+    peak        : I, from the drive line to the thread's peak;  depth : K;  first : J;  degression : R;  angle : Q [degrees]
+    pitch       : P
+    taper       : E;  tapered : L;  springs : H
+    """
+
+    start: tuple[float, float]
+    end: float
+    peak: float
+    depth: float
+    first: float
+    pitch: float
+    degression: float = 1.0
+    angle: float = 0.0
+    taper: float = 0.0
+    tapered: int = 0
+    springs: int = 0
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A move to (x, z): in step with the spindle, `pitch` per turn along its path, or fast (0)."""
+
+    x: float
+    z: float
+    pitch: float = 0.0
+
+
+def depths(thread: Thread) -> Iterator[float]:
+    """Depths of the passes, spring passes included."""
+    depth, number, peak = thread.first, 1, abs(thread.peak)
+    while peak + depth < peak + thread.depth:  # rounded as LinuxCNC rounds, which counts from the drive line
+        yield depth
+        number += 1
+        depth = thread.first * number ** (1.0 / thread.degression)
+    for _ in range(1 + thread.springs):
+        yield thread.depth
+
+
+def passes(thread: Thread) -> Iterator[Cut]:
+    """The moves of the thread, all passes."""
+    inwards = math.copysign(1.0, thread.peak)
+    ahead = 1.0 if thread.end > thread.start[1] else -1.0
+    slope = math.tan(math.radians(thread.angle))
+    tapered = thread.tapered if thread.taper > 0 else 0
+    aslant = thread.pitch * math.hypot(thread.depth, thread.taper) / thread.taper if tapered else 0.0
+    for depth in depths(thread):
+        left = thread.depth - depth
+        clear = thread.start[0] - inwards * left
+        peak, cut = clear + thread.peak, thread.start[0] + thread.peak + inwards * depth
+        first, last = thread.start[1] + ahead * depth * slope, thread.end - ahead * left * slope
+        yield Cut(clear, first)
+        if tapered & _ENTRY:
+            yield Cut(peak, first, aslant)
+            yield Cut(cut, first + ahead * thread.taper, aslant)
+        else:
+            yield Cut(cut, first)
+        if tapered & _END:
+            yield Cut(cut, last - ahead * thread.taper, thread.pitch)
+            yield Cut(peak, last, aslant)
+        else:
+            yield Cut(cut, last, thread.pitch)
+        yield Cut(clear, last)
+
+
+def read_thread(state: State, block: Block, end: float) -> Thread:
+    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or wrong."""
+    word, value = block.motion_word(), block.value
+    for letter, what in _NEEDED.items():
+        if letter not in value:
+            raise WordFault(word, f"G76 needs {letter}: {what}")
+    if value["P"] == 0 or value["I"] == 0:
+        letter = "P" if value["P"] == 0 else "I"
+        raise WordFault(block.at[letter], f"{letter} of G76 must not be 0: {_NEEDED[letter]}")
+    if not 0 < value["J"] < value["K"]:
+        raise WordFault(
+            block.at["J"],
+            "J of G76, the depth of the first pass, must be above 0 and below K, the full depth",
+        )
+    if not 0 <= value.get("Q", 0.0) <= ANGLE_MAX:
+        raise WordFault(
+            block.at["Q"], f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees"
+        )
+    here = state.programmed() / state.unit
+    part = 0.5 if state.diameters else 1.0
+    thread = Thread(
+        start=(float(here[0]), float(here[2])),
+        end=end / state.unit,
+        peak=part * value["I"],
+        depth=part * value["K"],
+        first=part * value["J"],
+        pitch=abs(value["P"]),
+        degression=max(value.get("R", 1.0), 1.0),
+        angle=value.get("Q", 0.0),
+        taper=value.get("E", 0.0),
+        tapered=integer(block, "L", 0) if "L" in value else 0,
+        springs=integer(block, "H", 0) if "H" in value else 0,
+    )
+    if thread.tapered > _ENTRY + _END:
+        raise WordFault(block.at["L"], "L of G76 must be 0 (no taper), 1 (entry), 2 (end) or 3 (both)")
+    if (thread.depth / thread.first) ** thread.degression + thread.springs > PASSES_MAX:
+        raise WordFault(word, f"G76 makes more than {PASSES_MAX} passes; correct J, R or H")
+    return thread
+
+
+_NEEDED = {
+    "P": "the pitch",
+    "I": "from the drive line to the thread's peak, below 0 for an outer thread",
+    "J": "the depth of the first pass",
+    "K": "the full depth of the thread",
+}
+
 
 _AND_BACK = 331  # G33.1
 
@@ -47,9 +187,9 @@ def cut_thread(state: State, store: Store, block: Block, found: Findings) -> Non
     state.position[:], there = target, state.position.copy()
     end = float(state.programmed()[2])
     state.position[:] = there
-    passes = thread_cycle.passes(thread_cycle.read_thread(state, block, end))
+    read = read_thread(state, block, end)
     feed = _feed(state, block, 1.0)
-    for cut in passes:
+    for cut in passes(read):
         place = state.machine(np.array([cut.x * state.unit, here[1], cut.z * state.unit]))
         if cut.pitch:
             _cut(state, store, block.line, place, cut.pitch * feed)

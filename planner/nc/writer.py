@@ -25,8 +25,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.leader import without_leader
-from planner.nc.lexer import NUMBER, Words, split_words
+from planner.nc.lexer import NUMBER, Words, split_words, without_leader
 from planner.nc.program import FEED_MOVES, Program, extruder_alone
 
 SIGNIFICANT = 4  # digits of a feed

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from planner.base.errors import InputError
-from planner.nc.cycles import CLEARANCE, Hole, steps
+from planner.nc.drilling import CLEARANCE, Hole, steps
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
-from planner.nc.thread_cycle import Thread, depths, passes
+from planner.nc.threads import Thread, depths, passes
 
 HEAD = "G21 G90 G98 F100 S60 M3\nG0 X0 Y0 Z10\n"
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from planner.nc.lathe_thread import LatheThread, ThreadFault, lathe_depths, thread_passes
+from planner.nc.lathe_cuts import LatheThread, ThreadFault, lathe_depths, thread_passes
 from planner.nc.turning import (
     Contour,
     ContourFault,

@@ -24,8 +24,7 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault, Notes
-from planner.nc.hpgl.arcs import circle_through
-from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point
+from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point, circle_through
 from planner.nc.hpgl.instructions import ALLOWED, CHANGING, FORMS, IGNORED, PAGE_ENDS, REFUSED, WITH_NUMBERS
 from planner.nc.hpgl.lexer import Instruction, instructions
 from planner.nc.hpgl.scaling import Scaling, ScalingError

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from planner.nc.language.frame_parts import turned
+from planner.nc.language.coordinates import turned
 from planner.nc.language.making import Making, Row
 
 AXES = "XYZ"

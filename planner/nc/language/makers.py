@@ -14,8 +14,7 @@ from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
-from planner.nc.language.making import Maker, Making, Row
-from planner.nc.language.said import ASSUMED
+from planner.nc.language.making import ASSUMED, Maker, Making, Row
 from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import at_place, in_plane
 from planner.nc.program import Kind

@@ -18,10 +18,9 @@ from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
-from planner.nc.language.fault_places import last_statement, statement_of
 from planner.nc.language.making import Making
 from planner.nc.language.rows import AppendedRows, NotFinite
-from planner.nc.language.stops import Endless, TooDeep, sentence
+from planner.nc.language.stops import Endless, TooDeep, last_statement, sentence, statement_of
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import TravelRow, words_of
 from planner.nc.language.tree import Language, ProgramFault, SourcePlace

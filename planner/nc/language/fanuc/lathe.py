@@ -2,7 +2,7 @@
 
     G70             the profile P to Q, then back to where the tool was
     G71 G72 G73     roughing (nc/turning.py) of the profile P to Q; then the blocks of the profile are passed over
-    G76             thread of many passes (nc/lathe_thread.py)
+    G76             thread of many passes (nc/lathe_cuts.py)
 
 Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q R), and one, G71 P Q U W I
 K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least increments (0.001 mm, 0.0001 inch) where they have no point.

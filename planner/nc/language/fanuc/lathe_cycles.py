@@ -15,8 +15,16 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc.faults import Notes
 from planner.nc.language.tree import SourcePlace
-from planner.nc.lathe_cuts import Pecking, pecked, single_cut, single_thread
-from planner.nc.lathe_thread import LatheThread, Pass, ThreadFault, thread_passes
+from planner.nc.lathe_cuts import (
+    LatheThread,
+    Pass,
+    Pecking,
+    ThreadFault,
+    pecked,
+    single_cut,
+    single_thread,
+    thread_passes,
+)
 from planner.nc.lexer import Words as LexedWords
 from planner.nc.program import Kind, Program
 from planner.nc.state import State

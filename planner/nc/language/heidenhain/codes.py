@@ -9,7 +9,7 @@ from planner.nc.codes import M_GROUP
 from planner.nc.language.heidenhain.definitions import Definitions
 from planner.nc.language.heidenhain.items import Items, items, looked_up
 from planner.nc.language.heidenhain.text import ConversationalBlock
-from planner.nc.language.said import assumed_row
+from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, Statement, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language.heidenhain import contour, cycles, drilling, patterns
+from planner.nc.language.heidenhain import contour, cycles, drilling
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.items import looked_up
 from planner.nc.language.heidenhain.moves import Moves
@@ -147,9 +147,9 @@ class Definitions(Flow):
             if int(entry.group(1)) in _REFUSED and number != ZERO:
                 raise block.fault(_REFUSED[int(entry.group(1))], column + entry.start())
             given.append((self._q(block, int(entry.group(1))), number))
-        if cycle in patterns.PATTERNS:
+        if cycle in drilling.PATTERNS:
             called = [*self._call_cycle(block), looked_up(block)]
-            return [assign(block.place, *given), *patterns.pattern(block, cycle, called)]
+            return [assign(block.place, *given), *drilling.pattern(block, cycle, called)]
         return [assign(block.place, *given, (own("cycle"), Number(float(cycle))))]
 
     def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
@@ -205,7 +205,7 @@ class Definitions(Flow):
         return [keep, made(block.place, f"cycle {cycle}", **given), back, looked_up(block)]
 
 
-READ = (*drilling.CYCLES, *cycles.PARAMETERS, *patterns.PATTERNS)
+READ = (*drilling.CYCLES, *cycles.PARAMETERS, *drilling.PATTERNS)
 _FEEDS = (206, 207, 208, 385)  # Q parameters, in tenths of an inch per minute in inch programs
 # Q parameters that are read where they are 0 only.
 _REFUSED = {

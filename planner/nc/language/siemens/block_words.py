@@ -12,7 +12,7 @@ import re
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.said import assumed_row
+from planner.nc.language.making import assumed_row
 from planner.nc.language.siemens import codes, cycles, drilling
 from planner.nc.language.siemens.calls import Calls
 from planner.nc.language.siemens.text import LineTokens, position

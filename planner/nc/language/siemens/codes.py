@@ -30,7 +30,7 @@ IDLE = frozenset((
 ))  # fmt: skip
 # The same with arguments or a value behind them.
 IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "LIMS"))
-# Commands and words that are not followed and may change geometry or time: what is said of them (said.py).
+# Commands and words that are not followed and may change geometry or time: what is said of them (making.py).
 SAID = {
     **dict.fromkeys(("BRISK", "DRIVE"), "acceleration"),
     **dict.fromkeys(("CFC", "CFIN"), "tool centre feed"),

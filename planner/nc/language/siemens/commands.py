@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from planner.nc.language.frames import ADDED, SIEMENS
-from planner.nc.language.siemens import codes, cycles, drilling, patterns
+from planner.nc.language.siemens import codes, cycles, drilling
 from planner.nc.language.siemens.control import SiemensControl
 from planner.nc.language.siemens.text import LineTokens, position, variable
 from planner.nc.language.tree import ZERO, Expression, Message, Number, Statement, assign, made, row
@@ -89,7 +89,7 @@ class Commands(SiemensControl):
             raise reader.fault(f"{name} stands behind MCALL with a drilling cycle, which it repeats", 0)
         given = self._arguments(reader)
         try:
-            self.body += patterns.pattern_rows(reader.place, name, given, self.cycle)
+            self.body += drilling.pattern_rows(reader.place, name, given, self.cycle)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
 

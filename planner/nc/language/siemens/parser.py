@@ -22,7 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.nc.language.frames import SIEMENS
-from planner.nc.language.siemens import codes, patterns
+from planner.nc.language.siemens import codes, drilling
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
@@ -179,7 +179,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], None]] = {
     **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
     **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),
     "MCALL": SiemensParser._modal_call,
-    **dict.fromkeys(patterns.ARGUMENTS, SiemensParser._pattern),
+    **dict.fromkeys(drilling.PATTERNS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
     **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
     **dict.fromkeys(codes.TOOL_POINT, SiemensParser._tool_point),

@@ -5,16 +5,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import TypeVar, overload
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.nc.program import Event
 
+One = TypeVar("One")
+
+
+class MadeWhenAsked(Sequence[One]):
+    """A sequence whose members are made when they are looked at."""
+
+    def made(self, index: int) -> One:
+        """The member of that number. Raises IndexError."""
+        raise NotImplementedError
+
+    @overload
+    def __getitem__(self, index: int) -> One: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[One]: ...
+    def __getitem__(self, index: int | slice) -> One | Sequence[One]:
+        if isinstance(index, slice):
+            return tuple(self.made(k) for k in range(*index.indices(len(self))))
+        return self.made(index)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class EventTable(Sequence[Event]):
+class EventTable(MadeWhenAsked[Event]):
     """E events.
 
     block  : (E,) the block before which it happens
@@ -38,13 +57,8 @@ class EventTable(Sequence[Event]):
     def __len__(self) -> int:
         return len(self.block)
 
-    @overload
-    def __getitem__(self, index: int) -> Event: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Event]: ...
-    def __getitem__(self, index: int | slice) -> Event | Sequence[Event]:
-        if isinstance(index, slice):
-            return tuple(self[k] for k in range(*index.indices(len(self))))
+    def made(self, index: int) -> Event:
+        """The event of that number."""
         text = f"{chr(self.letter[index])}{plain(float(self.value[index]))}"
         return Event(block=int(self.block[index]), line=int(self.line[index]), text=text)
 

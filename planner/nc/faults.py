@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 from planner.base.errors import InputError
+from planner.nc.events import MadeWhenAsked
 from planner.nc.lexer import Words
 
 
@@ -30,8 +31,8 @@ class Fault:
         return f"{self.word}: {self.message}" if self.word else self.message
 
 
-class FaultList(Sequence[Fault]):
-    """Faults by word; a `Fault` is made when it is looked at (a rotary program has 220,000)."""
+class FaultList(MadeWhenAsked[Fault]):
+    """Faults by word (a rotary program has 220,000)."""
 
     def __init__(self, found: list[tuple[Words, int, str]]):
         self._found = found
@@ -39,13 +40,8 @@ class FaultList(Sequence[Fault]):
     def __len__(self) -> int:
         return len(self._found)
 
-    @overload
-    def __getitem__(self, index: int) -> Fault: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Fault]: ...
-    def __getitem__(self, index: int | slice) -> Fault | Sequence[Fault]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
+    def made(self, index: int) -> Fault:
+        """The fault of that number."""
         words, word, message = self._found[index]
         line = int(words.line[words.row(word)])
         return Fault(line, words.column(word), words.text(word), message, words.file(word))

@@ -94,21 +94,13 @@ class Interpreter:
 
     @property
     def state(self) -> State:
-        """What is in force, and where the axes are; another one may be put in its place for a while."""
+        """What is in force, and where the axes are."""
         return self.mover.state
-
-    @state.setter
-    def state(self, state: State) -> None:
-        self.mover.state = state
 
     @property
     def store(self) -> Store:
-        """The blocks so far; another one may be put in its place for a while."""
+        """The blocks so far."""
         return self.mover.store
-
-    @store.setter
-    def store(self, store: Store) -> None:
-        self.mover.store = store
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
@@ -122,8 +114,7 @@ class Interpreter:
 
     def go_on_with(self, state: State, store: Store) -> None:
         """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
-        self.state = self.mover.state = state
-        self.store = self.mover.store = store
+        self.mover.state, self.mover.store = state, store
 
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""
@@ -158,7 +149,7 @@ class Interpreter:
             if after < rows:
                 self.by_word += 1
                 self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.report, self.assumed)
+                block = read_block(words, after, self.found.report, self.assumed)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -181,7 +172,7 @@ class Interpreter:
         row = self._read
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
-            self.note(f"the program ends; what follows from line {after} on is not read", end)
+            self.found.note(f"the program ends; what follows from line {after} on is not read", end)
 
     @property
     def feed_factors(self) -> list[tuple[int, float]]:
@@ -202,18 +193,6 @@ class Interpreter:
         lines = {arc.line for arc in self.open_arcs if arc.centred}
         return len(lines) > 1 and all(arc.otherwise for arc in self.open_arcs)
 
-    def report(self, word: int, message: str) -> None:
-        """Keep a fault of a word of the chunk, by its index."""
-        self.found.report(word, message)
-
-    def note(self, text: str, line: int) -> None:
-        """Keep what a user should know of a line."""
-        self.found.note(text, line)
-
-    def assume(self, text: str, line: int) -> None:
-        """Keep what was assumed on a line and may change geometry or time; what is strict does not come by."""
-        self.found.assume(text, line)
-
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
         return FaultList(self.found.faults + self.mover.splines.faults())
@@ -226,7 +205,7 @@ class Interpreter:
         self._units_known = True
         line = int(self.store.block.line[moves.argmax()])
         if self.setup.inch:
-            self.note("no G20 or G21 before the first move: inches, as the machine file says", line)
+            self.found.note("no G20 or G21 before the first move: inches, as the machine file says", line)
             return
         row = int((self._words.line == line).argmax())
         self.found.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
@@ -240,7 +219,7 @@ class Interpreter:
         if len(slow) and not self._timed:
             at = feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
-            self.assume(text, int(self.store.block.line[slow[0]]))
+            self.found.assume(text, int(self.store.block.line[slow[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -251,10 +230,10 @@ class Interpreter:
                 centred = any(block.value.get(letter) for letter in "IJK")
                 self.open_arcs.append(OpenArc(block.line, fault.otherwise, centred))
                 message += f"; {_IF_LATHE}" if self.two_axes else ""
-            self.report(fault.word, message)
+            self.found.report(fault.word, message)
             return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
-            self.report(min(block.at.values()), str(fault))
+            self.found.report(min(block.at.values()), str(fault))
             self.mover.cutter = self.state.actual = None  # what follows is read without compensation
             return block.m.get("stopping") in (20, 300)
 
@@ -332,7 +311,7 @@ class Interpreter:
             return
         motion = block.g.get("motion")
         if code in (280, 300) and motion == 0 and not self.state.strict:
-            self.note(
+            self.found.note(
                 f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
             )
         elif code in COVET_AXES and motion is not None:
@@ -358,4 +337,4 @@ class Interpreter:
                 letter, block.value[letter], absolute=self.state.absolute
             ):
                 self.assumed.moved.add(letter)
-                self.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
+                self.found.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))

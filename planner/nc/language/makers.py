@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -34,25 +35,36 @@ def _oversize(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 def _approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """APPR of a kind (index in KINDS), with X Y Z of the first contour point, LEN, R, CCA, F and side."""
-    unit, first = making.unit, np.array(making.here())
-    for axis, letter in enumerate("XYZ"):
-        first[axis] = given.get(letter, first[axis])
-    found = Approach(
-        kind=KINDS[round(given["kind"])],
-        line=making.line,
-        at=making.at,
-        frame=making.frame,
-        length=given.get("LEN", 0.0) * unit,
-        radius=given.get("R", 0.0) * unit,
-        angle=given.get("CCA", 0.0),
-        feed=given.get("F"),
-        first=first * unit,
-        side=round(given["side"]) or -1,
-        compensated=given["side"] != 0.0,
-    )
+    side = round(given["side"])
+    first = _target(making, given) * making.unit
+    found = Approach(**_way(making, given), first=first, side=side or -1, compensated=side != 0)
     found.check("APPR")
     making.travel.approach(found, making.assume)
     return []
+
+
+def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """DEP of a kind (index in KINDS), with X Y Z, LEN, R, CCA and F."""
+    found = Departure(**_way(making, given), end=_target(making, given) * making.unit, raised="Z" in given)
+    found.check("DEP")
+    if found.kind == "LCT" and not {"X", "Y"} & set(given):
+        raise ValueError("DEP LCT needs its end as X and Y")
+    making.travel.depart(found)
+    return []
+
+
+def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
+    """What APPR and DEP have in common."""
+    return {
+        "kind": KINDS[round(given["kind"])],
+        "line": making.line,
+        "at": making.at,
+        "frame": making.frame,
+        "length": given.get("LEN", 0.0) * making.unit,
+        "radius": given.get("R", 0.0) * making.unit,
+        "angle": given.get("CCA", 0.0),
+        "feed": given.get("F"),
+    }
 
 
 def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
@@ -150,30 +162,6 @@ def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
-
-
-def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """DEP of a kind (index in KINDS), with X Y Z, LEN, R, CCA and F."""
-    unit, end = making.unit, np.array(making.here())
-    for axis, letter in enumerate("XYZ"):
-        end[axis] = given.get(letter, end[axis])
-    found = Departure(
-        kind=KINDS[round(given["kind"])],
-        line=making.line,
-        at=making.at,
-        frame=making.frame,
-        length=given.get("LEN", 0.0) * unit,
-        radius=given.get("R", 0.0) * unit,
-        angle=given.get("CCA", 0.0),
-        feed=given.get("F"),
-        end=end * unit,
-        raised="Z" in given,
-    )
-    found.check("DEP")
-    if found.kind == "LCT" and not {"X", "Y"} & set(given):
-        raise ValueError("DEP LCT needs its end as X and Y")
-    making.travel.depart(found)
-    return []
 
 
 def keep(making: Making, given: Mapping[str, float]) -> Iterable[Row]:

@@ -77,7 +77,7 @@ class Making:
         """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
         if self.interpreter.found.strict:
             raise ValueError(f"{text} (assumed without --strict)")
-        self.interpreter.assume(text, self.line)
+        self.interpreter.found.assume(text, self.line)
 
 
 def equal_steps(whole: float, most: float) -> int:

@@ -138,6 +138,11 @@ class Source:
         )
         return PlainRows(place, self.first_row + first, self.first_row + last, may_end)
 
+    def part(self, rows: PlainRows, first: int, last: int) -> PlainRows:
+        """The rows `first` to `last` - 1 of some."""
+        may_end = rows.may_end and last == rows.last
+        return self._run(first - self.first_row, last - self.first_row, may_end=may_end)
+
     def fault(self, fault: ProgramFault, name: str = "") -> Fault:
         """A fault of this file as the reader reports it."""
         data, at = self.words.data, fault.place.at - self.begin

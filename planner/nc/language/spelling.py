@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language.expression_reader import ExpressionReader
+from planner.nc.language.source import SourceLine
 from planner.nc.language.tree import (
     Assignments,
     Exists,
@@ -24,6 +25,7 @@ from planner.nc.language.tree import (
     Number,
     Numbered,
     Parameter,
+    ProgramFault,
     Word,
     op,
 )
@@ -39,14 +41,6 @@ LINE = Named("_line", True)  # LinuxCNC's name for the number of the line, which
 _IN_LINES = "; write the expression in several lines"
 
 
-class Unspelled(Exception):
-    """What cannot be read, and where in the line's text."""
-
-    def __init__(self, column: int, message: str):
-        super().__init__(message)
-        self.column, self.message = column, message
-
-
 @dataclass(frozen=True)
 class Spelling:
     """functions : names of functions of one value;  ranks : operators with their rank, the highest first applied
@@ -60,21 +54,16 @@ class Spelling:
 
 
 class LineReader(ExpressionReader):
-    """Reads one line from left to right. `text` starts at byte `start` of the source; `at` counts its characters without blanks and
-    comments.
-    """
+    """Reads one line from left to right; `at` counts its characters without blanks and comments."""
 
-    def __init__(self, text: str, start: int, spelling: Spelling, line: int):
-        self.start, self.spelling, self.line = start, spelling, line
-        self.ranks = spelling.ranks
+    def __init__(self, line: SourceLine, spelling: Spelling):
+        self.line, self.spelling, self.ranks = line, spelling, spelling.ranks
         self.at = 0
         self.comments: list[str] = []
         self.places: list[int] | None = None  # of the characters that are left, in `text`
-        self.text = (
-            text
-            if _BLANK.search(text) is None and "(" not in text and ";" not in text
-            else self._cleaned(text)
-        )
+        text = line.text
+        plain = _BLANK.search(text) is None and "(" not in text and ";" not in text
+        self.text = text if plain else self._cleaned(text)
 
     def _cleaned(self, text: str) -> str:
         """The text without blanks and comments; comments are kept."""
@@ -88,11 +77,11 @@ class LineReader(ExpressionReader):
             if c == "(":
                 close = text.find(")", at)
                 if close < 0:
-                    raise Unspelled(at, "the comment is not closed on its line; write )")
+                    raise self._fault(at, "the comment is not closed on its line; write )")
                 inner = text[at + 1 : close]
                 if "(" in inner:
                     message = "a comment inside a comment is not allowed; remove the inner parenthesis"
-                    raise Unspelled(at + 1 + inner.index("("), message)
+                    raise self._fault(at + 1 + inner.index("("), message)
                 self.comments.append(inner)
                 at = close
             elif c not in " \t\r\x1a":
@@ -107,9 +96,12 @@ class LineReader(ExpressionReader):
             return at
         return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
-    def refused(self, message: str, at: int | None = None) -> Unspelled:
+    def refused(self, message: str, at: int | None = None) -> ProgramFault:
         """What to raise about the character at `at`, or the next one."""
-        return Unspelled(self.column(self.at if at is None else at), message)
+        return self._fault(self.column(self.at if at is None else at), message)
+
+    def _fault(self, column: int, message: str) -> ProgramFault:
+        return ProgramFault(self.line.place._replace(at=self.line.start + column), message)
 
     @property
     def ended(self) -> bool:
@@ -173,7 +165,7 @@ class LineReader(ExpressionReader):
             return operand if c == "+" else -operand
         if c == "#":
             parameter = self.parameter()
-            return Number(float(self.line)) if parameter == LINE else parameter
+            return Number(float(self.line.place.line)) if parameter == LINE else parameter
         if c == "[":
             return self.bracket()
         number = self.number()
@@ -252,7 +244,7 @@ class LineReader(ExpressionReader):
                     and "." not in self.text[at : self.at]
                 ):
                     value = Number(value.value * scale)
-                words.append(Word(letter, self.start + self.column(at), value))
+                words.append(Word(letter, self.line.start + self.column(at), value))
             else:
                 raise self.refused(f"{c!r} starts neither a word nor an assignment", at)
         return tuple(words), tuple(assignments)

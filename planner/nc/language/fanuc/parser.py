@@ -20,7 +20,7 @@ from planner.nc.language.fanuc import calls
 from planner.nc.language.fanuc.control import FanucControl
 from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import LineReader, Unspelled
+from planner.nc.language.spelling import LineReader
 from planner.nc.language.tree import (
     Call,
     Expression,
@@ -80,9 +80,6 @@ class FanucParser(FanucControl):
                     self._plain(item)
                 else:
                     self._line(item)
-            except Unspelled as fault:
-                place = item.place._replace(at=item.start + fault.column)  # type: ignore[union-attr]
-                self.faults.append(ProgramFault(place, fault.message))
             except ProgramFault as fault:
                 self.faults.append(fault)
         self._end_of_program()
@@ -129,26 +126,18 @@ class FanucParser(FanucControl):
             number = int(words.value[span.start]) if len(letters) and letters[0] == ord("N") else None
             used = number is not None and (self.targets is None or number in self.targets)
             if used and row > begin:
-                self.body.append(self._part(rows, begin, row))
+                self.body.append(self.source.part(rows, begin, row))
                 begin = row
             if used and number is not None:
                 self.body.append(Label(rows.place, number))
             if self.modal is not None and any(chr(c) in "XYZ" for c in letters):
-                self.body += [self._part(rows, begin, row + 1), self.modal]
+                self.body += [self.source.part(rows, begin, row + 1), self.modal]
                 begin = row + 1
         if begin < rows.last:
-            self.body.append(self._part(rows, begin, rows.last))
-
-    def _part(self, rows: PlainRows, first: int, last: int) -> PlainRows:
-        row = first - self.source.first_row
-        words = self.source.words
-        place = SourcePlace(
-            self.source.file, int(words.line[row]), self.source.begin + int(words.at[words.first[row]])
-        )
-        return PlainRows(place, first, last, rows.may_end and last == rows.last)
+            self.body.append(self.source.part(rows, begin, rows.last))
 
     def _line(self, line: SourceLine) -> None:
-        reader = LineReader(line.text, line.start, SPELLING, line.place.line)
+        reader = LineReader(line, SPELLING)
         if reader.take("/"):
             reader.number() if reader.peek().isdigit() else None
         program = _PROGRAM.match(reader.text, reader.at)

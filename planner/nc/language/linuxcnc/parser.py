@@ -19,7 +19,7 @@ import re
 from planner.nc.language.linuxcnc.control import KEYWORDS, LinuxcncControl, end_of
 from planner.nc.language.linuxcnc.text import ARGUMENTS_MAX, LANGUAGE, SPELLING
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import LineReader, Unspelled
+from planner.nc.language.spelling import LineReader
 from planner.nc.language.tree import (
     Call,
     Expression,
@@ -59,9 +59,6 @@ class LinuxcncParser(LinuxcncControl):
                 continue
             try:
                 self._line(item)
-            except Unspelled as fault:
-                place = item.place._replace(at=item.start + fault.column)
-                self.faults.append(ProgramFault(place, fault.message))
             except ProgramFault as fault:
                 self.faults.append(fault)
         for left in self.open[:1] if not self.faults else ():
@@ -82,7 +79,7 @@ class LinuxcncParser(LinuxcncControl):
         self.ended |= in_main and rows.may_end and self.source.has_end(rows)
 
     def _line(self, line: SourceLine) -> None:
-        reader = LineReader(line.text, line.start, SPELLING, line.place.line)
+        reader = LineReader(line, SPELLING)
         reader.take("/")
         if reader.peek() in "oO" and not reader.ended:
             self._o_word(reader, line)

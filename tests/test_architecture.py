@@ -40,7 +40,6 @@ LAYERS = (
     "planner.machine_import",
     "planner.constraints",
     "planner.nc",
-    "planner.kinematics.tip_path",
     "planner.geometry",
     "planner.corners",
     "planner.smoothing",

@@ -7,8 +7,8 @@ import pytest
 
 import planner
 from planner.base.errors import InputError
+from planner.interactive.tip_path import tip_path
 from planner.kinematics import at_tip, kinematics_of
-from planner.kinematics.tip_path import tip_path
 from tests.kinematics.five_axis import table_machine
 
 MACHINE = table_machine(tool_length=60.0)

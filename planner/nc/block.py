@@ -1,53 +1,22 @@
-"""One row of words as a block: its codes by modal group and its other words by letter, checked against each
-other.
-
-Checked here is what a line may hold at all: codes that are known, one code per modal group, a letter once,
-words that some code of the line uses, N at its start. What the words mean in the state of the program is the
-interpreter's business.
-"""
+"""A line of a program: its codes by modal group, and its other words by letter."""
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from planner.nc import codes
-from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
-from planner.nc.commands import MESSAGE, command, homed
-from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
-from planner.nc.settings import (
-    ALWAYS_READ,
-    EVERYTHING,
-    EXTRUDER_MODES,
-    TEXTS,
-    TOOL_POINT_OFF,
-    TOOL_POINT_ON,
-    Setting,
-    setting,
-)
+from planner.nc.settings import Setting
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
 NUMBER_MAX = 1e9
-CODE_MAX = 1e4  # larger G and M numbers are all unknown
-_CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
-_ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
-
-_TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
-
-Report = Callable[[int, str], None]
-
-_BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
-NAME_SHOWN = 20  # characters of a name in a note
-PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is done with them")
-PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
 OFFSET_NUMBER = codes.Assumption(
     "number of an offset (D, H) without a code that uses it",
     "numbers of offsets (D, H) without a code that uses them",
     "left out",
 )
+Report = Callable[[int, str], None]
 
 
 @dataclass(slots=True)
@@ -101,208 +70,8 @@ class Block:
         return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
 
-def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Block | None:
-    """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the row cannot be read as a
-    whole, or holds nothing."""
-    block = Block(line=int(words.line[row]))
-    first, last = int(words.first[row]), int(words.first[row + 1])
-    owned = ""  # letters that belong to a setting
-    for word in range(first, last):
-        code, value = int(words.letter[word]), float(words.value[word])
-        if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
-            if block.settings:
-                block.settings[-1].values.update(_bare_words(words, word))
-            break
-        if code == FAULT:
-            if homed(words, word, block, assumed) or command(words, word, block, report, assumed):
-                break
-            report(word, _unreadable(words, word))
-            return None
-        letter = chr(code)
-        if letter == "%":
-            name = words.rest(word).partition("(")[0].partition(";")[0].strip()
-            if word > first or (name and assumed.strict):
-                report(word, "a % stands alone on its line: it starts and ends a program")
-                return None
-            if name:
-                assumed.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
-            block.ended = True
-        elif letter == "O":
-            if not _program_number(words, word, last, block, report, assumed):
-                return None
-        elif letter == "N":
-            if word > first:
-                report(word, "a line number comes first on its line, once")
-                return None
-        elif letter in "GM":
-            owned = ""
-            taken = None
-            if value * 10.0 not in ALWAYS_READ[letter] or assumed.reading.ignore:
-                taken = _settle(words, word, (first, last), block, assumed)
-            if taken is not None:
-                owned = taken
-            else:
-                block.partial |= _add_code(block, letter, value, word, report, assumed)
-        elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
-            if letter in owned and block.settings:
-                block.settings[-1].values[letter.lower()] = value
-        elif assumed.treatment[code] == REFUSED and letter != "E":
-            report(word, str(codes.LETTERS_REFUSED[letter]))
-            block.partial = True
-        elif letter in block.value and (assumed.strict or block.value[letter] != value):
-            report(word, f"a second {letter} word on this line; write one")
-            return None
-        elif abs(value) > NUMBER_MAX:
-            report(word, f"the number is too large; at most {NUMBER_MAX:g} is allowed")
-            return None
-        else:
-            block.value[letter], block.at[letter] = value, word
-    if not block.partial:
-        _check_used(words, block, report, assumed)
-    return block
-
-
-def _program_number(
-    words: Words, word: int, last: int, block: Block, report: Report, assumed: Assumed
-) -> bool:
-    """Keep the number of a program as an event; False, after a report, for another O word."""
-    number = float(words.value[word])
-    statement = number < 0 or (words.letter[word:last] == FAULT).any()
-    if statement or assumed.strict or number > NUMBER_MAX:
-        report(word, str(codes.LETTERS_REFUSED["O"]))
-        return False
-    assumed.count(PROGRAM_NUMBER, words.text(word), block.line)
-    block.events.append(("O", number))
-    return True
-
-
-def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed: Assumed) -> str | None:
-    """Keep a code that moves nothing, or that the user knows to be harmless, as an event.
-
-    Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is to be read.
-    """
-    letter, value = chr(words.letter[word]), float(words.value[word])
-    code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
-    if abs(value * 10.0 - code) > 10.0 * _CODE_ROUNDING:
-        return None
-    name = f"{letter}{codes.number(code)}"
-    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
-    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
-    if assumed.ignores(name):
-        assumed.count(LEFT_OUT_BY_USER, name, block.line)
-        block.events.append((letter, code / 10))
-        block.partial = True
-        block.foreign |= letter == "G"
-        alone = letter == "M" and code not in codes.M_GROUP and not before
-        return found.own if found else EVERYTHING if alone else ""
-    if assumed.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
-        block.tool_point, block.at["tool point"] = code // 10, word
-        block.events.append((letter, code / 10))
-        return ""
-    if found is None or assumed.strict:
-        return None
-    if found.what is None:
-        block.settings.append(Setting(name, {}, word))
-    else:
-        assumed.count(found.what, words.text(word), block.line)
-    assumed.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
-    block.events.append((letter, code / 10))
-    block.stops |= found.stops
-    return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
-
-
-def _bare_words(words: Words, word: int) -> dict[str, float]:
-    """The letters of a line from one without a number on, NaN where they have none."""
-    text = words.data[int(words.at[word]) :].partition(b"\n")[0].partition(b";")[0].decode("latin-1").lower()
-    return {letter: float(number) if number else math.nan for letter, number in _BARE_WORD.findall(text)}
-
-
-def _letters(words: Words, first: int, last: int) -> str:
-    return bytes(words.letter[first:last]).decode("latin-1")
-
-
-def _behind(words: Words, word: int, last: int) -> str:
-    """The letters from a word on, up to the next code."""
-    return re.split("[GM]", _letters(words, word, last), maxsplit=1)[0]
-
-
-def _add_code(block: Block, letter: str, value: float, word: int, report: Report, assumed: Assumed) -> bool:
-    """Put a G or M code into its group; True if it was reported instead."""
-    code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
-    known, refused = (codes.G_GROUP, codes.G_REFUSED) if letter == "G" else (codes.M_GROUP, codes.M_REFUSED)
-    exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
-    if not exact or code not in known:
-        refusal = refused.get(code) if exact else None
-        refusal = refusal or codes.unknown(letter, code, strict=assumed.strict or not exact)
-        report(word, str(refusal))
-        block.foreign |= refusal.takes_axes
-        block.refused_motion |= refusal.takes_axes and 330 <= code <= 890
-        return True
-    group, groups = known[code], block.g if letter == "G" else block.m
-    if groups.get(group) == code and not assumed.strict:  # said twice
-        return False
-    if group in groups:
-        report(
-            word,
-            f"{letter}{codes.number(groups[group])} and {letter}{codes.number(code)} on one line are of the same "
-            f"group ({group}); write one of them, or two lines",
-        )
-        return True
-    groups[group] = code
-    block.at[group] = word
-    return False
-
-
-def _check_used(words: Words, block: Block, report: Report, assumed: Assumed) -> None:
-    """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no motion code, the one in force
-    may use them: the interpreter looks."""
-    named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
-    block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
-    in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
-    if "E" in block.own:
-        assumed.used("E")
-    for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
-        if letter in "DH" and not assumed.strict:
-            assumed.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
-        elif assumed.treatment[ord(letter)] != LEFT_OUT:
-            report(block.at[letter], unused(letter))
-        del block.value[letter]
-
-
 def unused(letter: str) -> str:
     """What is said of a word that no code of its block uses."""
     if letter in codes.LETTERS_REFUSED:
         return str(codes.LETTERS_REFUSED[letter])
     return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
-
-
-def _unreadable(words: Words, word: int) -> str:
-    kind = Unreadable(int(words.value[word]))
-    if kind is Unreadable.LONG:
-        return (
-            f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?"
-        )
-    if kind is Unreadable.COMMENT_OPEN:
-        return "the comment is not closed on its line; write )"
-    if kind is Unreadable.COMMENT_NESTED:
-        return "a comment inside a comment is not allowed; remove the inner parenthesis"
-    if kind is Unreadable.NUMBER:
-        return _no_number(words, word)
-    return _character(words.text(word))
-
-
-def _no_number(words: Words, word: int) -> str:
-    after = words.data[int(words.at[word]) + len(words.text(word)) :].lstrip(b" \t")[:1].decode("latin-1")
-    if after in codes.CHARACTERS and after not in ")/":
-        return codes.CHARACTERS[after]
-    return "a letter without a number; write digits after it, such as X1.5"
-
-
-def _character(character: str) -> str:
-    if character.isdigit() or character in "+-.":
-        return "a number without a letter before it; a word is a letter and one number"
-    if character.isprintable():
-        return codes.CHARACTERS.get(
-            character, "this character starts no word; a word is a letter and a number"
-        )
-    return f"character {ord(character)} is not part of a text; is this a binary file?"

@@ -7,15 +7,12 @@ and said so. Everything else that starts with $ may move ($J jogs) and is refuse
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
+from planner.nc.assumed import Assumed
+from planner.nc.block import Block, Report
 from planner.nc.codes import Assumption
 from planner.nc.lexer import Words
 from planner.nc.settings import GRBL, VELOCITY_LIMIT, Setting
-
-if TYPE_CHECKING:
-    from planner.nc.assumed import Assumed
-    from planner.nc.block import Block, Report
 
 MESSAGE = "message"  # the rest of the line is text
 

@@ -22,7 +22,8 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
 from planner.nc.assumed import Assumed
-from planner.nc.block import Block, read_block
+from planner.nc.block import Block
+from planner.nc.block_reader import read_block
 from planner.nc.cutter import CutterFault
 from planner.nc.dwell_times import DwellWords
 from planner.nc.faults import FaultList, Findings, Notes

@@ -16,20 +16,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.machine import Machine
+from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.program import MOVES, SetLimit
 from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
-
-if TYPE_CHECKING:
-    from planner.machine import Machine
-    from planner.nc.faults import Findings
-    from planner.nc.state import State
-    from planner.nc.store import Store
+from planner.nc.state import State
+from planner.nc.store import Store
 
 SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", "M201", "M204"
 # From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x and y are above 17 mm/s.

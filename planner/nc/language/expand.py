@@ -17,6 +17,7 @@ from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
 from planner.nc.language.fanuc.calls import fanuc_files
 from planner.nc.language.fanuc.lathe import LatheParser
+from planner.nc.language.fanuc.lathe_cycles import LatheCycles
 from planner.nc.language.fanuc.lathe_words import LatheAsked
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
@@ -58,6 +59,7 @@ def expand(
     front = _FRONTS[dialect]
     run = ProgramRun(interpreter, rows, front.language, front.asked(interpreter))
     run.tee = tee or run.tee
+    run.lathe = LatheCycles(run) if dialect == LATHE else None
     files = _Files(run, rows, front, integers)
     found = files.read(words, interpreter.source)
     if not found:

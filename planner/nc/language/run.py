@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
@@ -37,10 +37,17 @@ IDLE_AT_ONCE = SIZES.idle_rows
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
 
-if TYPE_CHECKING:
-    from planner.nc.language.fanuc.lathe_cycles import LatheCycles
-
 Load = Callable[[str], bool]
+
+
+class Cycles(Protocol):
+    """Cycles of lathes, which read a profile aside."""
+
+    def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
+        """Do a part of a cycle (tree.Turning)."""
+
+    def leave(self) -> SourcePlace | None:
+        """Give up a profile that was not read to its end; the place of its cycle, or None for no such profile."""
 
 
 class Ended(Exception):
@@ -52,6 +59,7 @@ class ProgramRun:
 
     numbered : values of the numbered parameters, by number
     shared   : values of the named parameters that all calls share
+    lathe    : its cycles of a lathe
     resume   : the label where the caller of a procedure goes on, or None
     """
 
@@ -79,7 +87,7 @@ class ProgramRun:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
-        self._lathe: LatheCycles | None = None
+        self.lathe: Cycles | None = None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
         asked.travel = self.travel
@@ -87,7 +95,7 @@ class ProgramRun:
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
         stopped = self._run(main)
-        left = None if self._lathe is None else self._lathe.leave()
+        left = None if self.lathe is None else self.lathe.leave()
         if stopped is None and left is not None:
             return ProgramFault(
                 left, "the program ends inside the profile of this cycle; end it behind the cycles"
@@ -268,11 +276,8 @@ class ProgramRun:
 
     def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
         """Do a part of a lathe's cycle."""
-        if self._lathe is None:
-            from planner.nc.language.fanuc.lathe_cycles import LatheCycles  # 3 ms, for lathes
-
-            self._lathe = LatheCycles(self)
-        self._lathe.act(action, letters, place)
+        assert self.lathe is not None
+        self.lathe.act(action, letters, place)
 
     def made(self, maker: str, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
         """Execute the rows that a maker makes of values; each row a list of letters and numbers."""

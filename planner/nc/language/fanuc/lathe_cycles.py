@@ -8,12 +8,12 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.faults import Notes
+from planner.nc.language.run import ProgramRun
 from planner.nc.language.tree import SourcePlace
 from planner.nc.lathe_cuts import (
     LatheThread,
@@ -39,9 +39,6 @@ from planner.nc.turning import (
     pattern_repeat,
     stock_removal,
 )
-
-if TYPE_CHECKING:
-    from planner.nc.language.run import ProgramRun
 
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"

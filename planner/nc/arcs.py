@@ -80,7 +80,7 @@ def arc_from_centre(
 
 
 def is_hardly_turned(arc: Arc) -> bool:
-    """Whether it turns so little that some controls make a full turn of it."""
+    """True if it turns so little that some controls make a full turn of it."""
     return abs(arc.sweep) <= FULL_TURN
 
 
@@ -122,7 +122,7 @@ def arc_from_radius(
 
 
 def closes(start: FloatArray, end: FloatArray, centre: FloatArray, *, normal: int, unit: float) -> bool:
-    """Whether start and end lie on one circle about the centre, (3,) each [mm]; the others as of `arc_from_centre`."""
+    """True if start and end lie on one circle about the centre, (3,) each [mm]; the others as of `arc_from_centre`."""
     return _not_closed(start, end, centre, normal, unit) is None
 
 

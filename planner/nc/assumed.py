@@ -1,4 +1,4 @@
-"""What a reader assumes about a program, counted and said once each: words that, as far as the program tells, move nothing.
+"""Assumptions about a program, counted and said once each: words that, as far as the program tells, move nothing.
 
     12 M codes that this reader does not know: assumed not to move anything; first M428 line 4
 
@@ -35,7 +35,7 @@ class _Counted:
 
 
 class Assumed:
-    """What was assumed so far in one program.
+    """Assumptions so far in one program.
 
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
@@ -83,11 +83,11 @@ class Assumed:
         found.times += times
 
     def ignores(self, name: str) -> bool:
-        """Whether the user said that a code or command is harmless."""
+        """True if the user said that a code or command is harmless."""
         return name in self.reading.ignore
 
     def may_stand(self, letter: str, value: float, *, absolute: bool) -> bool:
-        """Whether a word of an axis that is not planned leaves it where it is; its first word says where that is."""
+        """True if a word of an axis that is not planned leaves it where it is; its first word says where that is."""
         if not absolute:
             return value == 0.0
         code = ord(letter)

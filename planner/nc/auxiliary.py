@@ -1,4 +1,4 @@
-"""What a block says before it moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a control passes on; dwells;
+"""Words that act before a block moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a control passes on; dwells;
 path control. Outputs are events; an input that is waited for is refused.
 """
 

@@ -56,7 +56,7 @@ class Block:
     tool_point: int | None = None
 
     def has(self, letters: str) -> bool:
-        """Whether the block has a word with one of the letters."""
+        """True if the block has a word with one of the letters."""
         return any(letter in self.value for letter in letters)
 
     def first_of(self, letters: str) -> int:
@@ -71,7 +71,7 @@ class Block:
 
 
 def unused(letter: str) -> str:
-    """What is said of a word that no code of its block uses."""
+    """The message for a word that no code of its block uses."""
     if letter in codes.LETTERS_REFUSED:
         return str(codes.LETTERS_REFUSED[letter])
     return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"

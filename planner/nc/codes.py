@@ -1,4 +1,4 @@
-"""What G and M codes and letters are: which modal group they belong to, or why they are refused and what to
+"""Tables of G and M codes and letters: which modal group they belong to, or why they are refused and what to
 do instead.
 
 Codes are integers in tenths, as RS274NGC has them: G61.1 is 611. Two codes of one group on a line contradict

@@ -19,7 +19,7 @@ _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while
 
 
 def check_unchanged(state: State, block: Block) -> None:
-    """What must not change while compensation is on. Raises WordFault."""
+    """Raise WordFault for words that must not stand in a block while compensation is on."""
     for group in _REFUSED_GROUPS:
         code = block.g.get(group)
         if code is not None and not (group == "plane" and code == {2: 170, 1: 180, 0: 190}[state.normal]):

@@ -85,7 +85,7 @@ class Cutter:
 
     @property
     def started(self) -> bool:
-        """Whether the first move has been made."""
+        """True if the first move has been made."""
         return self._open is not None
 
     @property
@@ -231,7 +231,7 @@ class Cutter:
         self._open = _Open(side, row, arc, begin, sweep)
 
     def _left_out(self, side: OffsetMove, allowed_back: float) -> float:
-        """What the corner at the start of an arc takes off its sweep [rad]."""
+        """Angle that the corner at the start of an arc takes off its sweep [rad]."""
         assert self._state.actual is not None
         start = side.centre + side.radius * side.first / (1j * side.turning)
         left_out = _turn(start, self._plane(self._state.actual), side)

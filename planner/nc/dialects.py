@@ -91,7 +91,7 @@ def refuse_models(data: bytes, source: str) -> None:
 
 
 def is_plotter_file(data: bytes, source: str) -> bool:
-    """Whether a text is HPGL: by its content where that is clear, else by the suffix of its name."""
+    """True if a text is HPGL: by its content where that is clear, else by the suffix of its name."""
     head = data[:_LOOKED_AT]
     if _HPGL.match(head):
         return True

@@ -84,7 +84,7 @@ class CycleStep:
 
 
 def steps(hole: Hole) -> Iterator[CycleStep]:
-    """What is done from above the hole at R on."""
+    """The steps of a hole, from above it at R on."""
     a, b = hole.place
     down, up = CycleStep(Kind.LINE, (a, b, hole.bottom)), CycleStep(Kind.RAPID, (a, b, hole.retract))
     dwell, stop = CycleStep(Kind.DWELL, seconds=hole.dwell), CycleStep(None, spindle=5)
@@ -223,7 +223,7 @@ def _repeats(block: Block, hole: Hole) -> int:
 
 
 def _say(state: State, block: Block, found: Findings) -> None:
-    """What was assumed of a cycle."""
+    """Keep what is assumed of a cycle."""
     name, word = f"G{codes.number(state.motion)}", block.motion_word()
     if not state.retract_given:
         text = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"

@@ -1,4 +1,4 @@
-"""What a program holds that is not read: one record per place, in the order of the program."""
+"""Constructs of a program that are not read: one record per place, in the order of the program."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class Said(NamedTuple):
 
 
 class Notes(NamedTuple):
-    """What is said of a program: assumptions that may change geometry or time, and other notes."""
+    """Messages about a program: assumptions that may change geometry or time, and other notes."""
 
     assumptions: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
 
 
 class Findings:
-    """What is found while a program is read in chunks: faults by word, assumptions that may change geometry or time, and other notes.
+    """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or time, and other notes.
 
     strict : such assumptions are faults
     faults : of the chunks so far, in the order of their words; a line that is executed many times is named once
@@ -104,7 +104,7 @@ class Findings:
             self._notes.setdefault((True, text), [line, 0])[1] += 1
 
     def notes(self, more: Sequence[Said]) -> Notes:
-        """What was assumed, each once, with its first line and how often, and `more`; in the order of the lines."""
+        """Assumptions and notes, each once, with its first line and how often, and `more`; in the order of the lines."""
         found = [
             Said(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
             for (changes, text), (line, times) in self._notes.items()

@@ -1,4 +1,4 @@
-"""What F means, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one over minutes (G93).
+"""The meaning of F, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one over minutes (G93).
 
     G94    feed = F
     G95    feed = F S                 S in revolutions per minute
@@ -94,7 +94,7 @@ def check_feed(state: State, block: Block) -> None:
 
 
 def on_surface(state: State) -> bool:
-    """Whether the feed depends on the diameter: a feed per turn (G95) under a constant surface speed (G96)."""
+    """True if the feed depends on the diameter: a feed per turn (G95) under a constant surface speed (G96)."""
     return state.spindle.surface_speed and state.feed_mode == "per turn" and state.feed_per_turn > 0
 
 

@@ -1,4 +1,4 @@
-"""What is kept of the axes beside x, y and z (further_moves.py has their rules)."""
+"""State of the axes beside x, y and z (further_moves.py has their rules)."""
 
 from __future__ import annotations
 

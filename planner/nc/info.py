@@ -1,4 +1,4 @@
-"""What a program holds: counts, extents, lengths, feeds, corners, and every construct that is not supported.
+"""Description of a program: counts, extents, lengths, feeds, corners, and every construct that is not supported.
 
 Inspecting never stops at the first fault: what can be read is read, so for a program with faults the figures
 describe only that. A corner is the turn between the end of one feed move and the start of the next, at the

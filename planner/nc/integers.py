@@ -21,7 +21,7 @@ INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 
 @dataclass(frozen=True)
 class Integers:
-    """What numbers without a point mean.
+    """The meaning of numbers without a point.
 
     increment : of lengths [mm], or None: they are whole units
     """
@@ -51,7 +51,7 @@ class Integers:
 
 
 def integers_of(machine: Machine | None) -> Integers:
-    """What numbers without a point mean on a machine."""
+    """The meaning of numbers without a point on a machine."""
     given = machine.dialect.least_increment if machine is not None and machine.dialect is not None else None
     return Integers(given)
 

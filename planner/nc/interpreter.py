@@ -95,7 +95,7 @@ class Interpreter:
 
     @property
     def state(self) -> State:
-        """What is in force, and where the axes are."""
+        """The modal state, and where the axes are."""
         return self.mover.state
 
     @property
@@ -128,7 +128,7 @@ class Interpreter:
 
     @property
     def notes(self) -> Notes:
-        """What was assumed, each once, with its first line and how often."""
+        """Assumptions and notes, each once, with its first line and how often."""
         return self.found.notes(self.assumed.notes())
 
     def in_seconds(self, words: Words) -> Words:
@@ -187,7 +187,7 @@ class Interpreter:
 
     @property
     def all_arcs_close_otherwise(self) -> bool:
-        """Whether there are arcs that do not close, and all of them would with their centres read the other way.
+        """True if there are arcs that do not close, and all of them would with their centres read the other way.
 
         One line decides nothing, and neither does I0 J0: one odd arc is a mistake, not the way in which a whole program is written.
         """

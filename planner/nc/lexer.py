@@ -120,7 +120,7 @@ class Words:
         return found.group().decode("ascii").strip() if found else ""
 
     def rest(self, word: int) -> str:
-        """What follows the letter of a word on its line, comments included."""
+        """The line behind the letter of a word, comments included."""
         at = int(self.at[word]) + 1
         end = self.data.find(b"\n", at)
         return self.data[at : end if end >= 0 else len(self.data)].decode("utf-8", "replace").strip()
@@ -202,7 +202,7 @@ def _count(source):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _digit_follows(source, i):  # pragma: no cover - compiled
-    """Whether the next character after blanks from i on is a digit."""
+    """True if the next character after blanks from i on is a digit."""
     while i < len(source) and source[i] in (_SPACE, _TAB):
         i += 1
     return i < len(source) and 48 <= source[i] <= 57

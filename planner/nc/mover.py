@@ -1,4 +1,4 @@
-"""What a block moves: G0 to G3, splines, drilling cycles and threads, with or without cutter radius compensation."""
+"""Motion of blocks: G0 to G3, splines, drilling cycles and threads, with or without cutter radius compensation."""
 
 from __future__ import annotations
 
@@ -202,5 +202,5 @@ class Mover:
 
 
 def _gives_offsets(block: Block) -> bool:
-    """Whether the axis words are those of G43.1 or G43.2."""
+    """True if the axis words are those of G43.1 or G43.2."""
     return block.g.get("tool length") in (431, 432) and "motion" not in block.g

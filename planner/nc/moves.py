@@ -48,7 +48,7 @@ class ArcFault(WordFault):
 
 
 def is_move(state: State, block: Block) -> bool:
-    """Whether the block moves. A motion code alone does not, except for an arc, which then lacks its words."""
+    """True if the block moves. A motion code alone does not, except for an arc, which then lacks its words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))
     return arc or block.has(state.letters)
 
@@ -168,7 +168,7 @@ def _centre(state: State, block: Block, *, absolute: bool) -> FloatArray:
 
 
 def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
-    """Whether I J K are meant the other way: many programs have absolute centres and do not say so."""
+    """True if I J K are meant the other way: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
     except ArcError:

@@ -61,7 +61,7 @@ class _Others(NamedTuple):
 
 
 class _Counts(NamedTuple):
-    """What plain rows change besides the position: how far they are read and stored, and the modal motion and feed."""
+    """State that plain rows change besides the position: how far they are read and stored, and the modal motion and feed."""
 
     row: int
     blocks: int

@@ -45,7 +45,7 @@ class PocketShape(Protocol):
         """The closed path at a distance from the walls, in a direction."""
 
     def core(self) -> Path:
-        """What is left at the distance `room`; no legs for a point."""
+        """The path at the distance `room`; no legs for a point."""
 
     def to_wall(self) -> list[PocketLeg]:
         """From the start of the core to where a straight leg to the start of a loop stays inside."""

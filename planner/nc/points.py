@@ -66,7 +66,7 @@ def points_file(program: Program) -> bytes:
 
 
 def are_points(data: bytes) -> bool:
-    """Whether a file holds points: no NC program begins with a brace."""
+    """True if a file holds points: no NC program begins with a brace."""
     return data[:64].lstrip().startswith(b"{")
 
 

@@ -17,7 +17,7 @@ from planner.nc.reading import AS_USUAL, Reading
 
 
 class Kind(IntEnum):
-    """What a block does."""
+    """Kinds of blocks."""
 
     RAPID = 0  # straight, at the axes' limits (G0)
     LINE = 1  # straight, at the programmed feed (G1)
@@ -75,7 +75,7 @@ class Frame:
 
 @dataclass(frozen=True, kw_only=True)
 class Expansion:
-    """What was expanded to make a program of one that computes.
+    """Counts of the expansion of a program that computes.
 
     dialect : whose language it is: "linuxcnc", "fanuc", "heidenhain" or "siemens"
     calls   : subprograms in the order of their first call, and how often each was called

@@ -66,7 +66,7 @@ def read_program(
 
 
 def source_name(path: str | Path) -> str:
-    """What messages call a program file."""
+    """The name of a program file in messages."""
     return "<stdin>" if str(path) == STDIN else str(path)
 
 

@@ -193,13 +193,13 @@ def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
 
 
 def _said_of(number: int) -> Assumption:
-    """What is said of an M code that moves nothing."""
+    """The assumption about an M code that moves nothing."""
     of = {WAIT_M: _WAITING, CORNER_M: _CORNERS, SCALE_M: _SCALES, PRINTER_M: _OF_PRINTERS}
     return next((what for what, numbers in of.items() if number in numbers), UNKNOWN_M)
 
 
 def may_be_ignored(name: str) -> bool:
-    """Whether a code can be left out because the user knows it to be harmless: not a G code that is read or moves the axes, not the
+    """True if a code can be left out because the user knows it to be harmless: not a G code that is read or moves the axes, not the
     end of a program, not a call."""
     letter, number = name[0], name[1:]
     if letter not in "GM" or not number[:1].isdigit():

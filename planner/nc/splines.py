@@ -57,12 +57,12 @@ class OpenSpline:
 
     @property
     def ended(self) -> bool:
-        """Whether a G6.2 curve has all of its knots."""
+        """True if a G6.2 curve has all of its knots."""
         return self.code == NURBS_WITH_KNOTS and len(self.knots) >= len(self.points) + self.order
 
     @property
     def unfinished(self) -> str:
-        """What is said of a curve that is left before its end."""
+        """The message for a curve that is left before its end."""
         if self.code == NURBS:
             return f"the spline of line {self.line} does not end; write G5.3 after its last control point"
         return (
@@ -207,14 +207,14 @@ class SplineReader:
 
 
 def is_spline_line(block: Block) -> bool:
-    """Whether a line under a spline's motion code has words of the spline."""
+    """True if a line under a spline's motion code has words of the spline."""
     return "motion" in block.g or bool(
         block.value.keys() & set("XYZIJKLRPQ") - block.own
     )  # those of other codes are theirs
 
 
 def _leaves(opened: OpenSpline, block: Block) -> bool:
-    """Whether the block's motion code leaves the open curve, or begins another one."""
+    """True if the block's motion code leaves the open curve, or begins another one."""
     code = block.g.get("motion")
     if opened.code == NURBS:
         return code not in (None, NURBS, NURBS_END)

@@ -65,7 +65,7 @@ class System:
 
 @dataclass(slots=True)
 class Spindle:
-    """What the spindle does: speed [1/min], turning (+1 M3, -1 M4, 0), whether S is a surface speed (G96) [m/min or ft/min], and the
+    """The spindle: speed [1/min], turning (+1 M3, -1 M4, 0), whether S is a surface speed (G96) [m/min or ft/min], and the
     largest speed then [1/min], 0 where it has no bound."""
 
     speed: float = 0.0
@@ -170,7 +170,7 @@ class State:
 
     @property
     def is_plain(self) -> bool:
-        """Whether straight moves need nothing but offsets, units and F: what the compiled loop knows."""
+        """True if straight moves need nothing but offsets, units and F: what the compiled loop knows."""
         return self.feed_mode == "per minute" and not (
             self.rotated or self.diameters or self.in_thread or self.actual is not None
         )
@@ -206,7 +206,7 @@ class State:
 
 @dataclass(frozen=True)
 class Setup:
-    """What the machine says about a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
+    """Settings of the machine for a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
     gives none."""
 
     path_control: PathControl = PathControl.BLEND
@@ -235,7 +235,7 @@ class Setup:
 
     @property
     def inch(self) -> bool:
-        """Whether the machine file says that programs begin in inches."""
+        """True if the machine file says that programs begin in inches."""
         dialect = self.machine.dialect if self.machine is not None else None
         return dialect is not None and dialect.inch
 

@@ -66,7 +66,7 @@ class ToolPointSwitch:
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
     def take(self, state: State, store: Store, block: Block) -> None:
-        """What the words of a block switch. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
+        """Follow the words of a block that switch it. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
             raise WordFault(
@@ -108,7 +108,7 @@ class ToolPointSwitch:
         return self.switches[-1].word if self.switches else ""
 
     def _word(self, block: Block, tool: int | None) -> str:
-        """What is on after the words of a block."""
+        """The word that has it on after the words of a block; empty where it is off."""
         now = self._on
         if tool == G43_4:
             now = "G43.4"

@@ -97,7 +97,7 @@ class _FeedModes(NamedTuple):
 
 
 class _New(NamedTuple):
-    """What is to be written on the rows (n,) of feed moves.
+    """Feeds to write on the rows (n,) of feed moves.
 
     wanted, programmed : (n,) feeds in each row's units; wanted is NaN where the programmed one holds
     often              : (n,) runs per minute, under G93; NaN for a feed

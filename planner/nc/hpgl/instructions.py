@@ -19,7 +19,7 @@ class Form:
     counts: tuple[int, ...] | None
 
     def fits(self, count: int) -> bool:
-        """Whether the instruction may have so many numbers."""
+        """True if the instruction may have so many numbers."""
         return count % 2 == 0 if self.counts is None else count in self.counts
 
     def __str__(self) -> str:

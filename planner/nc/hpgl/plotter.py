@@ -106,7 +106,7 @@ class _Run:
         ]
 
     def _word(self, at: int, end: int) -> str:
-        """What is written there, as far as it can be shown."""
+        """The text there, as far as it can be shown."""
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
         return text if text.isprintable() else ""
 

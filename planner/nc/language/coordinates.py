@@ -29,7 +29,7 @@ class FrameParts:
 
     @property
     def only_shifted(self) -> bool:
-        """Whether there is nothing but the datum shift."""
+        """True if there is nothing but the datum shift."""
         return (self.mirror * self.scale == 1.0).all() and self.rotation % 360.0 == 0.0
 
     def affine(self) -> tuple[FloatArray, FloatArray]:
@@ -75,12 +75,12 @@ class Coordinates:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the program's points are those of the work system."""
+        """True if the program's points are those of the work system."""
         return not self.shift.any() and bool((self.matrix == np.eye(3)).all())
 
     @property
     def mirrored(self) -> bool:
-        """Whether the frame mirrors the plane."""
+        """True if the frame mirrors the plane."""
         return self._plane_size() < 0.0
 
     def scale(self) -> float:

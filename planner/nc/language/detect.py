@@ -1,4 +1,4 @@
-"""Whether a program computes, and in whose language: LinuxCNC's O words, or the macros of Fanuc and Haas.
+"""True if a program computes, and in whose language: LinuxCNC's O words, or the macros of Fanuc and Haas.
 
 A program that holds nothing of it is told from the words that the lexer has made, without looking at its text.
 
@@ -57,7 +57,7 @@ def bare(text: str) -> str:
 
 
 def computes(text: str) -> bool:
-    """Whether a bare line is a statement of a language rather than words."""
+    """True if a bare line is a statement of a language rather than words."""
     return bool(_EITHER.search(text) or _LINUXCNC.search(text) or _FANUC.search(text))
 
 
@@ -81,7 +81,7 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
 
 
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
-    """Whether a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
+    """True if a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
 
     Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle G70 to G73 with P and Q,
     a G76 with K and D, or another sign of a lathe (`_has_signs`).
@@ -109,12 +109,12 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
 
 
 def has_two_axes(words: Words) -> bool:
-    """Whether a program has X and Z and no Y: it may be one for a lathe."""
+    """True if a program has X and Z and no Y: it may be one for a lathe."""
     return _has(words, "X") and _has(words, "Z") and not _has(words, "Y")
 
 
 def _has_signs(words: Words) -> bool:
-    """Whether a program without Y has a sign of a Fanuc or Haas lathe (G code system A), and none of a mill or of another lathe.
+    """True if a program without Y has a sign of a Fanuc or Haas lathe (G code system A), and none of a mill or of another lathe.
 
     Signs are a tool with its offset in one word of four digits (T0101), G50 or G96 with S, and G99 without the cycles whose retract it
     is on mills. J, M6, planes but G18, feed modes and diameters of LinuxCNC (G93, G95, G7, G8), D beside G96, and G90, G91 or G94
@@ -147,7 +147,7 @@ def _has(words: Words, letter: str) -> bool:
 
 
 def has_further_systems(words: Words) -> bool:
-    """Whether a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas' know."""
+    """True if a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas' know."""
     return _has(words, "L") and bool(((words.value == G_FURTHER) & (words.letter == ord("G"))).any())
 
 

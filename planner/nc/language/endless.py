@@ -32,7 +32,7 @@ _ENDS = (2.0, 30.0)  # M codes
 
 
 def never_ends(loop: Loop, language: Language) -> bool:
-    """Whether the loop goes on for ever once its condition holds after a turn."""
+    """True if the loop goes on for ever once its condition holds after a turn."""
     if loop.kind == "repeat":
         return False
     read = list(_parameters(loop.condition))
@@ -53,7 +53,7 @@ def _parameters(expression: Expression) -> Iterator[Parameter]:
 
 
 def _is_kept(parameter: Parameter, language: Language) -> bool:
-    """Whether only assignments that name the parameter change it."""
+    """True if only assignments that name the parameter change it."""
     if isinstance(parameter, Named):
         return not (
             parameter.shared
@@ -74,7 +74,7 @@ def _all(body: Sequence[Statement]) -> Iterator[Statement]:
 
 
 def _stays(statement: Statement, read: set[Parameter]) -> bool:
-    """Whether a statement leaves the parameters as they are, and the loop going on."""
+    """True if a statement leaves the parameters as they are, and the loop going on."""
     if isinstance(statement, _LEAVES) or (isinstance(statement, PlainRows) and statement.may_end):
         return False
     if not isinstance(statement, Line):

@@ -82,7 +82,7 @@ def expand(
 
 @dataclass(frozen=True)
 class _Front:
-    """What reads a dialect. files : names, in small letters, of the file that holds a subprogram."""
+    """The reader of a dialect. files : names, in small letters, of the file that holds a subprogram."""
 
     language: Language
     asked: type[Asked]
@@ -154,7 +154,7 @@ class _Files:
 
 
 def _marker(file: int) -> str:
-    """What stands for a file in Python's tracebacks."""
+    """The name of a file in Python's tracebacks."""
     return f"<nc {file}>"
 
 

@@ -38,16 +38,16 @@ class ExpressionReader:
         """The operator that comes next; empty for none."""
         raise NotImplementedError
 
-    def skip(self, operator: str) -> object:
+    def skip(self, operator: str) -> None:
         """Go past the operator."""
         raise NotImplementedError
 
     def value(self) -> Expression:
-        """What comes next, up to an operator between two values."""
+        """The expression that comes next, up to an operator between two values."""
         raise NotImplementedError
 
     def refused(self, message: str) -> Exception:
-        """What to raise about what comes next."""
+        """A fault of the next character or token."""
         raise NotImplementedError
 
     def expression(self, rank: int = 1) -> Expression:
@@ -110,7 +110,7 @@ class TokenReader(ExpressionReader):
             at = found.end()
 
     def fault(self, message: str, at: int | None = None) -> Exception:
-        """What to raise about a character of the text; about the next token if none is given."""
+        """A fault of a character of the text; of the next token if none is given."""
         raise NotImplementedError
 
     def operand(self, token: Token) -> Expression | None:
@@ -118,12 +118,12 @@ class TokenReader(ExpressionReader):
         raise NotImplementedError
 
     def refused(self, message: str) -> Exception:
-        """What to raise about the next token."""
+        """A fault of the next token."""
         return self.fault(message)
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is left."""
+        """True if nothing is left."""
         return self.next >= len(self.tokens)
 
     def peek(self, ahead: int = 0) -> str:
@@ -143,7 +143,9 @@ class TokenReader(ExpressionReader):
         self.next += 1
         return True
 
-    skip = take
+    def skip(self, operator: str) -> None:
+        """Go past the next token."""
+        self.next += 1
 
     def expect(self, text: str) -> None:
         """Go past the token. Raises the fault that another one comes."""

@@ -28,7 +28,7 @@ class Expressions:
         return self.value(expression)
 
     def stored(self, index: float) -> bool:
-        """Whether a parameter of that number is the program's own, not one that the control is asked for."""
+        """True if a parameter of that number is the program's own, not one that the control is asked for."""
         low = 0 if self.language.vacant is None else 1
         return (
             index == int(index) and low <= index <= self.language.largest and index not in self.language.asked

@@ -54,7 +54,7 @@ def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
-    """What APPR and DEP have in common."""
+    """Words that APPR and DEP have in common."""
     return {
         "kind": KINDS[round(given["kind"])],
         "line": making.line,

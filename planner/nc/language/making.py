@@ -1,4 +1,4 @@
-"""What makers of rows get and give.
+"""Makers of rows.
 
 A maker is a function of the running program's state and the values of a command; it gives rows of words in the program's coordinates
 and units, each a list of letters and numbers, and raises ValueError for values that make no sense.

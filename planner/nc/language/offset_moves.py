@@ -50,7 +50,7 @@ class OffsetMoves:
 
     @property
     def started(self) -> bool:
-        """Whether the contour has begun."""
+        """True if the contour has begun."""
         return self._cutter is not None
 
     def begin_at(self, place: FloatArray, tangent: complex) -> FloatArray:

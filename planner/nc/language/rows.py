@@ -1,4 +1,4 @@
-"""What a running program appends, and how it becomes rows of words for the interpreter.
+"""Rows that a running program appends, and how they become rows of words for the interpreter.
 
 Appending has to be cheap, since a loop does it a million times: a statement appends its number to `pending` and the values it has
 computed to `values`. Everything else about its rows is constant and stands in tables: letters, places, the numbers that are not

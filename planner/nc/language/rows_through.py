@@ -77,7 +77,7 @@ class RowsThrough(Coordinates):
 
     @property
     def compensated(self) -> bool:
-        """Whether compensation is on, or waits for its approach."""
+        """True if compensation is on, or waits for its approach."""
         return self._offset is not None or self._approach is not None
 
     # --- rows -----------------------------------------------------------------------------------------------------------------
@@ -111,7 +111,7 @@ class RowsThrough(Coordinates):
             yield words_of(out, words.data, words.files)
 
     def end(self) -> list[TravelRow]:
-        """What is left to execute when the program has ended without M2 or M30. Raises ValueError."""
+        """Rows left to execute when the program has ended without M2 or M30. Raises ValueError."""
         self._no_corner()
         if self._approach is not None:
             raise ValueError("APPR is followed by no contour")
@@ -275,7 +275,7 @@ class RowsThrough(Coordinates):
         self._beside = offset.started
 
     def _idle(self) -> bool:
-        """Whether rows may pass as they are; not while a motion code that was turned round (G2, G3) may count behind."""
+        """True if rows may pass as they are; not while a motion code that was turned round (G2, G3) may count behind."""
         waits = self.compensated or self._beside or self._coming is not None or self._corner is not None
         turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
         return self.is_plain and not (waits or turned)

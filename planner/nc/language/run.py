@@ -233,7 +233,7 @@ class ProgramRun:
             self.numbered[number] = value
 
     def exists(self, index: float) -> bool:
-        """Whether there is a parameter of that number, with a value."""
+        """True if there is a parameter of that number, with a value."""
         number = round(index)
         return 0 < number <= self.language.largest and (
             number in self.language.asked or self.numbered[number] is not None
@@ -333,7 +333,7 @@ class ProgramRun:
         return known
 
     def _stopped(self, fault: ProgramFault) -> ProgramFault:
-        """What was pending is executed; the message gets the calls that led to the place."""
+        """Execute what is pending; the message gets the calls that led to the place."""
         message, frame = fault.message, self._frame
         while frame > 0:
             message += f"; called from line {self.frames[frame].line}"

@@ -127,7 +127,7 @@ class Source:
         return runs
 
     def has_end(self, rows: PlainRows) -> bool:
-        """Whether the rows hold M2 or M30."""
+        """True if the rows hold M2 or M30."""
         words, first = self.words, rows.first - self.first_row
         span = slice(int(words.first[first]), int(words.first[rows.last - self.first_row]))
         return bool(((words.letter[span] == ord("M")) & np.isin(words.value[span], (2, 30))).any())

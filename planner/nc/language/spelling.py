@@ -97,7 +97,7 @@ class LineReader(ExpressionReader):
         return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
     def refused(self, message: str, at: int | None = None) -> ProgramFault:
-        """What to raise about the character at `at`, or the next one."""
+        """A fault of the character at `at`, or of the next one."""
         return self._fault(self.column(self.at if at is None else at), message)
 
     def _fault(self, column: int, message: str) -> ProgramFault:
@@ -105,7 +105,7 @@ class LineReader(ExpressionReader):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is left on the line."""
+        """True if nothing is left on the line."""
         return self.at >= len(self.text)
 
     def peek(self) -> str:

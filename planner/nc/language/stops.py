@@ -1,4 +1,4 @@
-"""What stops a running program: sentences, and where it stands."""
+"""Messages of a running program that is stopped, and where it stands."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class TooDeep(ValueError):
 
 
 def sentence(fault: Exception) -> str:
-    """What a Python error of the compiled program means."""
+    """The message for a Python error of the compiled program."""
     text = str(fault)
     if isinstance(fault, ZeroDivisionError):
         return "division by zero"

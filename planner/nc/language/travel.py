@@ -1,4 +1,4 @@
-"""What commands ask and set of the way from a program's rows to the interpreter (`rows_through`): frame, compensation, corners."""
+"""Commands that ask and set the way from a program's rows to the interpreter (`rows_through`): frame, compensation, corners."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Move:
         return [TravelRow(words, self.rest.line, self.rest.frame)]
 
     def stands(self, normal: int) -> bool:
-        """Whether it leaves its place in the plane."""
+        """True if it leaves its place in the plane."""
         way = [self.end[a] - self.begin[a] for a in IN_PLANE[normal]]
         return self.arc is None and math.hypot(*way) < STANDS
 

@@ -1,4 +1,4 @@
-"""What a program that computes says, as a tree: expressions, statements, procedures. No language's spelling is known here.
+"""A program that computes, as a tree: expressions, statements, procedures. No language's spelling is known here.
 
 A statement appends rows of words, changes parameters, or decides what is executed next. Rows that need no computing stay as the lexer
 split them and are named by their numbers (`PlainRows`): a program of 100,000 lines with ten expressions is not parsed twice.
@@ -23,7 +23,7 @@ class SourcePlace(NamedTuple):
 
 
 class Value:
-    """What has a value when the program runs; + - * / of two of them are operations, computed here where both are numbers."""
+    """An expression; + - * / of two of them are operations, computed here where both are numbers."""
 
     __slots__ = ()
 
@@ -214,7 +214,7 @@ class Message(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """What happens to the modal state: "save", "forget", "restore" or "save until return"."""
+    """Save or restore the modal state: "save", "forget", "restore" or "save until return"."""
 
     place: SourcePlace
     action: str
@@ -262,7 +262,7 @@ class Procedure:
 
 @dataclass(frozen=True)
 class Language:
-    """What the operators and parameters of a language mean.
+    """The meaning of the operators and parameters of a language.
 
     operations : Python text by operator or function and number of operands, with {0} and {1} for the operands
     conditions : those among them that are true or false rather than a number

@@ -94,7 +94,7 @@ def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
 
 
 def fanuc_files(name: str) -> frozenset[str]:
-    """What the file of program O1000 may be called, in small letters."""
+    """Names that the file of program O1000 may have, in small letters."""
     numbers = {name, name.zfill(_LONGEST_NUMBER)}
     stems = {f"{letter}{number}" for number in numbers for letter in ("", "o")}
     return frozenset(stem + ending for stem in stems for ending in ("", ".nc", ".ngc", ".cnc", ".tap"))

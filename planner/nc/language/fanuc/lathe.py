@@ -145,7 +145,7 @@ class LatheParser(LatheSingles):
 
     @staticmethod
     def _is_first(cycle: str, given: dict[str, Word]) -> bool:
-        """Whether the block is the first of two."""
+        """True if the block is the first of two."""
         if cycle == "G76":
             return not given.keys() & set("XZUWK")
         return "P" not in given or "Q" not in given

@@ -49,7 +49,7 @@ Given = Mapping[str, float]
 
 
 class LatheCycles:
-    """What the cycles of one run need: where the tool stood, and what is set aside while a profile is read."""
+    """The cycles of one run: where the tool stood, and what is set aside while a profile is read."""
 
     def __init__(self, run: ProgramRun):
         self.run = run

@@ -56,21 +56,21 @@ REFUSED = {
 
 
 def is_of_the_builder(code: int) -> bool:
-    """Whether an M code, which is none of this control's, would be taken for one of RS274NGC or of a printer."""
+    """True if an M code, which is none of this control's, would be taken for one of RS274NGC or of a printer."""
     found = setting("M", 10 * code, "", "")
     of_printers = code > OWN_LAST and found is not None and found.what is not UNKNOWN_M
     return of_printers or (OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP)
 
 
 class Codes(Definitions):
-    """What M codes say. source : the file"""
+    """Statements of M codes. source : the file"""
 
     source: Source
 
     def _codes(
         self, block: ConversationalBlock, given: Items, *, straight: bool = False
     ) -> tuple[list[Statement], list[Statement], bool]:
-        """What the M codes of a block do before its move and after it, and whether it goes in machine coordinates, as `straight` moves
+        """Statements of the M codes of a block before its move and after it, and whether it goes in machine coordinates, as `straight` moves
         may."""
         before: list[Statement] = []
         after: list[Statement] = []

@@ -25,12 +25,12 @@ TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
 
 
 def compensates(text: str) -> bool:
-    """Whether a block may switch compensation on or off."""
+    """True if a block may switch compensation on or off."""
     return bool(_COMPENSATES.search(text))
 
 
 def side_rows(block: ConversationalBlock, given: Items) -> list[Statement]:
-    """What RL, RR or R0 of a block does before its move."""
+    """The statements of RL, RR or R0 before the move of a block."""
     if given.side is None:
         return []
     return [made(block.place, "compensate", side=given.side)]

@@ -1,4 +1,4 @@
-"""What sets something before it moves: the program's units, tool calls, and definitions of cycles."""
+"""Definitions that move nothing: the program's units, tool calls, and definitions of cycles."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict
 
 
 class Definitions(Flow):
-    """What has been set.
+    """Definitions in force.
 
     moves  : path functions, with the feed of the tool call
     unit   : mm per unit of the program

@@ -41,7 +41,7 @@ NAMED = 100_000  # number of the first label, and of the first tool, with a name
 
 
 class Flow:
-    """What the blocks of a program say about their order.
+    """Statements that decide the order of the blocks.
 
     blocks  : of the program
     names   : numbers of labels that have names
@@ -156,5 +156,5 @@ def called_file(text: str) -> str:
 
 
 def files(name: str) -> frozenset[str]:
-    """What the file of a called program may be called, in small letters."""
+    """Names that the file of a called program may have, in small letters."""
     return frozenset((name, f"{name}.h"))

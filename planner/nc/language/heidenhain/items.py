@@ -1,4 +1,4 @@
-"""What stands behind a path function: coordinates, directions, feeds and M codes; and the names of what a running program keeps."""
+"""Words behind a path function: coordinates, directions, feeds and M codes; and the names of what a running program keeps."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ POLAR = own("pr"), own("pa")
 
 @dataclass
 class Items:
-    """What stands behind a path function.
+    """The words behind a path function.
 
     axes    : absolute or incremental ("I") coordinates by letter
     polar   : PA, PR, IPA, IPR

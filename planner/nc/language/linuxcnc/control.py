@@ -142,5 +142,5 @@ def _needed(condition: Expression | None, keyword: str, line: SourceLine) -> Exp
 
 
 def end_of(kind: str) -> str:
-    """What ends a control statement."""
+    """The keyword that ends a control statement."""
     return "while [condition]" if kind == "do" else f"end{kind}"

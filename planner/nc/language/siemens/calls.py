@@ -32,7 +32,7 @@ class Calls(Commands):
     """Calls and what they hand over."""
 
     def _is_call(self, reader: LineTokens) -> bool:
-        """Whether the line is a call by a name."""
+        """True if the line is a call by a name."""
         name = reader.peek()
         if (
             reader.tokens[reader.next].kind != "name"
@@ -108,5 +108,5 @@ class Calls(Commands):
 
 
 def siemens_files(name: str) -> frozenset[str]:
-    """What the file of a subprogram may be called, in small letters: NAME.SPF, NAME.MPF, and as controls save them, NAME_SPF."""
+    """Names that the file of a subprogram may have, in small letters: NAME.SPF, NAME.MPF, and as controls save them, NAME_SPF."""
     return frozenset(name + ending for ending in (".spf", ".mpf", "_spf", "_mpf", ""))

@@ -1,4 +1,4 @@
-"""What the words and commands of a Sinumerik program are in RS274NGC: tables."""
+"""Tables of the words and commands of a Sinumerik program in RS274NGC."""
 
 from __future__ import annotations
 

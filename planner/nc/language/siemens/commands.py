@@ -14,7 +14,7 @@ TYPES = frozenset(("REAL", "INT", "BOOL"))
 
 
 class Commands(SiemensControl):
-    """What commands have set.
+    """Settings by commands.
 
     names    : of the variables
     absolute : G90 is in force
@@ -66,7 +66,7 @@ class Commands(SiemensControl):
         return [made(place, "keep"), *rows, made(place, "bring back", feed=ZERO)]
 
     def _arguments(self, reader: LineTokens) -> list[Expression | None]:
-        """What stands in the brackets behind a cycle; None for what is left out or a text."""
+        """The arguments in the brackets behind a cycle; None for what is left out or a text."""
         given: list[Expression | None] = []
         if not reader.take("("):
             return given

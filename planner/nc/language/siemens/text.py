@@ -98,7 +98,7 @@ class LineTokens(TokenReader):
         return super().value()
 
     def _take_apart(self) -> None:
-        """What looks like a word is a variable and what follows it: A+1 in an expression."""
+        """Split a word that is a variable and a sum: A+1 in an expression."""
         word = self.tokens[self.next]
         split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
         parts = [Token("name", word.text[:split], word.at)]

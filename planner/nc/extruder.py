@@ -139,7 +139,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
 
 @njit(cache=True, error_model="numpy")
 def _fed(letter, value, first, with_moves):
-    """Filament fed by each row (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed in force on it (R,) [mm/s]."""
+    """Filament fed by each row (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed in force (R,) [mm/s]."""
     rows = len(first) - 1
     amount, feeds = np.zeros(rows), np.zeros(rows)
     absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0

@@ -66,7 +66,7 @@ class ToolPointSwitch:
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
     def take(self, state: State, store: Store, block: Block) -> None:
-        """Follow the words of a block that switch it. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
+        """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
             raise WordFault(

@@ -124,7 +124,7 @@ class Approach(ContourWay):
     compensated: bool = True
 
     def begin(self, start: FloatArray, first: FloatArray, motion: int, radius: float, mirrored: bool) -> None:
-        """Take the state in force: where the tool is, `start` (3,), and the `first` point (3,) in the work system, the `motion` code, the
+        """Take the state: where the tool is, `start` (3,), and the `first` point (3,) in the work system, the `motion` code, the
         `radius` of the tool [mm], and whether the frame is `mirrored`."""
         self._start, self._first = start.copy(), first.copy()
         self._motion = min(motion, 1)

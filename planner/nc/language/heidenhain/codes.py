@@ -70,8 +70,8 @@ class Codes(Definitions):
     def _codes(
         self, block: ConversationalBlock, given: Items, *, straight: bool = False
     ) -> tuple[list[Statement], list[Statement], bool]:
-        """Statements of the M codes of a block before its move and after it, and whether it goes in machine coordinates, as `straight` moves
-        may."""
+        """Statements of the M codes of a block before and after its move, and whether it goes in machine coordinates, as `straight`
+        moves may."""
         before: list[Statement] = []
         after: list[Statement] = []
         machine = False

@@ -48,7 +48,7 @@ _LONG = 60.0  # a dwell of a minute is no usual one [s]
 _SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
-def events(state: State, store: Store, block: Block, found: Findings) -> None:
+def events(state: State, store: Store, block: Block, findings: Findings) -> None:
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
     if "S" in block.value:
@@ -73,10 +73,10 @@ def events(state: State, store: Store, block: Block, found: Findings) -> None:
         store.add(Kind.STOP, line, state)
         text = "a tool change is a full stop of the motion that moves nothing"
         if state.change_timed:
-            found.note(text, line)
+            findings.note(text, line)
         else:
             why = "it has no time, which [times] tool_change of the machine file gives"
-            found.assume(f"{text}; {why}", line, block.at["tool change"])
+            findings.assume(f"{text}; {why}", line, block.at["tool change"])
     store.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:
         store.add_event(letter, value, line)
@@ -94,38 +94,38 @@ def events(state: State, store: Store, block: Block, found: Findings) -> None:
             store.add_event("G", code / 10, line)
 
 
-def dwell(state: State, store: Store, block: Block, assumed: Assumed, found: Findings) -> None:
+def dwell(state: State, store: Store, block: Block, assumed: Assumed, findings: Findings) -> None:
     """G4. Raises WordFault."""
     seconds = block.value.get("P")
     if seconds is not None and assumed.printer:
         seconds *= MILLISECOND
-        found.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        findings.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
     elif seconds is None and not assumed.strict and (assumed.printer or "S" in block.value):
         seconds = block.value.get("S", 0.0)
-        found.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
+        findings.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
     if seconds is None or seconds < 0:
         word = block.at["one-shot"] if seconds is None else block.at["P"]
         raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
-    assume_seconds(state, block, seconds if "P" in block.value and not assumed.printer else 0.0, found)
+    assume_seconds(state, block, seconds if "P" in block.value and not assumed.printer else 0.0, findings)
     store.add_dwell(seconds, block.line, state)
 
 
-def assume_seconds(state: State, block: Block, seconds: float, found: Findings) -> None:
+def assume_seconds(state: State, block: Block, seconds: float, findings: Findings) -> None:
     """Say it if a dwell is so long that its P is most likely in another unit."""
     if seconds >= _LONG and not state.seconds_meant:
         text = f"a dwell of {seconds:g} s: P is read in seconds, as LinuxCNC and grbl have it; Fanuc's is in ms: --dialect fanuc"
-        found.assume(text, block.line, block.at.get("P", block.motion_word()))
+        findings.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
-def assume_rapids(store: Store, assumed: Assumed, found: Findings) -> None:
+def assume_rapids(store: Store, assumed: Assumed, findings: Findings) -> None:
     """Say it if G0 of a printer, which runs it at F, is planned as a rapid."""
     rapid = store.block.kind[: store.blocks] == Kind.RAPID
     if assumed.printer and rapid.any():
         text = "G0 is planned at the limits of the axes; 3-D printers run it at F"
-        found.assume(text, int(store.block.line[rapid.argmax()]))
+        findings.assume(text, int(store.block.line[rapid.argmax()]))
 
 
-def path_control(state: State, block: Block, assumed: Assumed, found: Findings) -> None:
+def path_control(state: State, block: Block, assumed: Assumed, findings: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
     word = block.at["path control"]
     if block.g["path control"] == _EXACT_PATH and assumed.printer:
@@ -139,7 +139,7 @@ def path_control(state: State, block: Block, assumed: Assumed, found: Findings) 
         and "motion" not in block.g
     ):
         text = "G61 with S is exact path and the spindle's speed; in Marlin it goes back to a saved position"
-        found.assume(text, block.line, word)
+        findings.assume(text, block.line, word)
     state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
     if "P" in block.value and block.g["path control"] == 640:
         tolerance = block.value["P"]
@@ -153,6 +153,6 @@ def path_control(state: State, block: Block, assumed: Assumed, found: Findings) 
         if tolerance > 0:
             state.tolerance = tolerance * state.unit
         else:
-            found.note("G64 P0 gives no tolerance; the machine's holds", block.line)
+            findings.note("G64 P0 gives no tolerance; the machine's holds", block.line)
     if "Q" in block.value:
-        found.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)
+        findings.note("G64 Q is not used: the tolerance of P bounds every deviation", block.line)

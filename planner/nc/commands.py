@@ -77,10 +77,10 @@ def homed(words: Words, word: int, block: Block, assumed: Assumed) -> bool:
     if block.g.get("one-shot") != 280 or block.value or assumed.strict:
         return False
     data, at = words.data, int(words.at[word])
-    found = _BARE.match(data[at : at + _LONGEST].partition(b"\n")[0] + b"\n")
-    if found is None:
+    match = _BARE.match(data[at : at + _LONGEST].partition(b"\n")[0] + b"\n")
+    if match is None:
         return False
-    named = found.group(1).upper()
+    named = match.group(1).upper()
     block.homing = "".join(letter for letter in "XYZ" if letter.encode() in named) or "XYZ"
     del block.g["one-shot"]
     return True

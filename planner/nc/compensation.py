@@ -54,7 +54,7 @@ def check_motion(state: State, block: Block) -> None:
         raise WordFault(block.motion_word(), _refusal(f"G{codes.number(state.motion)}"))
 
 
-def switch(state: State, store: Store, block: Block, on: Cutter | None, found: Findings) -> Cutter | None:
+def switch(state: State, store: Store, block: Block, on: Cutter | None, findings: Findings) -> Cutter | None:
     """The compensation after G40 to G42.1, given the one in force. Raises WordFault."""
     code = block.g["cutter compensation"]
     if code == _OFF:
@@ -76,14 +76,14 @@ def switch(state: State, store: Store, block: Block, on: Cutter | None, found: F
             block.at["L"],
             f"the edge orientation L of {name} is not supported; remove it and write the tool's path",
         )
-    diameter = _diameter(state, block, code, found)
+    diameter = _diameter(state, block, code, findings)
     if diameter == 0.0:
         return None
     left = (code in _LEFT) == (diameter > 0)
     return Cutter(state, store, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
 
 
-def _diameter(state: State, block: Block, code: int, found: Findings) -> float:
+def _diameter(state: State, block: Block, code: int, findings: Findings) -> float:
     """[mm]"""
     name = f"G{codes.number(code)}"
     if code in _DYNAMIC:
@@ -94,5 +94,5 @@ def _diameter(state: State, block: Block, code: int, found: Findings) -> float:
     tool = state.tools.get(number)
     if tool is None or tool.diameter == 0.0:
         text = f"tool {number} has no diameter in the machine file: {name} does not move the path"
-        found.assume(text, block.line, block.at["cutter compensation"])
+        findings.assume(text, block.line, block.at["cutter compensation"])
     return 0.0 if tool is None else tool.diameter

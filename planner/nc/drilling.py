@@ -141,14 +141,14 @@ _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [program
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
-def drill(state: State, store: Store, block: Block, found: Findings) -> None:
+def drill(state: State, store: Store, block: Block, findings: Findings) -> None:
     """Execute the line. Raises WordFault for words that are missing or contradict each other."""
     a, b = IN_PLANE[state.normal]
     c = state.normal
     here = _per_unit(state)
     series = _series(state, state.motion, float(here[c]))
     words = _words(state, block, series)
-    _check_words(state, block, words, found)
+    _check_words(state, block, words, findings)
     hole = _hole(state, block, series, words)
     repeats = _repeats(block, hole)
     if series.level < hole.clear - _ROUNDING:
@@ -166,10 +166,10 @@ def drill(state: State, store: Store, block: Block, found: Findings) -> None:
         for step in steps(hole):
             _to(state, store, block.line, step)
         here[c] = hole.retract
-    _say(state, block, found)
+    _say(state, block, findings)
 
 
-def _check_words(state: State, block: Block, words: dict[str, float], found: Findings) -> None:
+def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:
     """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it must."""
     code, word = state.motion, block.motion_word()
     name = f"G{codes.number(code)}"
@@ -179,7 +179,7 @@ def _check_words(state: State, block: Block, words: dict[str, float], found: Fin
         raise WordFault(block.at["P"], "a dwell must not be negative; write its seconds, such as P0.5")
     _check_spindle(state, code, word)
     if "P" in block.value and code in DWELLING | TAPPING.keys():
-        auxiliary.assume_seconds(state, block, words["P"], found)
+        auxiliary.assume_seconds(state, block, words["P"], findings)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
 
 
@@ -222,18 +222,18 @@ def _repeats(block: Block, hole: Hole) -> int:
     return repeats
 
 
-def _say(state: State, block: Block, found: Findings) -> None:
+def _say(state: State, block: Block, findings: Findings) -> None:
     """Keep what is assumed of a cycle."""
     name, word = f"G{codes.number(state.motion)}", block.motion_word()
     if not state.retract_given:
         text = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
-        found.assume(f"{name} before any G98 or G99: {text}", block.line, word)
+        findings.assume(f"{name} before any G98 or G99: {text}", block.line, word)
     if state.motion == _BY_HAND:
         text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
-        found.assume(f"{name}: {text}", block.line, word)
+        findings.assume(f"{name}: {text}", block.line, word)
     if state.motion in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"
-        found.assume(f"{name} is synchronised with the spindle: {text}", block.line)
+        findings.assume(f"{name} is synchronised with the spindle: {text}", block.line)
 
 
 def _series(state: State, code: int, level: float) -> CycleSeries:

@@ -30,7 +30,7 @@ _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per
 LINUXCNC_SLOWEST = 0.1
 
 
-def set_feed(state: State, block: Block, found: Findings) -> None:
+def set_feed(state: State, block: Block, findings: Findings) -> None:
     """The feed mode and F of a block. Raises WordFault for an F that is not positive."""
     mode = _MODES[block.g["feed mode"]] if "feed mode" in block.g else state.feed_mode
     if mode != state.feed_mode:
@@ -52,18 +52,18 @@ def set_feed(state: State, block: Block, found: Findings) -> None:
     code = block.g.get("units")
     if code is not None and (code == 200) != (state.unit != 1.0):
         unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
-        found.note(
+        findings.note(
             f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line", block.line
         )
 
 
-def take_default(state: State, default: float | None, block: Block, found: Findings) -> None:
+def take_default(state: State, default: float | None, block: Block, findings: Findings) -> None:
     """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
     if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
     state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
-    found.assume(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+    findings.assume(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
 
 
 def check_feed(state: State, block: Block) -> None:
@@ -129,7 +129,7 @@ def surface_parts(state: State, start: float, end: float) -> list[float]:
     return sorted(part for part in parts if 0.0 < part <= 1.0)
 
 
-def feed_of_time(state: State, block: Block, length: float, found: Findings) -> None:
+def feed_of_time(state: State, block: Block, length: float, findings: Findings) -> None:
     """Under G93 the feed of a block of this length [mm]; that of one that goes nowhere is any."""
     if state.feed_mode != "inverse time":
         return
@@ -138,4 +138,4 @@ def feed_of_time(state: State, block: Block, length: float, found: Findings) -> 
     per_minute = length * block.value["F"] / state.unit
     if 0.0 < per_minute < LINUXCNC_SLOWEST:
         text = f"G93 asks for less than {LINUXCNC_SLOWEST:g} units/min, and keeps its time; LinuxCNC takes {LINUXCNC_SLOWEST:g}"
-        found.assume(text, block.line, block.at["F"])
+        findings.assume(text, block.line, block.at["F"])

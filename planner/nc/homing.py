@@ -13,15 +13,15 @@ from planner.nc.state import State
 from planner.nc.store import Store
 
 
-def go_home(state: State, store: Store, block: Block, found: Findings) -> None:
+def go_home(state: State, store: Store, block: Block, findings: Findings) -> None:
     """All axes, or those of the block, go to the position of G28 or G30; in a rotated work system those of the system."""
     code, word = block.g["one-shot"], block.at["one-shot"]
     if code not in state.homes:
-        found.assume(
+        findings.assume(
             f"G{codes.number(code)} has no position in the machine file: machine zero", block.line, word
         )
     else:
-        offsets.assume_origin(state, f"G{codes.number(code)}", block, found)
+        offsets.assume_origin(state, f"G{codes.number(code)}", block, findings)
     if state.actual is not None:  # cutter radius compensation ends here
         state.actual = None
         store.add(Kind.RAPID, block.line, state)
@@ -38,7 +38,7 @@ def go_home(state: State, store: Store, block: Block, found: Findings) -> None:
     store.add(Kind.RAPID, block.line, state)
 
 
-def go_to_switches(state: State, store: Store, block: Block, found: Findings) -> None:
+def go_to_switches(state: State, store: Store, block: Block, findings: Findings) -> None:
     """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or to machine zero."""
     if not block.homing:
         return
@@ -46,7 +46,7 @@ def go_to_switches(state: State, store: Store, block: Block, found: Findings) ->
     for letter in block.homing:
         state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
     store.add(Kind.RAPID, block.line, state)
-    found.assume(
+    findings.assume(
         "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not",
         block.line,
     )

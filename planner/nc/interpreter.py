@@ -77,8 +77,8 @@ class Interpreter:
         )
         store = Store(len(state.further.letters))
         store.keep_origin(state)
-        self.found = Findings(strict=reading.strict)
-        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.found)
+        self.findings = Findings(strict=reading.strict)
+        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.findings)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []
@@ -107,11 +107,11 @@ class Interpreter:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
         self._end_compensation()
-        auxiliary.assume_rapids(self.store, self.assumed, self.found)
-        limits = self._limits.throughout(self.store, self.setup.machine, self.found)
+        auxiliary.assume_rapids(self.store, self.assumed, self.findings)
+        limits = self._limits.throughout(self.store, self.setup.machine, self.findings)
         read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         read = dataclasses.replace(read, limits=limits)
-        return read if self.found.faults else at_the_tip(read, self.tool_point, self.setup.machine)
+        return read if self.findings.faults else at_the_tip(read, self.tool_point, self.setup.machine)
 
     def go_on_with(self, state: State, store: Store) -> None:
         """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
@@ -124,12 +124,12 @@ class Interpreter:
         try:
             self.mover.cutter.fix()
         except CutterFault as fault:
-            self.found.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
+            self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> Notes:
         """Assumptions and notes, each once, with its first line and how often."""
-        return self.found.notes(self.assumed.notes())
+        return self.findings.notes(self.assumed.notes())
 
     def in_seconds(self, words: Words) -> Words:
         """The next words of the program with the times of dwells in seconds, as `execute` takes them."""
@@ -150,7 +150,7 @@ class Interpreter:
             if after < rows:
                 self.by_word += 1
                 self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.found.report, self.assumed)
+                block = read_block(words, after, self.findings.report, self.assumed)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -165,7 +165,7 @@ class Interpreter:
         letters = words.letter[refused]
         self.assumed.moved |= {chr(letter) for letter in np.flatnonzero(np.bincount(letters))}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
-        self.found.keep(words, found)
+        self.findings.keep(words, found)
         self.assumed.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
@@ -173,7 +173,7 @@ class Interpreter:
         row = self._read
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
-            self.found.note(f"the program ends; what follows from line {after} on is not read", end)
+            self.findings.note(f"the program ends; what follows from line {after} on is not read", end)
 
     @property
     def feed_factors(self) -> list[tuple[int, float]]:
@@ -196,7 +196,7 @@ class Interpreter:
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self.found.faults + self.mover.splines.faults())
+        return FaultList(self.findings.faults + self.mover.splines.faults())
 
     def _assume_units(self) -> None:
         """Say it if there is a move before any G20 or G21."""
@@ -206,10 +206,10 @@ class Interpreter:
         self._units_known = True
         line = int(self.store.block.line[moves.argmax()])
         if self.setup.inch:
-            self.found.note("no G20 or G21 before the first move: inches, as the machine file says", line)
+            self.findings.note("no G20 or G21 before the first move: inches, as the machine file says", line)
             return
         row = int((self._words.line == line).argmax())
-        self.found.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
+        self.findings.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
 
     def _assume_feeds(self) -> None:
         """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""
@@ -220,7 +220,7 @@ class Interpreter:
         if len(slow) and not self._timed:
             at = feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
-            self.found.assume(text, int(self.store.block.line[slow[0]]))
+            self.findings.assume(text, int(self.store.block.line[slow[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -231,10 +231,10 @@ class Interpreter:
                 centred = any(block.value.get(letter) for letter in "IJK")
                 self.open_arcs.append(OpenArc(block.line, fault.otherwise, centred))
                 message += f"; {_IF_LATHE}" if self.two_axes else ""
-            self.found.report(fault.word, message)
+            self.findings.report(fault.word, message)
             return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
-            self.found.report(min(block.at.values()), str(fault))
+            self.findings.report(min(block.at.values()), str(fault))
             self.mover.cutter = self.state.actual = None  # what follows is read without compensation
             return block.m.get("stopping") in (20, 300)
 
@@ -242,30 +242,30 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
-        self._limits.take(block.settings, self.state, self.store, block.line, self.found)
-        feeds.set_feed(self.state, block, self.found)
+        self._limits.take(block.settings, self.state, self.store, block.line, self.findings)
+        feeds.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
-        auxiliary.events(self.state, self.store, block, self.found)
+        auxiliary.events(self.state, self.store, block, self.findings)
         if block.g.get("one-shot") == 40:
-            auxiliary.dwell(self.state, self.store, block, self.assumed, self.found)
+            auxiliary.dwell(self.state, self.store, block, self.assumed, self.findings)
         self._modes(block)
         turned = self.state.further.position.copy()
         if not block.foreign:
             self._check_parked(block)
-            homing.go_to_switches(self.state, self.store, block, self.found)
+            homing.go_to_switches(self.state, self.store, block, self.findings)
             self._one_shot(block)
             self.store.keep_origin(self.state)
             self.mover.execute(block)
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
                 text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
-                self.found.assume(text, block.line, block.motion_word())
+                self.findings.assume(text, block.line, block.motion_word())
             self.tool_point.check(self.state, block, turned)
         stop = block.m.get("stopping")
         if stop is not None and self.mover.cutter is not None:
             self.mover.cutter.fix()
         if stop == 600:
             text = "a pallet change (M60) is a full stop; the axes are assumed to stand still"
-            self.found.assume(text, block.line, block.at["stopping"])
+            self.findings.assume(text, block.line, block.at["stopping"])
         if stop in (0, 10, 600):
             self.store.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
@@ -287,14 +287,16 @@ class Interpreter:
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
-            self.mover.cutter = compensation.switch(state, self.store, block, self.mover.cutter, self.found)
+            self.mover.cutter = compensation.switch(
+                state, self.store, block, self.mover.cutter, self.findings
+            )
         if "tool length" in g:
-            offsets.set_tool_offset(state, block, self.found)
+            offsets.set_tool_offset(state, block, self.findings)
         self.tool_point.take(state, self.store, block)
         if "work offset" in g:
-            offsets.take_system(state, block, self.found)
+            offsets.take_system(state, block, self.findings)
         if "path control" in g:
-            auxiliary.path_control(state, block, self.assumed, self.found)
+            auxiliary.path_control(state, block, self.assumed, self.findings)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
@@ -312,7 +314,7 @@ class Interpreter:
             return
         motion = block.g.get("motion")
         if code in (280, 300) and motion == 0 and not self.state.strict:
-            self.found.note(
+            self.findings.note(
                 f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
             )
         elif code in COVET_AXES and motion is not None:
@@ -321,11 +323,11 @@ class Interpreter:
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
         if code in (280, 300):
-            homing.go_home(self.state, self.store, block, self.found)
+            homing.go_home(self.state, self.store, block, self.findings)
         elif code in (281, 301):
             offsets.store_position(self.state, code)
         elif code == 100:
-            offsets.set_data(self.state, block, self.found)
+            offsets.set_data(self.state, block, self.findings)
         else:
             offsets.shift_origin(self.state, block)
 
@@ -338,4 +340,4 @@ class Interpreter:
                 letter, block.value[letter], absolute=self.state.absolute
             ):
                 self.assumed.moved.add(letter)
-                self.found.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))
+                self.findings.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))

@@ -45,8 +45,8 @@ def without_leader(data: bytes) -> tuple[bytes, str]:
 
     Offsets and lines stay as they are.
     """
-    found = _FIRST_PERCENT.search(data[:_LOOKED_AT])
-    text = data[: found.start()] if found else b""
+    match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
+    text = data[: match.start()] if match else b""
     if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
         return data, ""
     shown = " ".join(text.decode("utf-8", "replace").split())[:_SHOWN]
@@ -116,8 +116,8 @@ class Words:
         at = int(self.at[word])
         if self.letter[word] == FAULT and self.value[word] != Unreadable.NUMBER:
             return self.data[at : at + 4].decode("utf-8", "replace")[:1]
-        found = _WORD.match(self.data, at)
-        return found.group().decode("ascii").strip() if found else ""
+        match = _WORD.match(self.data, at)
+        return match.group().decode("ascii").strip() if match else ""
 
     def rest(self, word: int) -> str:
         """The line behind the letter of a word, comments included."""
@@ -151,9 +151,9 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
     words, rows = _split(source, start, block_delete, letter, value, at, line, first)
     value = value[:words]
     for word in np.flatnonzero(np.isnan(value)):
-        found = _WORD.match(data, at[word])
-        assert found is not None
-        value[word] = float(re.sub(rb"[ \t]", b"", found.group()[1:]))
+        match = _WORD.match(data, at[word])
+        assert match is not None
+        value[word] = float(re.sub(rb"[ \t]", b"", match.group()[1:]))
     return Words(
         letter=letter[:words],
         value=value,

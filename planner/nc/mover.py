@@ -30,16 +30,16 @@ class Mover:
     """Executes the motion of blocks, one after the other: moves the state, and appends to the store.
 
     feed_default : of moves before the first F word [mm/s], or None
-    found   : keeps what is assumed
+    findings : keeps what is assumed
     cutter  : the cutter radius compensation that is on, or None
     splines : of lines that are read, and of those that are open
     """
 
     def __init__(
-        self, state: State, store: Store, assumed: Assumed, feed_default: float | None, found: Findings
+        self, state: State, store: Store, assumed: Assumed, feed_default: float | None, findings: Findings
     ):
         self.state, self.store, self.assumed = state, store, assumed
-        self.feed_default, self.found = feed_default, found
+        self.feed_default, self.findings = feed_default, findings
         self.cutter: Cutter | None = None
         self.splines = SplineReader()
 
@@ -51,7 +51,7 @@ class Mover:
             return
         if block.g.get("one-shot") == 530:
             moves.check_machine_coordinates(state, block)
-            offsets.assume_origin(state, "G53", block, self.found)
+            offsets.assume_origin(state, "G53", block, self.findings)
         if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
             self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
@@ -73,7 +73,7 @@ class Mover:
 
     def _take_default_feed(self, block: Block) -> None:
         if not self.assumed.strict:
-            feeds.take_default(self.state, self.feed_default, block, self.found)
+            feeds.take_default(self.state, self.feed_default, block, self.findings)
 
     def _move(self, block: Block) -> None:
         """A block with a motion code in force, and somewhere to go."""
@@ -91,12 +91,12 @@ class Mover:
         if state.motion > 3:
             further_moves.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
-            threads.thread(state, self.store, block, self.found)
+            threads.thread(state, self.store, block, self.findings)
         elif state.motion == codes.THREADING:
-            threads.cut_thread(state, self.store, block, self.found)
+            threads.cut_thread(state, self.store, block, self.findings)
         elif state.motion in codes.CYCLES:
             feeds.check_feed(state, block)
-            drilling.drill(state, self.store, block, self.found)
+            drilling.drill(state, self.store, block, self.findings)
         elif state.motion in (2, 3):
             self._arc(block)
         else:
@@ -112,7 +112,7 @@ class Mover:
         if kind == Kind.LINE:
             feeds.check_feed(state, block)
             length = float(np.linalg.norm(target - state.position))
-            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length), self.found)
+            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length), self.findings)
         if kind == Kind.LINE and feeds.on_surface(state):
             further_moves.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
@@ -153,18 +153,18 @@ class Mover:
             if not state.plane_known:
                 state.plane_known = True
                 text = "no G17, G18 or G19 before the first arc: G17; a Fanuc control starts with what is set in it"
-                self.found.assume(text, block.line, block.motion_word())
+                self.findings.assume(text, block.line, block.motion_word())
             arc, normal = moves.arc(state, block, target)
             if is_hardly_turned(arc):
                 length = moves.arc_length(state.position, target, arc, normal)
                 text = f"an arc of {length:.4g} mm hardly turns; some controls make a full circle of it"
-                self.found.assume(text, block.line, block.motion_word())
+                self.findings.assume(text, block.line, block.motion_word())
             if feeds.on_surface(state):
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
                 state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
             feeds.feed_of_time(
-                state, block, moves.arc_length(state.position, target, arc, normal), self.found
+                state, block, moves.arc_length(state.position, target, arc, normal), self.findings
             )
             if self.cutter is not None:
                 self.cutter.arc(target, arc, block.line)

@@ -29,7 +29,7 @@ _SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)  # G10 P1 ... P9
 _FIXTURE = 593  # the system of G10 L11
 
 
-def set_tool_offset(state: State, block: Block, found: Findings) -> None:
+def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
     """G43, G43.1, G43.2, G43.4, G49. Raises WordFault for words that contradict each other."""
     code = block.g["tool length"]
     if code in (431, 432) and "motion" not in block.g:
@@ -40,13 +40,13 @@ def set_tool_offset(state: State, block: Block, found: Findings) -> None:
         state.tool_offset = _given(state, block, state.tool_offset)
     elif code in (430, 434):
         tool = integer(block, "H", 0) if "H" in block.value else state.tool_loaded
-        state.tool_offset = _offset_of(state, tool, block, found)
+        state.tool_offset = _offset_of(state, tool, block, findings)
     elif "H" in block.value:
         if block.has("XYZ"):
             raise WordFault(
                 block.at["H"], "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines"
             )
-        state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, found)
+        state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, findings)
     elif block.has("XYZ"):
         state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
     else:
@@ -66,19 +66,19 @@ def system_of(block: Block) -> int:
     return FURTHER_SYSTEMS + number
 
 
-def take_system(state: State, block: Block, found: Findings) -> None:
+def take_system(state: State, block: Block, findings: Findings) -> None:
     """G54 to G59.3 and G54.1: the work system from here on."""
     state.system = system_of(block)
     if state.system not in state.systems and state.system != 540:
         text = f"{system_name(state.system)} has no offset in the machine file: 0"
-        found.assume(text, block.line, block.at["work offset"])
+        findings.assume(text, block.line, block.at["work offset"])
 
 
-def assume_origin(state: State, what: str, block: Block, found: Findings) -> None:
+def assume_origin(state: State, what: str, block: Block, findings: Findings) -> None:
     """Say that `what` goes by machine coordinates where those of G54 are not known: without it G54 may be anywhere."""
     if state.system == 540 and 540 not in state.systems:
         text = f"{what} is in machine coordinates, and G54 has no offset in the machine file: 0"
-        found.assume(text, block.line, block.at["one-shot"])
+        findings.assume(text, block.line, block.at["one-shot"])
 
 
 def store_position(state: State, code: int) -> None:
@@ -112,14 +112,14 @@ def shift_origin(state: State, block: Block) -> None:
     state.apply_offsets()
 
 
-def set_data(state: State, block: Block, found: Findings) -> None:
+def set_data(state: State, block: Block, findings: Findings) -> None:
     """G10. Raises WordFault for words that are missing or not used."""
     kind = integer(block, "L", 0) if "L" in block.value else -1
     if kind in (2, 20):
         _set_system(state, block, kind)
         state.apply_offsets()
     elif kind in (1, 10, 11):
-        _set_tool(state, block, kind, found)
+        _set_tool(state, block, kind, findings)
     else:
         word = block.at["L"] if kind >= 0 else block.at["one-shot"]
         raise WordFault(
@@ -168,7 +168,7 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     further_moves.set_system(state, block, code, from_place=False)
 
 
-def _set_tool(state: State, block: Block, kind: int, found: Findings) -> None:
+def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
     further_moves.refuse(state, block, "of a tool offset")
     if "P" not in block.value:
         raise WordFault(block.at["one-shot"], f"G10 L{kind} needs its tool as a P word")
@@ -176,7 +176,7 @@ def _set_tool(state: State, block: Block, kind: int, found: Findings) -> None:
     tool = state.tools.get(number) or Tool(np.zeros(3))
     for letter in "IJQ":
         if letter in block.value:
-            found.note(
+            findings.note(
                 f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line
             )
     offset = _given(state, block, tool.offset) if kind == 1 else _offset_from_place(state, block, tool, kind)
@@ -197,9 +197,9 @@ def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> Flo
     return system.turn(offset)
 
 
-def _offset_of(state: State, number: int, block: Block, found: Findings) -> FloatArray:
+def _offset_of(state: State, number: int, block: Block, findings: Findings) -> FloatArray:
     if number not in state.tools and number != 0:
-        found.assume(
+        findings.assume(
             f"tool {number} has no length in the machine file: 0", block.line, block.at["tool length"]
         )
     return state.tools[number].offset.copy() if number in state.tools else np.zeros(3)

@@ -129,14 +129,14 @@ def execute(
     if language != SIEMENS and not reading.strict:
         data, leader = without_leader(data)
         if leader:
-            interpreter.found.note(f"the text before the first % is not read ({leader!r})", 1)
+            interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
     if is_turned(words, dialect, reading, machine):
         dialect = LATHE
-        interpreter.found.assume(LATHE_NOTE, int(words.line[0]))
+        interpreter.findings.assume(LATHE_NOTE, int(words.line[0]))
     elif dialect != SIEMENS and not reading.strict:
         interpreter.two_axes = has_two_axes(words)
     interpreter.state.fanuc = (

@@ -90,8 +90,8 @@ def ignore_list(text: str) -> tuple[str, ...]:
 def _normal(entry: str) -> str:
     """The one way to write an entry: "m007" is "M7"."""
     text = "".join(entry.upper().split())
-    if found := _CODE.fullmatch(text):
-        letter, whole, tenth = found.groups()
+    if match := _CODE.fullmatch(text):
+        letter, whole, tenth = match.groups()
         name = f"{letter}{int(whole)}" + (f".{tenth}" if tenth and tenth != "0" else "")
         if not may_be_ignored(name):
             raise InputError(

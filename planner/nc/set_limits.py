@@ -51,7 +51,7 @@ class LimitsInForce:
         self._kept = 1.0  # factor that M220 B keeps
 
     def take(
-        self, settings: Sequence[Setting], state: State, store: Store, line: int, found: Findings
+        self, settings: Sequence[Setting], state: State, store: Store, line: int, findings: Findings
     ) -> None:
         """Execute the commands of a line. Raises WordFault for a value that is not positive."""
         for setting in settings:
@@ -66,9 +66,9 @@ class LimitsInForce:
                 self._take_factor(setting.values, state, line)
                 continue
             self._line = self._line or line
-            self._take_limits(setting.name, given, state.unit, line, found)
+            self._take_limits(setting.name, given, state.unit, line, findings)
 
-    def throughout(self, store: Store, machine: Machine | None, found: Findings) -> tuple[SetLimit, ...]:
+    def throughout(self, store: Store, machine: Machine | None, findings: Findings) -> tuple[SetLimit, ...]:
         """The limits that hold throughout, and what is to be said of them."""
         self._look(store)
         if not self._line:
@@ -80,13 +80,13 @@ class LimitsInForce:
         limits = tuple(SetLimit(quantity=q, axis=a, value=v) for (q, a), v in sorted(lowest.items()))
         if len(self._seen) > 1:
             text = "the program changes its limits of speed or acceleration on the way: the lowest of each holds throughout"
-            found.assume(text, self._line)
+            findings.assume(text, self._line)
         elif limits:
-            found.note(
+            findings.note(
                 "limits that the program sets hold where they are lower than the machine's", self._line
             )
         if machine is not None and limited(machine, limits, above=True) is not machine:
-            found.assume("the program sets limits above those of the machine file, which hold", self._line)
+            findings.assume("the program sets limits above those of the machine file, which hold", self._line)
         return limits
 
     def _look(self, store: Store) -> None:
@@ -97,12 +97,12 @@ class LimitsInForce:
             self._seen.append(dict(self._now))
 
     def _take_limits(
-        self, name: str, given: Mapping[str, float], unit: float, line: int, found: Findings
+        self, name: str, given: Mapping[str, float], unit: float, line: int, findings: Findings
     ) -> None:
         if name == SPEEDS:
             per_minute = max(given.values(), default=0.0) >= PER_MINUTE
             said = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
-            found.assume(f"speeds of {SPEEDS} are read per {said}", line)
+            findings.assume(f"speeds of {SPEEDS} are read per {said}", line)
             self._set("velocity", given, unit / (SECONDS_PER_MINUTE if per_minute else 1.0))
         elif name == ACCELERATIONS:
             self._set("acceleration", given, unit)
@@ -113,7 +113,7 @@ class LimitsInForce:
             if "r" in given:
                 self._set("acceleration", {"e": given["r"]}, unit)
         elif name == VELOCITY_LIMIT:
-            self._take_velocity_limit(given, line, found)
+            self._take_velocity_limit(given, line, findings)
         else:
             quantity, axis = GRBL[name]
             self._set(
@@ -129,7 +129,7 @@ class LimitsInForce:
         state.feed_factor = factor
         self.factors.append((line, factor))
 
-    def _take_velocity_limit(self, given: Mapping[str, float], line: int, found: Findings) -> None:
+    def _take_velocity_limit(self, given: Mapping[str, float], line: int, findings: Findings) -> None:
         if "accel" in given:
             self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]), 1.0)
         if "velocity" in given:
@@ -137,7 +137,7 @@ class LimitsInForce:
             self._set(FEED, {"": given["velocity"]}, 1.0)
         rest = sorted(given.keys() - {"accel", "velocity"})
         if rest:
-            found.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
+            findings.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
 
     def _set(self, quantity: str, values: Mapping[str, float], factor: float) -> None:
         for axis, value in values.items():

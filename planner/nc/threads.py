@@ -163,7 +163,7 @@ _NEEDED = {
 _AND_BACK = 331  # G33.1
 
 
-def thread(state: State, store: Store, block: Block, found: Findings) -> None:
+def thread(state: State, store: Store, block: Block, findings: Findings) -> None:
     """G33, or G33.1 with its way back. Raises WordFault for words that are missing or impossible."""
     name = f"G{codes.number(state.motion)}"
     if block.value.get("K", 0.0) == 0.0:
@@ -178,10 +178,10 @@ def thread(state: State, store: Store, block: Block, found: Findings) -> None:
         stop(state, store, block.line)
         state.in_thread = True
         _cut(state, store, block.line, start, feed * faster)
-    _say(state, block, found)
+    _say(state, block, findings)
 
 
-def cut_thread(state: State, store: Store, block: Block, found: Findings) -> None:
+def cut_thread(state: State, store: Store, block: Block, findings: Findings) -> None:
     """G76. Raises WordFault for words that are missing or impossible."""
     target, here = moves.target(state, block), state.programmed()
     state.position[:], there = target, state.position.copy()
@@ -196,7 +196,7 @@ def cut_thread(state: State, store: Store, block: Block, found: Findings) -> Non
         else:
             _rapid(state, store, block.line, place)
     _rapid(state, store, block.line, target)
-    _say(state, block, found)
+    _say(state, block, findings)
 
 
 def stop(state: State, store: Store, line: int) -> None:
@@ -227,8 +227,8 @@ def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
         store.add(Kind.RAPID, line, state)
 
 
-def _say(state: State, block: Block, found: Findings) -> None:
-    found.note(
+def _say(state: State, block: Block, findings: Findings) -> None:
+    findings.note(
         f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out "
         "that begin and end with full stops",
         block.line,

@@ -221,9 +221,9 @@ def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list
 def _end(words: Words, word: int) -> int:
     """Where the digits of a word end in the source."""
     after = int(words.at[word]) + 1
-    found = _NUMBER.match(words.data, after)
-    assert found is not None
-    return after + len(found.group().rstrip(b" \t"))
+    match = _NUMBER.match(words.data, after)
+    assert match is not None
+    return after + len(match.group().rstrip(b" \t"))
 
 
 def _spliced(source: bytes, edits: Iterable[Edit]) -> bytes:

@@ -51,11 +51,11 @@ def instructions(data: bytes, report: Report, note: Callable[[str], None]) -> It
         at = _match(_BLANK, data, at).end()
         if at >= last:
             break
-        found = _INSTRUCTION.match(data, at)
-        if found is None:
+        match = _INSTRUCTION.match(data, at)
+        if match is None:
             at = _passed_over(data, at, report, note)
             continue
-        name, start, end = found.group(1).decode().upper(), at, found.end()
+        name, start, end = match.group(1).decode().upper(), at, match.end()
         if name in TEXT:
             at = _match(TEXT[name], data, at + 2).end()
             yield Instruction(name, [], start, start + 2, data[start + 2 : at])
@@ -106,24 +106,24 @@ def _numbers_one_by_one(data: bytes, start: int, end: int, report: Report) -> li
     numbers: list[float] = []
     at = _match(_SEPARATOR, data, start).end()
     while at < end:
-        found = _NUMBER.match(data, at, end)
+        match = _NUMBER.match(data, at, end)
         apart = not numbers or data[at - 1 : at] in b", \t\r\n\f\v" or data[at : at + 1] in b"+-"
-        if found is None or not apart:
+        if match is None or not apart:
             report(
                 at, at + 1, "this is no number; write digits, such as -12.5, with commas between the numbers"
             )
             return None
-        value = float(found.group())
+        value = float(match.group())
         if abs(value) > NUMBER_MAX:
-            report(at, found.end(), f"the number is too large; at most {NUMBER_MAX:g} is allowed")
+            report(at, match.end(), f"the number is too large; at most {NUMBER_MAX:g} is allowed")
             return None
         numbers.append(value)
-        at = _match(_SEPARATOR, data, found.end()).end()
+        at = _match(_SEPARATOR, data, match.end()).end()
     return numbers
 
 
 def _match(pattern: re.Pattern[bytes], data: bytes, at: int) -> re.Match[bytes]:
     """The match of a pattern that fits everywhere."""
-    found = pattern.match(data, at)
-    assert found is not None
-    return found
+    match = pattern.match(data, at)
+    assert match is not None
+    return match

@@ -100,14 +100,14 @@ class TokenReader(ExpressionReader):
         self.text, self.next = text, 0
         self.tokens: list[Token] = []
         while text[at:].strip():
-            found = self.pattern.match(text, at)
-            if found is None:
+            match = self.pattern.match(text, at)
+            if match is None:
                 at += len(text[at:]) - len(text[at:].lstrip())
                 raise self.fault(f"{text[at]!r} is not part of the language", at)
-            kind = str(found.lastgroup)
-            word = found.group(kind)
-            self.tokens.append(Token(kind, word if kind == "text" else word.upper(), found.start(kind)))
-            at = found.end()
+            kind = str(match.lastgroup)
+            word = match.group(kind)
+            self.tokens.append(Token(kind, word if kind == "text" else word.upper(), match.start(kind)))
+            at = match.end()
 
     def fault(self, message: str, at: int | None = None) -> Exception:
         """A fault of a character of the text; of the next token if none is given."""

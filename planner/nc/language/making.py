@@ -75,9 +75,9 @@ class Making:
 
     def assume(self, text: str) -> None:
         """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
-        if self.interpreter.found.strict:
+        if self.interpreter.findings.strict:
             raise ValueError(f"{text} (assumed without --strict)")
-        self.interpreter.found.assume(text, self.line)
+        self.interpreter.findings.assume(text, self.line)
 
 
 def equal_steps(whole: float, most: float) -> int:

@@ -253,7 +253,7 @@ class ProgramRun:
             piece if isinstance(piece, str) else "######" if piece is None else f"{piece:.6f}"
             for piece in pieces
         )
-        self.interpreter.found.note(f"message: {text.strip()}", line)
+        self.interpreter.findings.note(f"message: {text.strip()}", line)
 
     def modes(self, action: str, place: tuple[int, int, int]) -> None:
         """Save the modal state, forget it, or write the words that restore it."""

@@ -127,32 +127,32 @@ class LineReader(ExpressionReader):
 
     def keyword(self) -> str:
         """The letters that come next, in lower case; empty if none."""
-        found = _LETTERS.match(self.text, self.at)
-        if found is None:
+        match = _LETTERS.match(self.text, self.at)
+        if match is None:
             return ""
-        self.at = found.end()
-        return found.group().lower()
+        self.at = match.end()
+        return match.group().lower()
 
     def name(self) -> str:
         """A name between < and >."""
-        found = _NAME.match(self.text, self.at)
-        if found is None:
+        match = _NAME.match(self.text, self.at)
+        if match is None:
             raise self.refused("a name is < characters >, such as <depth>")
-        name = found.group(1).lower()
+        name = match.group(1).lower()
         if name.startswith(("_hal[", "_ini[")):
             raise self.refused("a signal or setting that only the control knows; write its value")
-        self.at = found.end()
+        self.at = match.end()
         return name
 
     # --- values -------------------------------------------------------------------------------------------------------------
 
     def number(self) -> float | None:
         """The number that comes next, without a sign, or None."""
-        found = _NUMBER.match(self.text, self.at)
-        if found is None:
+        match = _NUMBER.match(self.text, self.at)
+        if match is None:
             return None
-        self.at = found.end()
-        return float(found.group())
+        self.at = match.end()
+        return float(match.group())
 
     def value(self) -> Expression:
         """A number, parameter, bracket or function, with signs before it."""
@@ -215,8 +215,8 @@ class LineReader(ExpressionReader):
 
     def operator(self) -> str:
         """The operator that comes next; empty for none."""
-        found = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
-        return found.group().upper() if found else ""
+        match = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
+        return match.group().upper() if match else ""
 
     def skip(self, operator: str) -> None:
         """Go past the operator."""

@@ -65,7 +65,7 @@ class LatheParser(LatheSingles):
         rows = np.flatnonzero(words.letter[words.first[:-1]] != ord("%"))
         self.source.lines = rows.tolist()
         texts = [self.source.line(row).text.upper().replace(" ", "") for row in rows.tolist()]
-        numbers = {int(found.group(1)) for text in texts if (found := _NUMBER.match(text))}
+        numbers = {int(match.group(1)) for text in texts if (match := _NUMBER.match(text))}
         found_pairs = (
             (int(p or later), int(q or first)) for text in texts for p, q, first, later in _CALL.findall(text)
         )
@@ -89,8 +89,8 @@ class LatheParser(LatheSingles):
     # --- profiles -----------------------------------------------------------------------------------------------------------
 
     def _line(self, line: SourceLine) -> None:
-        found = _NUMBER.match(line.text.replace(" ", ""))
-        number = int(found.group(1)) if found else -1
+        match = _NUMBER.match(line.text.replace(" ", ""))
+        number = int(match.group(1)) if match else -1
         begun = [pair for pair in self.pairs if pair[0] == number]
         for pair in begun:
             if pair in self.called:  # its cycle has made it: what follows is behind it
@@ -228,8 +228,8 @@ class LatheParser(LatheSingles):
         ):
             return word.value
         text = self.source.words.data[word.at - self.source.begin :]
-        found = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
-        if (found and found.group(1)) or (line.scale != 1.0 and word.letter in LENGTHS):
+        match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
+        if (match and match.group(1)) or (line.scale != 1.0 and word.letter in LENGTHS):
             return word.value
         return Operation("*", (word.value, _INCREMENT))
 

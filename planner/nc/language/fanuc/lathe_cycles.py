@@ -124,7 +124,7 @@ class LatheCycles:
     def _removal(self, given: Given, *, facing: bool) -> Iterable[Words]:
         contour, unit = self._contour(), self._unit
         if "R" not in given:
-            self.run.interpreter.found.assume(
+            self.run.interpreter.findings.assume(
                 f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._place.line
             )
         roughing = Roughing(
@@ -177,7 +177,7 @@ class LatheCycles:
     def _pecking(self, given: Given, *, grooving: bool) -> Iterable[Words]:
         start = self._here()
         if "K" in given and "R" not in given:
-            self.run.interpreter.found.assume(
+            self.run.interpreter.findings.assume(
                 f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._place.line
             )
         pecking = Pecking(

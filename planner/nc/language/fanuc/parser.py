@@ -69,7 +69,7 @@ class FanucParser(FanucControl):
         items = list(self.source.in_order())
         texts = [item.text.upper().replace(" ", "") for item in items if not isinstance(item, PlainRows)]
         self.numbers = frozenset(
-            str(int(found.group(1))) for text in texts if (found := _PROGRAM.match(text))
+            str(int(match.group(1))) for text in texts if (match := _PROGRAM.match(text))
         )
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
@@ -202,9 +202,9 @@ class FanucParser(FanucControl):
     def _if(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
         at = reader.at
-        found = _KEYWORD.match(reader.text, reader.at)
-        if found is not None and found.group(1).upper() == "GOTO":
-            reader.at = found.end()
+        match = _KEYWORD.match(reader.text, reader.at)
+        if match is not None and match.group(1).upper() == "GOTO":
+            reader.at = match.end()
             body: list[Statement] = [Goto(line.place, reader.value())]
         elif reader.text[at : at + 4].upper() == "THEN":
             reader.at += 4

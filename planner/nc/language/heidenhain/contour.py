@@ -88,12 +88,12 @@ def frame_rows(
 
 def datum_rows(block: ConversationalBlock, column: int) -> list[Statement]:
     """TRANS DATUM AXIS X Y Z, and TRANS DATUM RESET. Raises ProgramFault."""
-    found = _DATUM.match(block.text, column)
-    if found is None:
+    match = _DATUM.match(block.text, column)
+    if match is None:
         raise block.fault("TRANS DATUM is followed by AXIS and coordinates, or by RESET", column)
-    if found.group(1).upper() == "RESET":
+    if match.group(1).upper() == "RESET":
         return frame_rows(block, [(axis, ZERO) for axis in "XYZ"], 7)
-    return frame_rows(block, _shifts(block, found.end()), 7)
+    return frame_rows(block, _shifts(block, match.end()), 7)
 
 
 def transformed(block: ConversationalBlock, cycle: int, column: int) -> list[Statement]:

@@ -80,18 +80,18 @@ class Definitions(Flow):
         return [row(block.place, ("M", 30.0))]
 
     def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        found = _TOOL_CALL.match(block.text, column)
-        if found is None:
+        match = _TOOL_CALL.match(block.text, column)
+        if match is None:
             raise block.fault('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR', column)
-        tool = self._tool_number(found.group(1), found.group(2))
-        axis, feed = found.group(3), found.group(5)
+        tool = self._tool_number(match.group(1), match.group(2))
+        axis, feed = match.group(3), match.group(5)
         if axis and axis.upper() != "Z":
-            raise block.fault(f"tool axis {axis.upper()}; Z is planned", found.start(3))
-        more_of = _named(block, _OVERSIZE, *found.span(6))
+            raise block.fault(f"tool axis {axis.upper()}; Z is planned", match.start(3))
+        more_of = _named(block, _OVERSIZE, *match.span(6))
         if more_of.pop("DR2", ZERO) != ZERO:
-            raise block.fault("DR2, of a tool's corner radius, is not read; write 0", found.start(6))
+            raise block.fault("DR2, of a tool's corner radius, is not read; write 0", match.start(6))
         if more_of and tool is None:
-            raise block.fault("DL and DR need the number of the tool in their TOOL CALL", found.start(6))
+            raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
         rows: list[Statement] = []
         if tool is not None:
             number = Number(float(tool))
@@ -101,12 +101,12 @@ class Definitions(Flow):
                 rows.append(row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
             if self.oversizes:
                 rows.append(made(block.place, "oversize", DR=more_of.get("DR", ZERO)))
-        if found.group(4):
-            speed, _ = value(block, found.start(4))
+        if match.group(4):
+            speed, _ = value(block, match.start(4))
             rows.append(row(block.place, ("S", speed)))
         self.moves.automatic = None
         if feed and feed.upper() != "MAX":
-            self.moves.automatic, _ = value(block, found.start(5))
+            self.moves.automatic, _ = value(block, match.start(5))
             rows.append(row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
         if tool is not None:
             rows.append(looked_up(block))
@@ -120,23 +120,23 @@ class Definitions(Flow):
 
     def _tool_data(self, block: ConversationalBlock, column: int) -> list[Statement]:
         """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool to have ready."""
-        found = _TOOL_DEF.match(block.text, column)
-        if found is None:
+        match = _TOOL_DEF.match(block.text, column)
+        if match is None:
             raise block.fault("TOOL DEF takes the number of a tool, its length L and its radius R", column)
-        data = _named(block, _LENGTHS, *found.span(3))
+        data = _named(block, _LENGTHS, *match.span(3))
         if not data:
             return []
-        tool = self._tool_number(found.group(1), found.group(2))
+        tool = self._tool_number(match.group(1), match.group(2))
         if tool is None:
             raise block.fault("TOOL DEF with L or R needs the number of the tool", column)
         words = (({"L": "Z", "R": "R"}[name], given) for name, given in data.items())
         return [row(block.place, ("G", 10.0), ("L", ONE), ("P", float(tool)), *words)]
 
     def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        found = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
-        if found is None:
+        match = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
+        if match is None:
             raise block.fault("CYCL DEF needs the number of a cycle", column)
-        cycle, part, column = int(found.group(1)), found.group(2), column + found.end()
+        cycle, part, column = int(match.group(1)), match.group(2), column + match.end()
         if part is not None:
             return self._old_cycle(block, cycle, int(part), column)
         if cycle not in READ:
@@ -158,16 +158,16 @@ class Definitions(Flow):
         if cycle in contour.TITLES:
             return contour.transformed(block, cycle, column)
         if cycle == 32:
-            found = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
-            if found is None and part != 1:
+            match = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
+            if match is None and part != 1:
                 return []  # 32.2: filter and rotary axes
-            if found is None:  # the machine's tolerance again
+            if match is None:  # the machine's tolerance again
                 return [row(block.place, ("G", 64.0))]
-            tolerance, _ = value(block, column + found.end())
+            tolerance, _ = value(block, column + match.end())
             return [row(block.place, ("G", 64.0), ("P", tolerance))]
         if cycle == 9:
-            found = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
-            seconds, _ = value(block, column + (found.end() if found else 0))
+            match = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
+            seconds, _ = value(block, column + (match.end() if match else 0))
             return [row(block.place, ("G", 4.0), ("P", seconds))]
         if cycle == 1:
             return self._pecking(block, part, column)
@@ -177,10 +177,10 @@ class Definitions(Flow):
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [assign(block.place, (own("cycle"), ONE))]
-        found = _PECKING.match(block.text, column)
-        if found is None or not 1 <= part <= len(drilling.PECKING):
+        match = _PECKING.match(block.text, column)
+        if match is None or not 1 <= part <= len(drilling.PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
-        number, _ = value(block, found.end())
+        number, _ = value(block, match.end())
         return [assign(block.place, (parameter(drilling.PECKING[part - 1]), number))]
 
     def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:

@@ -60,12 +60,12 @@ class Flow:
         self.file = 0
 
     def _label(self, block: ConversationalBlock, column: int) -> tuple[int, int]:
-        found = _LABEL.match(block.text, column)
-        if found is None:
+        match = _LABEL.match(block.text, column)
+        if match is None:
             raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
-        if found.group(1):
-            return int(found.group(1)), found.end()
-        return self.names.setdefault(found.group(2), NAMED + len(self.names)), found.end()
+        if match.group(1):
+            return int(match.group(1)), match.end()
+        return self.names.setdefault(match.group(2), NAMED + len(self.names)), match.end()
 
     def _label_here(self, block: ConversationalBlock, column: int) -> list[Statement]:
         label, _ = self._label(block, column)
@@ -93,11 +93,11 @@ class Flow:
         return [If(block.place, ((more, again),), [assign(block.place, (counter, ZERO))])]
 
     def _parameter(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        found = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
-        if found is None:
+        match = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
+        if match is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
-        formula = Formula(block, found.end())
-        return [assign(block.place, (self._q(block, int(found.group(1))), formula.read()))]
+        formula = Formula(block, match.end())
+        return [assign(block.place, (self._q(block, int(match.group(1))), formula.read()))]
 
     def _q(self, block: ConversationalBlock, number: int) -> Parameter:
         if number >= PARAMETERS:
@@ -105,14 +105,14 @@ class Flow:
         return parameter(number)
 
     def _fn(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        found = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
-        number = int(found.group(1)) if found else -1
-        column += found.end() if found else 0
+        match = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
+        number = int(match.group(1)) if match else -1
+        column += match.end() if match else 0
         if number in _FN_IF:
             return self._jump(block, column, number)
         target_of = re.match(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE)
         if target_of is None or number not in {**_FN_ONE, **_FN_TWO}:
-            raise block.fault(f"FN {number if found else ''} is not read; read are FN 0 to 13", column)
+            raise block.fault(f"FN {number if match else ''} is not read; read are FN 0 to 13", column)
         q, column = self._q(block, int(target_of.group(1))), column + target_of.end()
         if number in _FN_ONE:
             word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)

@@ -155,19 +155,19 @@ class HeidenhainParser(Codes):
 
     def _block(self, k: int, last: int) -> list[Statement]:
         block = self.blocks[k]
-        found = _FUNCTION.match(block.text)
-        name = " ".join(found.group().upper().split()) if found else ""
+        match = _FUNCTION.match(block.text)
+        name = " ".join(match.group().upper().split()) if match else ""
         read = _READ.get(name)
-        if found is None or read is None:
+        if match is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
             raise block.fault(
                 f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
             )
         if name not in _MOVES:
-            return read(self, block, found.end())
+            return read(self, block, match.end())
         corner = self._corner(k + 1, last)
         self.skip = bool(corner)
-        return [*corner, *read(self, block, found.end())]
+        return [*corner, *read(self, block, match.end())]
 
     def _call_program(self, block: ConversationalBlock, column: int) -> list[Statement]:
         """CALL PGM name: a file of the program's folder; its units end with it."""
@@ -203,11 +203,11 @@ class HeidenhainParser(Codes):
 
     def _corner(self, k: int, last: int) -> list[Statement]:
         """RND or CHF in block k, which the move before it ends with."""
-        found = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
-        if found is None:
+        match = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
+        if match is None:
             return []
-        block, column = self.blocks[k], found.end()
-        rounded = found.group().upper() == "RND"
+        block, column = self.blocks[k], match.end()
+        rounded = match.group().upper() == "RND"
         if rounded and (radius := re.match(r"\s*R(?=\s*[-+.\dQ])", block.text[column:], re.IGNORECASE)):
             column += radius.end()
         number, column = value(block, column)

@@ -119,17 +119,17 @@ def value(block: ConversationalBlock, column: int) -> tuple[Expression, int]:
     """The number or parameter at a column of the block's text, and the column after it. Raises ProgramFault."""
     while block.text[column : column + 1] == " ":
         column += 1
-    found = _Q.match(block.text, column)
-    if found:
-        number = int(found.group(2))
+    match = _Q.match(block.text, column)
+    if match:
+        number = int(match.group(2))
         if number >= PARAMETERS:
             raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", column)
         q = parameter(number)
-        return (-q if found.group(1) == "-" else q), found.end()
-    found = _NUMBER.match(block.text, column)
-    if found is None:
+        return (-q if match.group(1) == "-" else q), match.end()
+    match = _NUMBER.match(block.text, column)
+    if match is None:
         raise block.fault("a number or a Q parameter is expected here, such as +12.5 or Q3", column)
-    return Number(float(found.group())), found.end()
+    return Number(float(match.group())), match.end()
 
 
 class Formula(TokenReader):

@@ -105,11 +105,11 @@ class LinuxcncParser(LinuxcncControl):
 
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
         """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
-        found = _FLOW.match(reader.text, reader.at)
-        if found is None:
+        match = _FLOW.match(reader.text, reader.at)
+        if match is None:
             return False
-        code = int(found.group(1))
-        reader.at = found.end()
+        code = int(match.group(1))
+        reader.at = match.end()
         if code in _MODES:
             self._nothing_left(reader, f"M{code}")
             self.body.append(Modes(line.place, _MODES[code]))
@@ -173,8 +173,8 @@ class LinuxcncParser(LinuxcncControl):
         self.body = self.base
 
     def _returns(self, line: SourceLine) -> bool:
-        found = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
-        return found is not None and found.group(1) is not None
+        match = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
+        return match is not None and match.group(1) is not None
 
     def _call(self, reader: LineReader, line: SourceLine, label: str | Expression) -> None:
         arguments: list[Expression] = []

@@ -49,9 +49,9 @@ class Calls(Commands):
         reader.next += 1
         times: Expression = ONE
         given = self._arguments(reader)
-        if found := _TIMES.fullmatch(reader.peek()):
+        if match := _TIMES.fullmatch(reader.peek()):
             reader.next += 1
-            times = Number(float(found.group(1)))
+            times = Number(float(match.group(1)))
         if not reader.ended:
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)

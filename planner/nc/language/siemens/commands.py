@@ -140,10 +140,10 @@ class Commands(SiemensControl):
                 return
 
     def _message(self, reader: LineTokens) -> None:
-        found = re.search(r'"([^"]*)"', reader.text)
+        match = re.search(r'"([^"]*)"', reader.text)
         reader.next = len(reader.tokens)
-        if found and found.group(1):
-            self.body.append(Message(reader.place, (found.group(1),)))
+        if match and match.group(1):
+            self.body.append(Message(reader.place, (match.group(1),)))
 
     def _refused(self, reader: LineTokens) -> None:
         raise reader.fault(

@@ -9,20 +9,20 @@ import numpy as np
 from planner.base.units import MILLISECOND
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes
-from planner.nc.assumed import Assumed
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
+from planner.nc.ignored_words import IgnoredWords
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind, PathControl
 from planner.nc.state import State
-from planner.nc.store import Store
 
 # Ten times M codes: the one that reads an input, and the words that each needs.
 _READ_INPUT = 660
 _NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
 
 
-def signal(store: Store, block: Block) -> None:
+def signal(table: BlockTable, block: Block) -> None:
     """Execute the block's code. Raises WordFault if a word is missing, or for an input that is waited for."""
     code = block.m["signals"]
     for letter in _NEEDED[code]:
@@ -35,7 +35,7 @@ def signal(store: Store, block: Block) -> None:
             block.at["signals"],
             "M66 waits for an input of the control, which only the machine knows; plan the parts before and after it",
         )
-    store.add_event("M", code / 10, block.line)
+    table.add_event("M", code / 10, block.line)
 
 
 # By ten times the G code.
@@ -48,7 +48,7 @@ _LONG = 60.0  # a dwell of a minute is no usual one [s]
 _SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
 
 
-def events(state: State, store: Store, block: Block, findings: Findings) -> None:
+def events(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
     if "S" in block.value:
@@ -56,33 +56,33 @@ def events(state: State, store: Store, block: Block, findings: Findings) -> None
             raise WordFault(
                 block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
             )
-        store.add_event("S", block.value["S"], line)
+        table.add_event("S", block.value["S"], line)
         state.spindle.speed = block.value["S"]
     if "T" in block.value:
         state.tool_selected = integer(block, "T", 0)
-        store.add_event("T", state.tool_selected, line)
+        table.add_event("T", state.tool_selected, line)
     if "signals" in block.m:
-        signal(store, block)
+        signal(table, block)
     if "tool number" in block.m:
         if "Q" not in block.value:
             raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
         state.tool_loaded = integer(block, "Q", 0)
     if "tool change" in block.m:
         state.tool_loaded = state.tool_selected
-        store.add_event("M", 6.0, line)
-        store.add(Kind.STOP, line, state)
+        table.add_event("M", 6.0, line)
+        table.add(Kind.STOP, line, state)
         text = "a tool change is a full stop of the motion that moves nothing"
         if state.change_timed:
             findings.note(text, line)
         else:
             why = "it has no time, which [times] tool_change of the machine file gives"
             findings.assume(f"{text}; {why}", line, block.at["tool change"])
-    store.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
+    table.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:
-        store.add_event(letter, value, line)
+        table.add_event(letter, value, line)
     for group in ("spindle", "spindle orientation", "coolant", "override"):
         if group in block.m:
-            store.add_event("M", block.m[group] / 10, line)
+            table.add_event("M", block.m[group] / 10, line)
     state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
     if "spindle mode" in block.g:
         state.spindle.surface_speed = block.g["spindle mode"] == 960
@@ -91,23 +91,23 @@ def events(state: State, store: Store, block: Block, findings: Findings) -> None
         state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
-            store.add_event("G", code / 10, line)
+            table.add_event("G", code / 10, line)
 
 
-def dwell(state: State, store: Store, block: Block, assumed: Assumed, findings: Findings) -> None:
+def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G4. Raises WordFault."""
     seconds = block.value.get("P")
-    if seconds is not None and assumed.printer:
+    if seconds is not None and ignored.printer:
         seconds *= MILLISECOND
         findings.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
-    elif seconds is None and not assumed.strict and (assumed.printer or "S" in block.value):
+    elif seconds is None and not ignored.strict and (ignored.printer or "S" in block.value):
         seconds = block.value.get("S", 0.0)
         findings.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
     if seconds is None or seconds < 0:
         word = block.at["one-shot"] if seconds is None else block.at["P"]
         raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
-    assume_seconds(state, block, seconds if "P" in block.value and not assumed.printer else 0.0, findings)
-    store.add_dwell(seconds, block.line, state)
+    assume_seconds(state, block, seconds if "P" in block.value and not ignored.printer else 0.0, findings)
+    table.add_dwell(seconds, block.line, state)
 
 
 def assume_seconds(state: State, block: Block, seconds: float, findings: Findings) -> None:
@@ -117,18 +117,18 @@ def assume_seconds(state: State, block: Block, seconds: float, findings: Finding
         findings.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
-def assume_rapids(store: Store, assumed: Assumed, findings: Findings) -> None:
+def assume_rapids(table: BlockTable, ignored: IgnoredWords, findings: Findings) -> None:
     """Say it if G0 of a printer, which runs it at F, is planned as a rapid."""
-    rapid = store.block.kind[: store.blocks] == Kind.RAPID
-    if assumed.printer and rapid.any():
+    rapid = table.block.kind[: table.blocks] == Kind.RAPID
+    if ignored.printer and rapid.any():
         text = "G0 is planned at the limits of the axes; 3-D printers run it at F"
-        findings.assume(text, int(store.block.line[rapid.argmax()]))
+        findings.assume(text, int(table.block.line[rapid.argmax()]))
 
 
-def path_control(state: State, block: Block, assumed: Assumed, findings: Findings) -> None:
+def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
     word = block.at["path control"]
-    if block.g["path control"] == _EXACT_PATH and assumed.printer:
+    if block.g["path control"] == _EXACT_PATH and ignored.printer:
         raise WordFault(
             word, "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
         )

@@ -12,9 +12,9 @@ import math
 import re
 
 from planner.nc import codes
-from planner.nc.assumed import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, Assumed
 from planner.nc.block import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
 from planner.nc.commands import MESSAGE, command, homed
+from planner.nc.ignored_words import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, IgnoredWords
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
 from planner.nc.settings import (
     ALWAYS_READ,
@@ -39,7 +39,7 @@ PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is don
 PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
 
 
-def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Block | None:
+def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) -> Block | None:
     """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the row cannot be read as a
     whole, or holds nothing."""
     block = Block(line=int(words.line[row]))
@@ -52,21 +52,21 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
                 block.settings[-1].values.update(_bare_words(words, word))
             break
         if code == FAULT:
-            if homed(words, word, block, assumed) or command(words, word, block, report, assumed):
+            if homed(words, word, block, ignored) or command(words, word, block, report, ignored):
                 break
             report(word, _unreadable(words, word))
             return None
         letter = chr(code)
         if letter == "%":
             name = words.rest(word).partition("(")[0].partition(";")[0].strip()
-            if word > first or (name and assumed.strict):
+            if word > first or (name and ignored.strict):
                 report(word, "a % stands alone on its line: it starts and ends a program")
                 return None
             if name:
-                assumed.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
+                ignored.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
             block.ended = True
         elif letter == "O":
-            if not _program_number(words, word, last, block, report, assumed):
+            if not _program_number(words, word, last, block, report, ignored):
                 return None
         elif letter == "N":
             if word > first:
@@ -75,19 +75,19 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
         elif letter in "GM":
             owned = ""
             taken = None
-            if value * 10.0 not in ALWAYS_READ[letter] or assumed.reading.ignore:
-                taken = _settle(words, word, (first, last), block, assumed)
+            if value * 10.0 not in ALWAYS_READ[letter] or ignored.reading.ignore:
+                taken = _settle(words, word, (first, last), block, ignored)
             if taken is not None:
                 owned = taken
             else:
-                block.partial |= _add_code(block, letter, value, word, report, assumed)
-        elif letter in owned or (assumed.treatment[code] == LEFT_OUT and letter != "E"):
+                block.partial |= _add_code(block, letter, value, word, report, ignored)
+        elif letter in owned or (ignored.treatment[code] == LEFT_OUT and letter != "E"):
             if letter in owned and block.settings:
                 block.settings[-1].values[letter.lower()] = value
-        elif assumed.treatment[code] == REFUSED and letter != "E":
+        elif ignored.treatment[code] == REFUSED and letter != "E":
             report(word, str(codes.LETTERS_REFUSED[letter]))
             block.partial = True
-        elif letter in block.value and (assumed.strict or block.value[letter] != value):
+        elif letter in block.value and (ignored.strict or block.value[letter] != value):
             report(word, f"a second {letter} word on this line; write one")
             return None
         elif abs(value) > NUMBER_MAX:
@@ -96,25 +96,25 @@ def read_block(words: Words, row: int, report: Report, assumed: Assumed) -> Bloc
         else:
             block.value[letter], block.at[letter] = value, word
     if not block.partial:
-        _check_used(words, block, report, assumed)
+        _check_used(words, block, report, ignored)
     return block
 
 
 def _program_number(
-    words: Words, word: int, last: int, block: Block, report: Report, assumed: Assumed
+    words: Words, word: int, last: int, block: Block, report: Report, ignored: IgnoredWords
 ) -> bool:
     """Keep the number of a program as an event; False, after a report, for another O word."""
     number = float(words.value[word])
     statement = number < 0 or (words.letter[word:last] == FAULT).any()
-    if statement or assumed.strict or number > NUMBER_MAX:
+    if statement or ignored.strict or number > NUMBER_MAX:
         report(word, str(codes.LETTERS_REFUSED["O"]))
         return False
-    assumed.count(PROGRAM_NUMBER, words.text(word), block.line)
+    ignored.count(PROGRAM_NUMBER, words.text(word), block.line)
     block.events.append(("O", number))
     return True
 
 
-def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed: Assumed) -> str | None:
+def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored: IgnoredWords) -> str | None:
     """Keep a code that moves nothing, or that the user knows to be harmless, as an event.
 
     Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is to be read.
@@ -126,24 +126,24 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, assumed
     name = f"{letter}{codes.number(code)}"
     before = _letters(words, row[0], word).replace("N", "").replace("M", "")
     found = setting(letter, code, before, _behind(words, word + 1, row[1]))
-    if assumed.ignores(name):
-        assumed.count(LEFT_OUT_BY_USER, name, block.line)
+    if ignored.ignores(name):
+        ignored.count(LEFT_OUT_BY_USER, name, block.line)
         block.events.append((letter, code / 10))
         block.partial = True
         block.foreign |= letter == "G"
         alone = letter == "M" and code not in codes.M_GROUP and not before
         return found.own if found else EVERYTHING if alone else ""
-    if assumed.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
+    if ignored.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
         block.tool_point, block.at["tool point"] = code // 10, word
         block.events.append((letter, code / 10))
         return ""
-    if found is None or assumed.strict:
+    if found is None or ignored.strict:
         return None
     if found.what is None:
         block.settings.append(Setting(name, {}, word))
     else:
-        assumed.count(found.what, words.text(word), block.line)
-    assumed.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
+        ignored.count(found.what, words.text(word), block.line)
+    ignored.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
     return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
@@ -164,20 +164,22 @@ def _behind(words: Words, word: int, last: int) -> str:
     return re.split("[GM]", _letters(words, word, last), maxsplit=1)[0]
 
 
-def _add_code(block: Block, letter: str, value: float, word: int, report: Report, assumed: Assumed) -> bool:
+def _add_code(
+    block: Block, letter: str, value: float, word: int, report: Report, ignored: IgnoredWords
+) -> bool:
     """Put a G or M code into its group; True if it was reported instead."""
     code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
     known, refused = (codes.G_GROUP, codes.G_REFUSED) if letter == "G" else (codes.M_GROUP, codes.M_REFUSED)
     exact = abs(value * 10.0 - code) <= 10.0 * _CODE_ROUNDING
     if not exact or code not in known:
         refusal = refused.get(code) if exact else None
-        refusal = refusal or codes.unknown(letter, code, strict=assumed.strict or not exact)
+        refusal = refusal or codes.unknown(letter, code, strict=ignored.strict or not exact)
         report(word, str(refusal))
         block.foreign |= refusal.takes_axes
         block.refused_motion |= refusal.takes_axes and 330 <= code <= 890
         return True
     group, groups = known[code], block.g if letter == "G" else block.m
-    if groups.get(group) == code and not assumed.strict:  # said twice
+    if groups.get(group) == code and not ignored.strict:  # said twice
         return False
     if group in groups:
         report(
@@ -191,18 +193,18 @@ def _add_code(block: Block, letter: str, value: float, word: int, report: Report
     return False
 
 
-def _check_used(words: Words, block: Block, report: Report, assumed: Assumed) -> None:
+def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWords) -> None:
     """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no motion code, the one in force
     may use them: the interpreter looks."""
     named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
     block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
     if "E" in block.own:
-        assumed.used("E")
+        ignored.used("E")
     for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
-        if letter in "DH" and not assumed.strict:
-            assumed.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
-        elif assumed.treatment[ord(letter)] != LEFT_OUT:
+        if letter in "DH" and not ignored.strict:
+            ignored.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
+        elif ignored.treatment[ord(letter)] != LEFT_OUT:
             report(block.at[letter], unused(letter))
         del block.value[letter]
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 
-from planner.nc.assumed import Assumed
 from planner.nc.block import Block, Report
 from planner.nc.codes import Assumption
+from planner.nc.ignored_words import IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.settings import GRBL, VELOCITY_LIMIT, Setting
 
@@ -35,15 +35,15 @@ _LONGEST = 80  # characters of bare axis letters that are looked at
 _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNORECASE)
 
 
-def command(words: Words, word: int, block: Block, report: Report, assumed: Assumed) -> bool:
+def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
     """Execute a `$` command at the start of a line into `block`, or Klipper's limit; False for what is none, or is refused."""
-    if block.g or block.m or block.value or assumed.strict:
+    if block.g or block.m or block.value or ignored.strict:
         return False
     if words.text(word) != "$":
         return _velocity_limit(words, word, block)
     text = "$" + words.rest(word).split(";")[0].split("(")[0].strip()
-    if assumed.ignores("$") or assumed.ignores(text.upper()[:2]):
-        assumed.count(_IGNORED, text, block.line)
+    if ignored.ignores("$") or ignored.ignores(text.upper()[:2]):
+        ignored.count(_IGNORED, text, block.line)
         return True
     if homing := _HOMING.fullmatch(text):
         block.homing = homing.group(1).upper() or "XYZ"
@@ -52,10 +52,10 @@ def command(words: Words, word: int, block: Block, report: Report, assumed: Assu
         block.settings.append(Setting(setting[1], {"": float(setting[2])}, word))
         return True
     if setting:
-        assumed.count(_OTHER_SETTING, text, block.line)
+        ignored.count(_OTHER_SETTING, text, block.line)
         return True
     if _HARMLESS.fullmatch(text):
-        assumed.count(COMMAND, text, block.line)
+        ignored.count(COMMAND, text, block.line)
         return True
     return False
 
@@ -72,9 +72,9 @@ def _velocity_limit(words: Words, word: int, block: Block) -> bool:
     return True
 
 
-def homed(words: Words, word: int, block: Block, assumed: Assumed) -> bool:
+def homed(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
     """Execute a G28 with bare letters from `word` on into `block`: `G28 X Y`, or all axes for `G28 W`; False for anything else."""
-    if block.g.get("one-shot") != 280 or block.value or assumed.strict:
+    if block.g.get("one-shot") != 280 or block.value or ignored.strict:
         return False
     data, at = words.data, int(words.at[word])
     match = _BARE.match(data[at : at + _LONGEST].partition(b"\n")[0] + b"\n")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from planner.nc import codes
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.state import State
-from planner.nc.store import Store
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
 _OFF = 400
@@ -54,7 +54,9 @@ def check_motion(state: State, block: Block) -> None:
         raise WordFault(block.motion_word(), _refusal(f"G{codes.number(state.motion)}"))
 
 
-def switch(state: State, store: Store, block: Block, on: Cutter | None, findings: Findings) -> Cutter | None:
+def switch(
+    state: State, table: BlockTable, block: Block, on: Cutter | None, findings: Findings
+) -> Cutter | None:
     """The compensation after G40 to G42.1, given the one in force. Raises WordFault."""
     code = block.g["cutter compensation"]
     if code == _OFF:
@@ -80,7 +82,7 @@ def switch(state: State, store: Store, block: Block, on: Cutter | None, findings
     if diameter == 0.0:
         return None
     left = (code in _LEFT) == (diameter > 0)
-    return Cutter(state, store, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
+    return Cutter(state, table, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
 
 
 def _diameter(state: State, block: Block, code: int, findings: Findings) -> float:

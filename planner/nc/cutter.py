@@ -30,10 +30,10 @@ from dataclasses import dataclass, replace
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.block_table import BlockTable
 from planner.nc.offset_lines import NOWHERE, OffsetMove, dot, meeting
 from planner.nc.program import Kind
 from planner.nc.state import State
-from planner.nc.store import Store
 
 STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
 _ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
@@ -68,15 +68,15 @@ class _Open:
 
 
 class Cutter:
-    """The compensation in force, from G41 or G42 to G40; it writes its moves into the store.
+    """The compensation in force, from G41 or G42 to G40; it writes its moves into the table of blocks.
 
     radius : of the tool [mm], > 0
     left   : on which side of the path it is
     normal : axis normal to the plane
     """
 
-    def __init__(self, state: State, store: Store, *, radius: float, left: bool, normal: int):
-        self._state, self._store = state, store
+    def __init__(self, state: State, table: BlockTable, *, radius: float, left: bool, normal: int):
+        self._state, self._table = state, table
         self._radius, self._sign = radius, 1 if left else -1
         self.normal = normal
         self._open: _Open | None = None
@@ -195,39 +195,39 @@ class Cutter:
         state = self._state
         assert state.actual is not None
         place = self._at(end, state.actual)
-        self._store.make_room(2)
+        self._table.make_room(2)
         if kind == Kind.RAPID:
             state.actual = place
-            self._store.add(Kind.RAPID, line, state)
+            self._table.add(Kind.RAPID, line, state)
             return
         spokes = (end - corner) / (self._plane(state.actual) - corner)
         sweep = -self._sign * (-self._sign * cmath.phase(spokes) % (2.0 * math.pi))
         state.actual = place
-        self._store.add_arc(Arc(self._at(corner, place), sweep), self.normal, line, state)
+        self._table.add_arc(Arc(self._at(corner, place), sweep), self.normal, line, state)
 
     def _settle(self, open_: _Open) -> None:
         """See that the open move still leads forward, now that its end is known; write an arc's sweep."""
         if open_.arc >= 0 and not open_.fixed:
-            block, centre, normal, _ = self._store.arcs[open_.arc]
-            self._store.arcs[open_.arc] = (block, centre, normal, open_.sweep)
+            block, centre, normal, _ = self._table.arcs[open_.arc]
+            self._table.arcs[open_.arc] = (block, centre, normal, open_.sweep)
         elif not open_.fixed and dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
             raise CutterFault(_GOUGE)
 
     # --- blocks -------------------------------------------------------------------------------------------------------------
 
     def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
-        state, store = self._state, self._store
+        state, table = self._state, self._table
         assert state.actual is not None
         begin, before = self._plane(state.actual), state.actual
         state.position[:] = target
         state.actual = self._at(side.end, target)
-        store.make_room(2)
-        row, arc = store.blocks, -1
+        table.make_room(2)
+        row, arc = table.blocks, -1
         if kind == Kind.ARC:
-            arc = len(store.arcs)
-            store.add_arc(Arc(self._at(side.centre, before), sweep), self.normal, line, state)
+            arc = len(table.arcs)
+            table.add_arc(Arc(self._at(side.centre, before), sweep), self.normal, line, state)
         else:
-            store.add(kind, line, state)
+            table.add(kind, line, state)
         self._open = _Open(side, row, arc, begin, sweep)
 
     def _left_out(self, side: OffsetMove, allowed_back: float) -> float:
@@ -267,17 +267,17 @@ class Cutter:
         place = self._plane(state.actual)
         state.position[:] = target
         state.actual = self._at(place, target)
-        self._store.make_room(1)
+        self._table.make_room(1)
         if self._open is not None and self._open.row < 0:
-            self._open.row = self._store.blocks
-        self._store.add(kind, line, state)
+            self._open.row = self._table.blocks
+        self._table.add(kind, line, state)
 
     def _move_end(self, row: int, point: complex) -> None:
         """All blocks from the open move on end at another place in the plane."""
-        state, ends = self._state, self._store.block.end
+        state, ends = self._state, self._table.block.end
         assert state.actual is not None
         for axis, value in zip(IN_PLANE[self.normal], (point.real, point.imag), strict=True):
-            ends[row : self._store.blocks, axis] = value
+            ends[row : self._table.blocks, axis] = value
             state.actual[axis] = value
 
     def _plane(self, point: FloatArray) -> complex:

@@ -30,11 +30,11 @@ from planner.base.units import MM_PER_INCH
 from planner.nc import auxiliary, codes
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
-from planner.nc.store import Store
 
 CLEARANCE = 0.01 * MM_PER_INCH  # between pecks [mm]: a hundredth of an inch, as LinuxCNC has it
 
@@ -141,7 +141,7 @@ _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [program
 _SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
-def drill(state: State, store: Store, block: Block, findings: Findings) -> None:
+def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """Execute the line. Raises WordFault for words that are missing or contradict each other."""
     a, b = IN_PLANE[state.normal]
     c = state.normal
@@ -152,7 +152,7 @@ def drill(state: State, store: Store, block: Block, findings: Findings) -> None:
     hole = _hole(state, block, series, words)
     repeats = _repeats(block, hole)
     if series.level < hole.clear - _ROUNDING:
-        _to(state, store, block.line, CycleStep(Kind.RAPID, (here[a], here[b], hole.clear)))
+        _to(state, table, block.line, CycleStep(Kind.RAPID, (here[a], here[b], hole.clear)))
         here[c] = hole.clear
     for _ in range(repeats):
         for axis in (a, b):
@@ -161,10 +161,10 @@ def drill(state: State, store: Store, block: Block, findings: Findings) -> None:
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         hole = replace(hole, place=(float(here[a]), float(here[b])))
         height = float(here[c]) if here[c] > hole.clear + _ROUNDING else hole.retract
-        _to(state, store, block.line, CycleStep(Kind.RAPID, (*hole.place, height)))
-        _to(state, store, block.line, CycleStep(Kind.RAPID, (*hole.place, hole.clear)))
+        _to(state, table, block.line, CycleStep(Kind.RAPID, (*hole.place, height)))
+        _to(state, table, block.line, CycleStep(Kind.RAPID, (*hole.place, hole.clear)))
         for step in steps(hole):
-            _to(state, store, block.line, step)
+            _to(state, table, block.line, step)
         here[c] = hole.retract
     _say(state, block, findings)
 
@@ -277,16 +277,16 @@ def _check_spindle(state: State, code: int, word: int) -> None:
         raise WordFault(word, f"{name} stops the spindle, which does not turn; write M3 or M4 before it")
 
 
-def _to(state: State, store: Store, line: int, step: CycleStep) -> None:
+def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
     """Execute a step."""
-    store.make_room(1)
+    table.make_room(1)
     if step.kind is None:
-        store.add_event("M", step.spindle, line)
+        table.add_event("M", step.spindle, line)
         state.spindle.turning = _SPINDLE[step.spindle]
     elif step.kind == Kind.DWELL:
-        store.add_dwell(step.seconds, line, state)
+        table.add_dwell(step.seconds, line, state)
     elif step.kind == Kind.STOP:
-        store.add(Kind.STOP, line, state)
+        table.add(Kind.STOP, line, state)
     else:
         point = np.empty(3)
         a, b = IN_PLANE[state.normal]
@@ -294,7 +294,7 @@ def _to(state: State, store: Store, line: int, step: CycleStep) -> None:
         end = state.machine(point * state.unit)
         if step.kind == Kind.LINE or (end != state.place).any():
             state.position[:], state.actual = end, None
-            store.add(step.kind, line, state)
+            table.add(step.kind, line, state)
 
 
 def _per_unit(state: State) -> np.ndarray:

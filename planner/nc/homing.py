@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, further_moves, moves, offsets
+from planner.nc import codes, extra_axis_moves, moves, offsets
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.program import Kind
 from planner.nc.state import State
-from planner.nc.store import Store
 
 
-def go_home(state: State, store: Store, block: Block, findings: Findings) -> None:
+def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """All axes, or those of the block, go to the position of G28 or G30; in a rotated work system those of the system."""
     code, word = block.g["one-shot"], block.at["one-shot"]
     if code not in state.homes:
@@ -24,28 +24,28 @@ def go_home(state: State, store: Store, block: Block, findings: Findings) -> Non
         offsets.assume_origin(state, f"G{codes.number(code)}", block, findings)
     if state.actual is not None:  # cutter radius compensation ends here
         state.actual = None
-        store.add(Kind.RAPID, block.line, state)
+        table.add(Kind.RAPID, block.line, state)
     home = state.homes.get(code, np.zeros(3))
     everything = not block.has(state.letters)
     if everything:
         state.position[:] = home
     else:
         state.position[:] = moves.target(state, block)
-        further_moves.move(state, block)
-        store.add(Kind.RAPID, block.line, state)
+        extra_axis_moves.move(state, block)
+        table.add(Kind.RAPID, block.line, state)
         state.position[:] = _some_axes(state, block, home)
-    further_moves.go_home(state, block, code, everything=everything)
-    store.add(Kind.RAPID, block.line, state)
+    extra_axis_moves.go_home(state, block, code, everything=everything)
+    table.add(Kind.RAPID, block.line, state)
 
 
-def go_to_switches(state: State, store: Store, block: Block, findings: Findings) -> None:
+def go_to_switches(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or to machine zero."""
     if not block.homing:
         return
     home = state.homes.get(280, np.zeros(3))
     for letter in block.homing:
         state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
-    store.add(Kind.RAPID, block.line, state)
+    table.add(Kind.RAPID, block.line, state)
     findings.assume(
         "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not",
         block.line,

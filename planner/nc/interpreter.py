@@ -21,12 +21,13 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
-from planner.nc.assumed import Assumed
 from planner.nc.block import Block
 from planner.nc.block_reader import read_block
+from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
 from planner.nc.dwell_times import DwellWords
 from planner.nc.faults import FaultList, Findings, Notes
+from planner.nc.ignored_words import IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover
 from planner.nc.moves import WordFault
@@ -35,7 +36,6 @@ from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.set_limits import LimitsInForce
 from planner.nc.state import REFUSED_MOTION, Setup, State, set_units
-from planner.nc.store import Store
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
 _FEED_LEAST = (
@@ -55,7 +55,7 @@ class OpenArc(NamedTuple):
 class Interpreter:
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`, `faults()`, `notes`.
 
-    Between two chunks `state`, `setup` and `store` say where the program stands: what parameters of a program ask for.
+    Between two chunks `state`, `setup` and `table` say where the program stands: what parameters of a program ask for.
 
     open_arcs : every arc that does not close
     by_word : rows that were executed word by word, not by the compiled loop
@@ -69,16 +69,16 @@ class Interpreter:
         state = self.setup.start()
         state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
         self.tool_point = ToolPointSwitch.of(machine)
-        self.assumed = Assumed(
+        self.ignored = IgnoredWords(
             reading,
             state.further.letters,
             extruder=machine is not None and EXTRUDER in machine.axes,
             at_tip=self.tool_point.chain is not None,
         )
-        store = Store(len(state.further.letters))
-        store.keep_origin(state)
+        table = BlockTable(len(state.further.letters))
+        table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)
-        self.mover = Mover(state, store, self.assumed, self.setup.feed_default, self.findings)
+        self.mover = Mover(state, table, self.ignored, self.setup.feed_default, self.findings)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []
@@ -99,23 +99,23 @@ class Interpreter:
         return self.mover.state
 
     @property
-    def store(self) -> Store:
+    def table(self) -> BlockTable:
         """The blocks so far."""
-        return self.mover.store
+        return self.mover.table
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
         self._end_compensation()
-        auxiliary.assume_rapids(self.store, self.assumed, self.findings)
-        limits = self._limits.throughout(self.store, self.setup.machine, self.findings)
-        read = self.store.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
+        auxiliary.assume_rapids(self.table, self.ignored, self.findings)
+        limits = self._limits.throughout(self.table, self.setup.machine, self.findings)
+        read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         read = dataclasses.replace(read, limits=limits)
         return read if self.findings.faults else at_the_tip(read, self.tool_point, self.setup.machine)
 
-    def go_on_with(self, state: State, store: Store) -> None:
-        """Execute what follows in another `state` and into another `store`: a profile that is read aside."""
-        self.mover.state, self.mover.store = state, store
+    def go_on_with(self, state: State, table: BlockTable) -> None:
+        """Execute what follows in another `state` and into another `table`: a profile that is read aside."""
+        self.mover.state, self.mover.table = state, table
 
     def _end_compensation(self) -> None:
         """Settle the last move, if the program just ends while compensation is on."""
@@ -129,7 +129,7 @@ class Interpreter:
     @property
     def notes(self) -> Notes:
         """Assumptions and notes, each once, with its first line and how often."""
-        return self.findings.notes(self.assumed.notes())
+        return self.findings.notes(self.ignored.notes())
 
     def in_seconds(self, words: Words) -> Words:
         """The next words of the program with the times of dwells in seconds, as `execute` takes them."""
@@ -138,19 +138,19 @@ class Interpreter:
     def execute(self, words: Words) -> None:
         """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
         row, rows, self._words = 0, len(words.line), words
-        self.store.begin(len(words.letter))
+        self.table.begin(len(words.letter))
         while row < rows and not self.ended:
-            self.store.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
+            self.table.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
             after = (
                 row
                 if self.mover.splines.open
-                else run_plain(words, row, self.state, self.store, self.assumed)
+                else run_plain(words, row, self.state, self.table, self.ignored)
             )
             self._begun |= after > row
             if after < rows:
                 self.by_word += 1
-                self.store.frame = int(words.frame[after])
-                block = read_block(words, after, self.findings.report, self.assumed)
+                self.table.frame = int(words.frame[after])
+                block = read_block(words, after, self.findings.report, self.ignored)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
                 elif block is not None:
@@ -161,12 +161,12 @@ class Interpreter:
         self._read = row
         self._assume_units()
         self.mover.splines.keep(words)
-        refused = self.store.refused_word[: self.store.refusals]
+        refused = self.table.refused_word[: self.table.refusals]
         letters = words.letter[refused]
-        self.assumed.moved |= {chr(letter) for letter in np.flatnonzero(np.bincount(letters))}
+        self.ignored.moved |= {chr(letter) for letter in np.flatnonzero(np.bincount(letters))}
         found = [(int(w), str(codes.LETTERS_REFUSED[chr(c)])) for w, c in zip(refused, letters, strict=True)]
         self.findings.keep(words, found)
-        self.assumed.count_letters(words, row)
+        self.ignored.count_letters(words, row)
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
@@ -200,11 +200,11 @@ class Interpreter:
 
     def _assume_units(self) -> None:
         """Say it if there is a move before any G20 or G21."""
-        moves = np.isin(self.store.block.kind[: self.store.blocks], MOVES)
+        moves = np.isin(self.table.block.kind[: self.table.blocks], MOVES)
         if self._units_known or self._words is None or not moves.any():
             return
         self._units_known = True
-        line = int(self.store.block.line[moves.argmax()])
+        line = int(self.table.block.line[moves.argmax()])
         if self.setup.inch:
             self.findings.note("no G20 or G21 before the first move: inches, as the machine file says", line)
             return
@@ -214,13 +214,13 @@ class Interpreter:
     def _assume_feeds(self) -> None:
         """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""
         kind, feed = (
-            column[: self.store.blocks] for column in (self.store.block.kind, self.store.block.feed)
+            column[: self.table.blocks] for column in (self.table.block.kind, self.table.block.feed)
         )
         slow = np.flatnonzero(np.isin(kind, FEED_MOVES) & (feed < _FEED_LEAST))
         if len(slow) and not self._timed:
             at = feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
-            self.findings.assume(text, int(self.store.block.line[slow[0]]))
+            self.findings.assume(text, int(self.table.block.line[slow[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -242,19 +242,19 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             compensation.check_unchanged(self.state, block)
-        self._limits.take(block.settings, self.state, self.store, block.line, self.findings)
+        self._limits.take(block.settings, self.state, self.table, block.line, self.findings)
         feeds.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
-        auxiliary.events(self.state, self.store, block, self.findings)
+        auxiliary.events(self.state, self.table, block, self.findings)
         if block.g.get("one-shot") == 40:
-            auxiliary.dwell(self.state, self.store, block, self.assumed, self.findings)
+            auxiliary.dwell(self.state, self.table, block, self.ignored, self.findings)
         self._modes(block)
         turned = self.state.further.position.copy()
         if not block.foreign:
             self._check_parked(block)
-            homing.go_to_switches(self.state, self.store, block, self.findings)
+            homing.go_to_switches(self.state, self.table, block, self.findings)
             self._one_shot(block)
-            self.store.keep_origin(self.state)
+            self.table.keep_origin(self.state)
             self.mover.execute(block)
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
                 text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
@@ -267,9 +267,9 @@ class Interpreter:
             text = "a pallet change (M60) is a full stop; the axes are assumed to stand still"
             self.findings.assume(text, block.line, block.at["stopping"])
         if stop in (0, 10, 600):
-            self.store.add_event("M", stop / 10, block.line)
+            self.table.add_event("M", stop / 10, block.line)
         if stop in (0, 10, 600) or block.stops:
-            self.store.add(Kind.STOP, block.line, self.state)
+            self.table.add(Kind.STOP, block.line, self.state)
         if block.refused_motion:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
@@ -288,15 +288,15 @@ class Interpreter:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
             self.mover.cutter = compensation.switch(
-                state, self.store, block, self.mover.cutter, self.findings
+                state, self.table, block, self.mover.cutter, self.findings
             )
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.findings)
-        self.tool_point.take(state, self.store, block)
+        self.tool_point.take(state, self.table, block)
         if "work offset" in g:
             offsets.take_system(state, block, self.findings)
         if "path control" in g:
-            auxiliary.path_control(state, block, self.assumed, self.findings)
+            auxiliary.path_control(state, block, self.ignored, self.findings)
         if "distance mode" in g:
             state.absolute = g["distance mode"] == 900
         if "arc centre mode" in g:
@@ -304,7 +304,7 @@ class Interpreter:
         if "retract mode" in g:
             state.to_level, state.retract_given = g["retract mode"] == 980, True
         state.apply_offsets()
-        self.store.keep_origin(state)
+        self.table.keep_origin(state)
 
     # --- what moves ---------------------------------------------------------------------------------------------------------
 
@@ -323,7 +323,7 @@ class Interpreter:
                 f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
             )
         if code in (280, 300):
-            homing.go_home(self.state, self.store, block, self.findings)
+            homing.go_home(self.state, self.table, block, self.findings)
         elif code in (281, 301):
             offsets.store_position(self.state, code)
         elif code == 100:
@@ -336,8 +336,8 @@ class Interpreter:
         for letter in codes.PARKABLE:
             if letter in self.state.further.letters:
                 continue
-            if letter in block.value and not self.assumed.may_stand(
+            if letter in block.value and not self.ignored.may_stand(
                 letter, block.value[letter], absolute=self.state.absolute
             ):
-                self.assumed.moved.add(letter)
+                self.ignored.moved.add(letter)
                 self.findings.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))

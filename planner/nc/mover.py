@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, compensation, drilling, feeds, further_moves, moves, offsets, threads
+from planner.nc import codes, compensation, drilling, extra_axis_moves, feeds, moves, offsets, threads
 from planner.nc.arcs import is_hardly_turned
-from planner.nc.assumed import Assumed
 from planner.nc.block import OFFSET_NUMBER, Block
+from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings
+from planner.nc.ignored_words import IgnoredWords
 from planner.nc.moves import WordFault
 from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, State
-from planner.nc.store import Store
 
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
 COVET_AXES = (100, 280, 300, 520, 920)
@@ -27,7 +27,7 @@ _WHY_NO_MOTION = {
 
 
 class Mover:
-    """Executes the motion of blocks, one after the other: moves the state, and appends to the store.
+    """Executes the motion of blocks, one after the other: moves the state, and appends to the table of blocks.
 
     feed_default : of moves before the first F word [mm/s], or None
     findings : keeps what is assumed
@@ -36,9 +36,14 @@ class Mover:
     """
 
     def __init__(
-        self, state: State, store: Store, assumed: Assumed, feed_default: float | None, findings: Findings
+        self,
+        state: State,
+        table: BlockTable,
+        ignored: IgnoredWords,
+        feed_default: float | None,
+        findings: Findings,
     ):
-        self.state, self.store, self.assumed = state, store, assumed
+        self.state, self.table, self.ignored = state, table, ignored
         self.feed_default, self.findings = feed_default, findings
         self.cutter: Cutter | None = None
         self.splines = SplineReader()
@@ -53,7 +58,7 @@ class Mover:
             moves.check_machine_coordinates(state, block)
             offsets.assume_origin(state, "G53", block, self.findings)
         if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
-            self.assumed.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
+            self.ignored.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
         if state.motion in codes.SPLINES or (self.splines.open and "motion" in block.g):
             self._spline(block)
@@ -72,7 +77,7 @@ class Mover:
             self.state.motion, self.state.series = NO_MOTION, None
 
     def _take_default_feed(self, block: Block) -> None:
-        if not self.assumed.strict:
+        if not self.ignored.strict:
             feeds.take_default(self.state, self.feed_default, block, self.findings)
 
     def _move(self, block: Block) -> None:
@@ -84,19 +89,19 @@ class Mover:
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
-            threads.stop(state, self.store, block.line)
+            threads.stop(state, self.table, block.line)
         if self.cutter is not None:
-            further_moves.refuse(state, block, "under cutter radius compensation")
+            extra_axis_moves.refuse(state, block, "under cutter radius compensation")
             compensation.check_motion(state, block)
         if state.motion > 3:
-            further_moves.refuse(state, block, "in a cycle or a thread")
+            extra_axis_moves.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
-            threads.thread(state, self.store, block, self.findings)
+            threads.thread(state, self.table, block, self.findings)
         elif state.motion == codes.THREADING:
-            threads.cut_thread(state, self.store, block, self.findings)
+            threads.cut_thread(state, self.table, block, self.findings)
         elif state.motion in codes.CYCLES:
             feeds.check_feed(state, block)
-            drilling.drill(state, self.store, block, self.findings)
+            drilling.drill(state, self.table, block, self.findings)
         elif state.motion in (2, 3):
             self._arc(block)
         else:
@@ -107,14 +112,16 @@ class Mover:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
         begin = state.further.position.copy() if state.further.letters else NOWHERE
-        further_moves.move(state, block)
+        extra_axis_moves.move(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
         if kind == Kind.LINE:
             feeds.check_feed(state, block)
             length = float(np.linalg.norm(target - state.position))
-            feeds.feed_of_time(state, block, further_moves.length_moved(state, begin, length), self.findings)
+            feeds.feed_of_time(
+                state, block, extra_axis_moves.length_moved(state, begin, length), self.findings
+            )
         if kind == Kind.LINE and feeds.on_surface(state):
-            further_moves.refuse(state, block, "under a constant surface speed")
+            extra_axis_moves.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
             state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
             if cutter is None:
@@ -124,25 +131,25 @@ class Mover:
             cutter.line(target, kind, block.line)
             return
         state.position[:], state.actual = target, None
-        self.store.add(kind, block.line, state)
+        self.table.add(kind, block.line, state)
 
     def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
         """A straight move in parts, each with the feed of its larger radius."""
         state, start, at = self.state, self.state.place.copy(), begin
         parts = feeds.surface_parts(state, begin, end)
-        self.store.make_room(len(parts))
+        self.table.make_room(len(parts))
         for part in parts:
             there = begin + part * (end - begin)
             state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
             state.position[:] = target if part == 1.0 else start + part * (target - start)
             state.actual, at = None, there
-            self.store.add(Kind.LINE, block.line, state)
+            self.table.add(Kind.LINE, block.line, state)
 
     def _arc(self, block: Block) -> None:
         """G2, G3."""
         state = self.state
         target = moves.target(state, block)
-        further_moves.move(state, block)
+        extra_axis_moves.move(state, block)
         feeds.check_feed(state, block)
         if self.cutter is None and state.actual is not None:
             raise WordFault(
@@ -171,14 +178,14 @@ class Mover:
         finally:
             state.position[:] = target
         if self.cutter is None:
-            self.store.add_arc(arc, normal, block.line, state)
+            self.table.add_arc(arc, normal, block.line, state)
 
     def _spline(self, block: Block) -> None:
         """A line of a spline; the curve is a block of its first line."""
         state = self.state
         if not is_spline_line(block):
             return
-        further_moves.refuse(state, block, "on a spline")
+        extra_axis_moves.refuse(state, block, "on a spline")
         if self.cutter is not None:
             raise WordFault(
                 block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
@@ -190,15 +197,15 @@ class Mover:
             )
         state.series = None
         if state.in_thread:
-            threads.stop(state, self.store, block.line)
-        found = self.splines.read(state, block, self.store.blocks)
+            threads.stop(state, self.table, block.line)
+        found = self.splines.read(state, block, self.table.blocks)
         if found is None:
             return
         self._take_default_feed(block)
         feeds.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]
-        self.store.add_spline(points, weights, line, state)
+        self.table.add_spline(points, weights, line, state)
 
 
 def _gives_offsets(block: Block) -> bool:

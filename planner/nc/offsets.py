@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, further_moves
+from planner.nc import codes, extra_axis_moves
 from planner.nc.block import Block
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, coordinate, integer
@@ -33,7 +33,7 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
     """G43, G43.1, G43.2, G43.4, G49. Raises WordFault for words that contradict each other."""
     code = block.g["tool length"]
     if code in (431, 432) and "motion" not in block.g:
-        further_moves.refuse(state, block, "of a tool offset")
+        extra_axis_moves.refuse(state, block, "of a tool offset")
     if code == 490:
         state.tool_offset = np.zeros(3)
     elif code == 431:
@@ -108,7 +108,7 @@ def shift_origin(state: State, block: Block) -> None:
         state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
         if code == 921:
             state.g92_saved = np.zeros(3)
-    further_moves.shift_origin(state, block, code)
+    extra_axis_moves.shift_origin(state, block, code)
     state.apply_offsets()
 
 
@@ -147,7 +147,7 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
-    further_moves.set_system(state, block, code, from_place=kind == 20)
+    extra_axis_moves.set_system(state, block, code, from_place=kind == 20)
 
 
 def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
@@ -165,11 +165,11 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     code = FURTHER_SYSTEMS + number if kind == 20 else _SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
-    further_moves.set_system(state, block, code, from_place=False)
+    extra_axis_moves.set_system(state, block, code, from_place=False)
 
 
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
-    further_moves.refuse(state, block, "of a tool offset")
+    extra_axis_moves.refuse(state, block, "of a tool offset")
     if "P" not in block.value:
         raise WordFault(block.at["one-shot"], f"G10 L{kind} needs its tool as a P word")
     number = integer(block, "P", 1)

@@ -1,5 +1,5 @@
 """The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused, left out or parked whatever
-stands beside them (rotary axes, extruders; see `planner.nc.assumed`). Everything else stops it.
+stands beside them (rotary axes, extruders; see `planner.nc.ignored_words`). Everything else stops it.
 
 This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser engraving). It follows the
 same rules as the interpreter: feed first, then S, then the straight move; whatever is not certainly right is left to the
@@ -15,13 +15,13 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
-from planner.nc.assumed import AXIS, LEFT_OUT, PARKED, REFUSED, Assumed
 from planner.nc.block import NUMBER_MAX
-from planner.nc.further import LETTERS, ROTARY
+from planner.nc.block_table import BlockTable
+from planner.nc.extra_axes import LETTERS, ROTARY
+from planner.nc.ignored_words import AXIS, LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.program import Kind
 from planner.nc.state import State
-from planner.nc.store import Store
 
 # Letters by their codes.
 _F, _G, _N, _O, _S, _X, _Z = 70, 71, 78, 79, 83, 88, 90
@@ -72,7 +72,7 @@ class _Counts(NamedTuple):
     feed_unit: float  # mm per programmed unit when it was given
 
 
-def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assumed) -> int:
+def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: IgnoredWords) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
     if not state.is_plain:
         return row
@@ -90,18 +90,18 @@ def run_plain(words: Words, row: int, state: State, store: Store, assumed: Assum
         *_of_further(state),
     )
     begin = _Counts(
-        row, store.blocks, store.events, store.refusals, state.motion, state.feed, state.feed_unit
+        row, table.blocks, table.events, table.refusals, state.motion, state.feed, state.feed_unit
     )
-    others = _Others(assumed.treatment, assumed.parked)
+    others = _Others(ignored.treatment, ignored.parked)
     end = _run(
-        rows, begin, fixed, state.position, place, store.block, store.event, store.refused_word, others
+        rows, begin, fixed, state.position, place, table.block, table.event, table.refused_word, others
     )
     further.position[columns] = place
     if end.blocks > begin.blocks:
         state.series = None
     if end.events > begin.events:
-        state.spindle.speed = float(store.event.value[end.events - 1])  # plain rows have no other events
-    store.blocks, store.events, store.refusals = end.blocks, end.events, end.refusals
+        state.spindle.speed = float(table.event.value[end.events - 1])  # plain rows have no other events
+    table.blocks, table.events, table.refusals = end.blocks, end.events, end.refusals
     state.motion, state.feed, state.feed_unit = end.motion, end.feed, end.feed_unit
     return int(end.row)
 

@@ -147,14 +147,14 @@ def execute(
     integers = integers_of(machine)
     words = integers.applied(words)
     if dialect is not None:
-        interpreter.assumed.refuse_extruder()
+        interpreter.ignored.refuse_extruder()
         from planner.nc.language.expand import expand
 
         return interpreter, *expand(interpreter, words, dialect, integers, tee)
     interpreter.execute(interpreter.in_seconds(words))
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
-    if interpreter.assumed.follows and not len(faults):
+    if interpreter.ignored.follows and not len(faults):
         program = with_extruder(program, words, interpreter.rows_read, interpreter.feed_factors)
     return interpreter, program, faults
 

@@ -21,12 +21,12 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import Machine
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.program import MOVES, SetLimit
 from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
-from planner.nc.store import Store
 
 SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", "M201", "M204"
 # From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x and y are above 17 mm/s.
@@ -51,11 +51,11 @@ class LimitsInForce:
         self._kept = 1.0  # factor that M220 B keeps
 
     def take(
-        self, settings: Sequence[Setting], state: State, store: Store, line: int, findings: Findings
+        self, settings: Sequence[Setting], state: State, table: BlockTable, line: int, findings: Findings
     ) -> None:
         """Execute the commands of a line. Raises WordFault for a value that is not positive."""
         for setting in settings:
-            self._look(store)
+            self._look(table)
             given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
             for key, value in given.items():
                 if not value > 0.0:
@@ -68,9 +68,11 @@ class LimitsInForce:
             self._line = self._line or line
             self._take_limits(setting.name, given, state.unit, line, findings)
 
-    def throughout(self, store: Store, machine: Machine | None, findings: Findings) -> tuple[SetLimit, ...]:
+    def throughout(
+        self, table: BlockTable, machine: Machine | None, findings: Findings
+    ) -> tuple[SetLimit, ...]:
         """The limits that hold throughout, and what is to be said of them."""
-        self._look(store)
+        self._look(table)
         if not self._line:
             return ()
         lowest = {
@@ -89,10 +91,10 @@ class LimitsInForce:
             findings.assume("the program sets limits above those of the machine file, which hold", self._line)
         return limits
 
-    def _look(self, store: Store) -> None:
+    def _look(self, table: BlockTable) -> None:
         """Keep the limits in force if there was a move under them."""
-        kinds = store.block.kind[self._blocks : store.blocks]
-        self._blocks = store.blocks
+        kinds = table.block.kind[self._blocks : table.blocks]
+        self._blocks = table.blocks
         if np.isin(kinds, MOVES).any() and self._now not in self._seen:
             self._seen.append(dict(self._now))
 

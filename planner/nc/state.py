@@ -17,7 +17,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.units import MM_PER_INCH
 from planner.machine import LINEAR_AXES, Machine
-from planner.nc.further import Further, further_of
+from planner.nc.extra_axes import ExtraAxes, extra_axes_of
 from planner.nc.program import PathControl
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
@@ -156,7 +156,7 @@ class State:
     fanuc: bool = False
     seconds_meant: bool = False
     plane_known: bool = True
-    further: Further = field(default_factory=Further)
+    further: ExtraAxes = field(default_factory=ExtraAxes)
 
     @property
     def letters(self) -> str:
@@ -251,7 +251,7 @@ class Setup:
             homes=dict(self.positions),
             tools=dict(self.tools),
             change_timed=times is not None and times.tool_change is not None,
-            further=further_of(self.machine, system_code),
+            further=extra_axes_of(self.machine, system_code),
         )
         state.apply_offsets()
         return state

@@ -32,11 +32,11 @@ from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import State
-from planner.nc.store import Store
 
 PASSES_MAX = 10_000  # of a thread: more are a mistake in J or H
 ANGLE_MAX = 80.0  # of the compound slide [degrees], as LinuxCNC's manual has it
@@ -163,7 +163,7 @@ _NEEDED = {
 _AND_BACK = 331  # G33.1
 
 
-def thread(state: State, store: Store, block: Block, findings: Findings) -> None:
+def thread(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """G33, or G33.1 with its way back. Raises WordFault for words that are missing or impossible."""
     name = f"G{codes.number(state.motion)}"
     if block.value.get("K", 0.0) == 0.0:
@@ -173,15 +173,15 @@ def thread(state: State, store: Store, block: Block, findings: Findings) -> None
         raise WordFault(block.at["I"], "I of G33.1, how much faster the way back is, must be above 0")
     feed = _feed(state, block, abs(block.value["K"]))
     target, start = moves.target(state, block), state.position.copy()
-    _cut(state, store, block.line, target, feed)
+    _cut(state, table, block.line, target, feed)
     if state.motion == _AND_BACK:
-        stop(state, store, block.line)
+        stop(state, table, block.line)
         state.in_thread = True
-        _cut(state, store, block.line, start, feed * faster)
+        _cut(state, table, block.line, start, feed * faster)
     _say(state, block, findings)
 
 
-def cut_thread(state: State, store: Store, block: Block, findings: Findings) -> None:
+def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """G76. Raises WordFault for words that are missing or impossible."""
     target, here = moves.target(state, block), state.programmed()
     state.position[:], there = target, state.position.copy()
@@ -192,39 +192,39 @@ def cut_thread(state: State, store: Store, block: Block, findings: Findings) -> 
     for cut in passes(read):
         place = state.machine(np.array([cut.x * state.unit, here[1], cut.z * state.unit]))
         if cut.pitch:
-            _cut(state, store, block.line, place, cut.pitch * feed)
+            _cut(state, table, block.line, place, cut.pitch * feed)
         else:
-            _rapid(state, store, block.line, place)
-    _rapid(state, store, block.line, target)
+            _rapid(state, table, block.line, place)
+    _rapid(state, table, block.line, target)
     _say(state, block, findings)
 
 
-def stop(state: State, store: Store, line: int) -> None:
+def stop(state: State, table: BlockTable, line: int) -> None:
     """A full stop before or after a cut."""
-    store.make_room(1)
-    store.add(Kind.STOP, line, state)
+    table.make_room(1)
+    table.add(Kind.STOP, line, state)
     state.in_thread = False
 
 
-def _cut(state: State, store: Store, line: int, target: FloatArray, feed: float) -> None:
+def _cut(state: State, table: BlockTable, line: int, target: FloatArray, feed: float) -> None:
     """A straight move in step with the spindle."""
     if not state.in_thread:
-        stop(state, store, line)
+        stop(state, table, line)
     programmed, state.feed = state.feed, feed
     state.position[:], state.actual = target, None
-    store.make_room(1)
-    store.synchronised.append(store.blocks)
-    store.add(Kind.LINE, line, state)
+    table.make_room(1)
+    table.synchronised.append(table.blocks)
+    table.add(Kind.LINE, line, state)
     state.feed, state.in_thread = programmed, True
 
 
-def _rapid(state: State, store: Store, line: int, place: FloatArray) -> None:
+def _rapid(state: State, table: BlockTable, line: int, place: FloatArray) -> None:
     if state.in_thread:
-        stop(state, store, line)
+        stop(state, table, line)
     if (place != state.place).any():
         state.position[:], state.actual = place, None
-        store.make_room(1)
-        store.add(Kind.RAPID, line, state)
+        table.make_room(1)
+        table.add(Kind.RAPID, line, state)
 
 
 def _say(state: State, block: Block, findings: Findings) -> None:

@@ -26,13 +26,13 @@ from planner.base.units import RAD_PER_DEG
 from planner.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.machine import Machine
 from planner.nc.block import Block
+from planner.nc.block_table import BlockTable
 from planner.nc.events import EventTable
-from planner.nc.further import LETTERS, ROTARY
+from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.moves import WordFault
 from planner.nc.program import FEED_MOVES, MOVES, Kind, PathControl, Program, SplineTable, ToolPoint
 from planner.nc.settings import TOOL_POINT_ON
 from planner.nc.state import State
-from planner.nc.store import Store
 
 CHORD_SHARE = 0.1  # of the tolerance, that a rapid move of the joints leaves its chords by [-]
 CHORDS_MAX = 2**14  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um
@@ -65,7 +65,7 @@ class ToolPointSwitch:
         """That of a machine."""
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
-    def take(self, state: State, store: Store, block: Block) -> None:
+    def take(self, state: State, table: BlockTable, block: Block) -> None:
         """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
@@ -84,7 +84,7 @@ class ToolPointSwitch:
             )
         if now != self._on or (now and length != self.switches[-1].length):
             self._move(state, now, length)
-            self.switches.append(Switch(store.blocks, block.line, now, length))
+            self.switches.append(Switch(table.blocks, block.line, now, length))
 
     def check(self, state: State, block: Block, before: FloatArray) -> None:
         """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes stand at 0.

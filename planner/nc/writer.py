@@ -11,7 +11,7 @@ be run in a minute, in every block anew; the first other one after it has G94 an
 mode keeps it.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
-up to 0.1 % longer than asked.
+up to 0.1 % longer than new_feed.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     """
     alone = extruder_alone(program)  # keeps its feed, written out where one of ours is in force
     moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES) | alone)
-    asked = np.asarray(feeds, dtype=np.float64)
-    if asked.shape != (len(program),):
-        raise ValueError(f"retimed: {asked.size} feeds for {len(program)} blocks")
-    if (asked < 0).any():
-        raise ValueError(f"retimed: a feed of {np.nanmin(asked):g} mm/s; none may be negative")
-    asked = np.where(alone, np.nan, asked)
+    new_feed = np.asarray(feeds, dtype=np.float64)
+    if new_feed.shape != (len(program),):
+        raise ValueError(f"retimed: {new_feed.size} feeds for {len(program)} blocks")
+    if (new_feed < 0).any():
+        raise ValueError(f"retimed: a feed of {np.nanmin(new_feed):g} mm/s; none may be negative")
+    new_feed = np.where(alone, np.nan, new_feed)
     reading = program.reading
     read = source if reading.strict else without_leader(source)[0]
     words = split_words(read, block_delete=reading.block_delete)
@@ -72,7 +72,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     often[~per_minute | (mode.word[row] >= 0)] = np.nan
     own = _has_feed_of_f(program.feed[moving], programmed * unit[row], per_minute) | ~np.isnan(often)
     moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
-    wanted = np.maximum(asked[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
+    wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
     # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them decides

@@ -6,7 +6,7 @@ In reading order:
     compiled    statements to Python source, compiled once: `expressions` in `basic_blocks`
     rows        what the running program appends: row after row, given to the interpreter in chunks
     run         the running program: its parameters, calls and limits
-    asked       parameters that hold the state of the control
+    system_variables  parameters that hold the state of the control
     arithmetic  operators and functions that all dialects have
     spelling    expressions and words as RS274NGC and Fanuc spell them
     linuxcnc, fanuc, heidenhain, siemens    a folder for each dialect: its text to statements

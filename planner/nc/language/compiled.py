@@ -156,7 +156,7 @@ class _Function:
 
     def _assign(self, target: Parameter, value: str, place: SourcePlace) -> str:
         if isinstance(target, Named):
-            if target.shared and target.name in self.language.asked_names:
+            if target.shared and target.name in self.language.system_names:
                 raise ProgramFault(place, f"the control sets #<{target.name}> itself; it can only be read")
             return f"{'G' if target.shared else 'L'}[{target.name!r}]={value}"
         if isinstance(target.index, Number) and self.say.stored(target.index.value):
@@ -283,7 +283,7 @@ class _Function:
         for piece in message.pieces:
             if isinstance(piece, str):
                 pieces.append(repr(piece))
-            elif isinstance(piece, Named) and not (piece.shared and piece.name in self.language.asked_names):
+            elif isinstance(piece, Named) and not (piece.shared and piece.name in self.language.system_names):
                 pieces.append(f"{'G' if piece.shared else 'L'}.get({piece.name!r})")
             else:
                 pieces.append(self.say.value(piece))

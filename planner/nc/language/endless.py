@@ -57,9 +57,9 @@ def _is_kept(parameter: Parameter, language: Language) -> bool:
     if isinstance(parameter, Named):
         return not (
             parameter.shared
-            and (parameter.name in language.asked_names or parameter.name.startswith("_value"))
+            and (parameter.name in language.system_names or parameter.name.startswith("_value"))
         )
-    return isinstance(parameter.index, Number) and parameter.index.value not in language.asked
+    return isinstance(parameter.index, Number) and parameter.index.value not in language.system_numbers
 
 
 def _all(body: Sequence[Statement]) -> Iterator[Statement]:

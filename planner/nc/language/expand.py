@@ -12,13 +12,12 @@ from pathlib import Path
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.asked import Asked, FanucAsked, LinuxcncAsked, PositionAsked
 from planner.nc.language.compiled import ProgramFault, compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
 from planner.nc.language.fanuc.calls import fanuc_files
 from planner.nc.language.fanuc.lathe import LatheParser
 from planner.nc.language.fanuc.lathe_cycles import LatheCycles
-from planner.nc.language.fanuc.lathe_words import LatheAsked
+from planner.nc.language.fanuc.lathe_words import LatheVariables
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.flow import files as heidenhain_files
@@ -31,6 +30,12 @@ from planner.nc.language.siemens import text as siemens_text
 from planner.nc.language.siemens.calls import siemens_files
 from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
+from planner.nc.language.system_variables import (
+    FanucVariables,
+    LinuxcncVariables,
+    PositionVariables,
+    SystemVariables,
+)
 from planner.nc.language.tree import Language, Parser
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
@@ -57,7 +62,7 @@ def expand(
     """
     rows = AppendedRows()
     front = _FRONTS[dialect]
-    run = ProgramRun(interpreter, rows, front.language, front.asked(interpreter))
+    run = ProgramRun(interpreter, rows, front.language, front.variables(interpreter))
     run.tee = tee or run.tee
     run.lathe = LatheCycles(run) if dialect == LATHE else None
     files = _Files(run, rows, front, integers)
@@ -85,19 +90,19 @@ class _Front:
     """The reader of a dialect. files : names, in small letters, of the file that holds a subprogram."""
 
     language: Language
-    asked: type[Asked]
+    variables: type[SystemVariables]
     parser: Callable[[Source], Parser]
     files: Callable[[str], frozenset[str]]
 
 
 _FRONTS = {
     LINUXCNC: _Front(
-        linuxcnc_text.LANGUAGE, LinuxcncAsked, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
+        linuxcnc_text.LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
-    FANUC: _Front(fanuc_text.LANGUAGE, FanucAsked, FanucParser, fanuc_files),
-    LATHE: _Front(fanuc_text.LANGUAGE, LatheAsked, LatheParser, fanuc_files),
-    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionAsked, HeidenhainParser, heidenhain_files),
-    SIEMENS: _Front(siemens_text.LANGUAGE, PositionAsked, SiemensParser, siemens_files),
+    FANUC: _Front(fanuc_text.LANGUAGE, FanucVariables, FanucParser, fanuc_files),
+    LATHE: _Front(fanuc_text.LANGUAGE, LatheVariables, LatheParser, fanuc_files),
+    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionVariables, HeidenhainParser, heidenhain_files),
+    SIEMENS: _Front(siemens_text.LANGUAGE, PositionVariables, SiemensParser, siemens_files),
 }
 
 
@@ -113,7 +118,7 @@ class _Files:
         """Compile a file; returns what cannot be read in it."""
         first, begin = self.rows.add_file(words, name)
         source = Source(words, len(self.sources), first, begin, self.integers)
-        source.at_tip = self.run.interpreter.assumed.at_tip
+        source.at_tip = self.run.interpreter.ignored.at_tip
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)

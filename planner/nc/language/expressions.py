@@ -31,7 +31,9 @@ class Expressions:
         """True if a parameter of that number is the program's own, not one that the control is asked for."""
         low = 0 if self.language.vacant is None else 1
         return (
-            index == int(index) and low <= index <= self.language.largest and index not in self.language.asked
+            index == int(index)
+            and low <= index <= self.language.largest
+            and index not in self.language.system_numbers
         )
 
     def _expression(self, expression: Expression, *, raw: bool) -> tuple[str, bool]:
@@ -41,14 +43,14 @@ class Expressions:
             return (repr(expression.value) if expression.value >= 0 else f"({expression.value!r})"), False
         if isinstance(expression, Named):
             name = expression.name
-            if expression.shared and name in language.asked_names:
+            if expression.shared and name in language.system_names:
                 return f"A({name!r})", False
             return f"{'G' if expression.shared else 'L'}[{name!r}]", False
         if isinstance(expression, Numbered):
             index = expression.index
             if isinstance(index, Number) and self.stored(index.value):
                 text = f"P[{int(index.value)}]"
-            elif isinstance(index, Number) and index.value in language.asked:
+            elif isinstance(index, Number) and index.value in language.system_numbers:
                 return f"A({int(index.value)})", False
             else:
                 text = f"R({self.value(index)})"
@@ -68,4 +70,4 @@ class Expressions:
             return f"run.exists({self.value(parameter.index)})"
         if not parameter.shared:
             return f"({parameter.name!r} in L)"
-        return "True" if parameter.name in self.language.asked_names else f"({parameter.name!r} in G)"
+        return "True" if parameter.name in self.language.system_names else f"({parameter.name!r} in G)"

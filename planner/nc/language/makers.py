@@ -82,13 +82,13 @@ def _direction(making: Making) -> complex:
         raise ValueError(
             "CT while cutter radius compensation is on is not read; write the arc with CR= or I and J"
         )
-    store, normal = interpreter.store, interpreter.state.normal
-    k = store.blocks - 1
-    if k < 0 or store.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
+    table, normal = interpreter.table, interpreter.state.normal
+    k = table.blocks - 1
+    if k < 0 or table.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
         raise ValueError("CT goes on in the direction of the move before it, and there is none")
-    end, begin = store.block.end[k], store.block.end[k - 1] if k else np.zeros(3)
-    if store.block.kind[k] == Kind.ARC:
-        _, centre, about, sweep = store.arcs[-1]
+    end, begin = table.block.end[k], table.block.end[k - 1] if k else np.zeros(3)
+    if table.block.kind[k] == Kind.ARC:
+        _, centre, about, sweep = table.arcs[-1]
         spoke = in_plane(end, normal) - in_plane(centre, normal)
         way = spoke * (1j if sweep > 0 else -1j) * (1.0 if about == normal else 0.0)
     else:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault
 from planner.nc.language.travel_rows import (
     AXES,
@@ -25,7 +26,6 @@ from planner.nc.language.travel_rows import (
 )
 from planner.nc.program import Kind
 from planner.nc.state import State
-from planner.nc.store import Store
 
 _KINDS = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)
 
@@ -41,7 +41,7 @@ class OffsetMoves:
     def __init__(self, place: FloatArray, radius: float, side: int, normal: int):
         self.radius, self.side, self.normal = radius, side, normal
         self._start = place.copy()
-        self._state, self._store = State(), Store()
+        self._state, self._table = State(), BlockTable()
         self._state.normal = normal
         self._cutter: Cutter | None = None
         self._first: Move | None = None  # it waits for the next one in the plane
@@ -57,7 +57,7 @@ class OffsetMoves:
         """The contour begins at a place (3,) with a unit tangent; returns where the tool is then (3,)."""
         self._state.position[:] = place
         self._cutter = Cutter(
-            self._state, self._store, radius=self.radius, left=self.side > 0, normal=self.normal
+            self._state, self._table, radius=self.radius, left=self.side > 0, normal=self.normal
         )
         self._cutter.begin_beside(tangent)
         assert self._state.actual is not None
@@ -125,16 +125,16 @@ class OffsetMoves:
 
     def _add(self, move: Move) -> None:
         assert self._cutter is not None
-        before = self._store.blocks
+        before = self._table.blocks
         line = move.rest.line
         if move.arc is not None:
             self._cutter.arc(move.end, move.arc, line)
         else:
             self._cutter.line(move.end, _KINDS[move.code], line)
-        self._items.append((move, before, self._store.blocks))
+        self._items.append((move, before, self._table.blocks))
 
     def _written(self) -> Iterator[TravelRow]:
-        arcs = {block: (centre, sweep) for block, centre, _, sweep in self._store.arcs}
+        arcs = {block: (centre, sweep) for block, centre, _, sweep in self._table.arcs}
         place = self._start
         for item in self._items:
             if isinstance(item, TravelRow):
@@ -143,13 +143,13 @@ class OffsetMoves:
             move, first, last = item
             before, stops = stops_apart(move.rest)
             for block in range(first, last):
-                end = self._store.block.end[block].copy()
+                end = self._table.block.end[block].copy()
                 axes = [
                     *IN_PLANE[self.normal],
                     *([self.normal] if end[self.normal] != place[self.normal] else []),
                 ]
                 words = [(AXES[a], float(end[a]), move.at) for a in sorted(axes)]
-                code = 0 if self._store.block.kind[block] == Kind.RAPID else 1
+                code = 0 if self._table.block.kind[block] == Kind.RAPID else 1
                 if block in arcs and abs(arcs[block][1]) > 2.0 * FULL_TURN:
                     code = 3 if arcs[block][1] > 0 else 2
                     words += arc_words(Arc(*arcs[block]), place, self.normal, move.at)

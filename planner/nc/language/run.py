@@ -16,11 +16,11 @@ from typing import Protocol
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.asked import Asked, Modes
 from planner.nc.language.compiled import Compiled, whole
 from planner.nc.language.making import Making
 from planner.nc.language.rows import AppendedRows, NotFinite
 from planner.nc.language.stops import Endless, TooDeep, last_statement, sentence, statement_of
+from planner.nc.language.system_variables import Modes, SystemVariables
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import TravelRow, words_of
 from planner.nc.language.tree import Language, ProgramFault, SourcePlace
@@ -63,8 +63,10 @@ class ProgramRun:
     resume   : the label where the caller of a procedure goes on, or None
     """
 
-    def __init__(self, interpreter: Interpreter, rows: AppendedRows, language: Language, asked: Asked):
-        self.interpreter, self.rows, self.language, self.asked = interpreter, rows, language, asked
+    def __init__(
+        self, interpreter: Interpreter, rows: AppendedRows, language: Language, system: SystemVariables
+    ):
+        self.interpreter, self.rows, self.language, self.system = interpreter, rows, language, system
         self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
         if language.vacant is None:
             self.numbered[0] = None
@@ -90,7 +92,7 @@ class ProgramRun:
         self.lathe: Cycles | None = None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
-        asked.travel = self.travel
+        system.travel = self.travel
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
@@ -156,9 +158,9 @@ class ProgramRun:
             raise Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
         if pending > self._at_once:
-            blocks = self.interpreter.store.blocks + self.travel.moves
+            blocks = self.interpreter.table.blocks + self.travel.moves
             self.flush()
-            moved = self.interpreter.store.blocks + self.travel.moves > blocks
+            moved = self.interpreter.table.blocks + self.travel.moves > blocks
             self.idle = 0 if moved else self.idle + pending
             self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
@@ -219,14 +221,14 @@ class ProgramRun:
     def get(self, index: float) -> float | None:
         """The value of a parameter whose number is computed."""
         number = self._number(index)
-        return self.ask(number) if number in self.language.asked else self.numbered[number]
+        return self.ask(number) if number in self.language.system_numbers else self.numbered[number]
 
     def put(self, index: float, value: float | None) -> None:
         """Give a value to a parameter whose number is computed, or that belongs to the control."""
         number = self._number(index)
-        if number in self.language.asked:
+        if number in self.language.system_numbers:
             self.flush()
-            self.asked.put(number, value)
+            self.system.put(number, value)
         elif number == 0:
             raise ValueError("parameter #0 cannot be given a value")
         else:
@@ -236,13 +238,13 @@ class ProgramRun:
         """True if there is a parameter of that number, with a value."""
         number = round(index)
         return 0 < number <= self.language.largest and (
-            number in self.language.asked or self.numbered[number] is not None
+            number in self.language.system_numbers or self.numbered[number] is not None
         )
 
     def ask(self, parameter: int | str) -> float:
         """A parameter that holds the state of the control, after everything before it."""
         self.flush()
-        return self.asked.get(parameter, self._depth)
+        return self.system.get(parameter, self._depth)
 
     def message(self, line: int, pieces: tuple[object, ...]) -> None:
         """Keep a text for the user."""
@@ -261,7 +263,7 @@ class ProgramRun:
         if action == "forget":
             self._saved[-1] = None
         elif action in ("save", "save until return"):
-            self._saved[-1] = self.asked.modes()
+            self._saved[-1] = self.system.modes()
             self._restored_at_return[-1] |= action == "save until return"
         elif self._saved[-1] is not None:
             for words in self._saved[-1]:

@@ -269,7 +269,7 @@ class Language:
     locals     : parameters 1 to `locals` are a call's own
     largest    : largest number of a parameter
     vacant     : the value of a parameter that was never assigned; None where "no value" differs from 0
-    asked      : numbers of the parameters that hold the state of the control
+    system_numbers, system_names : parameters that hold the state of the control
     read       : the Python text of a parameter's value in an expression, with {0} for what was stored
     raw        : operators that tell a parameter without a value from 0
     """
@@ -279,8 +279,8 @@ class Language:
     locals: int
     largest: int
     vacant: float | None
-    asked: frozenset[int]
-    asked_names: frozenset[str] = frozenset()
+    system_numbers: frozenset[int]
+    system_names: frozenset[str] = frozenset()
     read: str = "{0}"
     raw: frozenset[str] = frozenset()
 

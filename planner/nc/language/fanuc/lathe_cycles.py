@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Notes
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.tree import SourcePlace
@@ -28,7 +29,6 @@ from planner.nc.lathe_cuts import (
 from planner.nc.lexer import Words as LexedWords
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
-from planner.nc.store import Store
 from planner.nc.turning import (
     SAME,
     Contour,
@@ -54,7 +54,7 @@ class LatheCycles:
     def __init__(self, run: ProgramRun):
         self.run = run
         self._start = np.zeros(3)
-        self._aside: tuple[State, Store, Callable[[LexedWords], None]] | None = None
+        self._aside: tuple[State, BlockTable, Callable[[LexedWords], None]] | None = None
         self._place = SourcePlace(0, 0, 0)  # of the cycle
 
     def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
@@ -88,8 +88,8 @@ class LatheCycles:
         if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
             raise ValueError(_NEEDS)
         self._start = state.programmed().copy()
-        self._aside = copy.deepcopy(state), interpreter.store, self.run.tee
-        interpreter.go_on_with(state, Store())
+        self._aside = copy.deepcopy(state), interpreter.table, self.run.tee
+        interpreter.go_on_with(state, BlockTable())
         self.run.tee = lambda words: None
         state.feed_mode, state.feed = (
             "per minute",
@@ -101,15 +101,15 @@ class LatheCycles:
         profile."""
         if self._aside is None:
             return None
-        state, store, self.run.tee = self._aside
-        self.run.interpreter.go_on_with(state, store)
+        state, table, self.run.tee = self._aside
+        self.run.interpreter.go_on_with(state, table)
         self._aside = None
         return self._place
 
     def _contour(self) -> Contour:
         """The blocks that were executed aside as a profile; the state is again what it was before them. Raises ValueError."""
         interpreter = self.run.interpreter
-        program, offset = interpreter.store.finish("", Notes()), interpreter.state.offset.copy()
+        program, offset = interpreter.table.finish("", Notes()), interpreter.state.offset.copy()
         self.leave()
         if (offset != interpreter.state.offset).any():
             raise ValueError("the profile changes an offset; write it before the cycle")

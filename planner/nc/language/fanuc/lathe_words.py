@@ -12,10 +12,10 @@ Refused: drilling cycles, G50 with coordinates.
 
 from __future__ import annotations
 
-from planner.nc.language.asked import FanucAsked
 from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
+from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tree import (
     Expression,
     Line,
@@ -37,7 +37,7 @@ _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 _REFUSED = {**dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are")}
 
 
-class LatheAsked(FanucAsked):
+class LatheVariables(FanucVariables):
     """Fanuc's numbers on a lathe: the second axis is z, and x is a diameter."""
 
     def here(self, axis: int) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS
-from planner.nc.language.asked import FanucAsked
 from planner.nc.language.expression_reader import ranked
 from planner.nc.language.spelling import Spelling
+from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tree import Language
 
 LOCALS = 33  # #1 to #33 are a call's own
@@ -27,7 +27,7 @@ LANGUAGE = Language(
     locals=LOCALS,
     largest=9999,
     vacant=None,
-    asked=FanucAsked.numbers,
+    system_numbers=FanucVariables.numbers,
     read="({0} or 0.0)",
     raw=frozenset(("EQ", "NE")),
 )

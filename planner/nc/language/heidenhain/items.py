@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from planner.nc.language.asked import FIRST_POSITION
 from planner.nc.language.heidenhain.text import ConversationalBlock, own, value
+from planner.nc.language.system_variables import FIRST_POSITION
 from planner.nc.language.tree import Expression, Line, Number, Numbered, assign
 
 _ITEM = re.compile(

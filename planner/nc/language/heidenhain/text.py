@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS
-from planner.nc.language.asked import FIRST_POSITION, PositionAsked
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
+from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
 from planner.nc.language.tree import (
     Expression,
     Language,
@@ -35,7 +35,7 @@ LANGUAGE = Language(
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
-    asked=PositionAsked.numbers,
+    system_numbers=PositionVariables.numbers,
 )
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS, LOGICAL
-from planner.nc.language.asked import LinuxcncAsked
 from planner.nc.language.expression_reader import ranked
 from planner.nc.language.spelling import Spelling
+from planner.nc.language.system_variables import LinuxcncVariables
 from planner.nc.language.tree import Language
 
 ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
@@ -20,6 +20,6 @@ LANGUAGE = Language(
     locals=ARGUMENTS_MAX,
     largest=5601,
     vacant=0.0,
-    asked=LinuxcncAsked.numbers,
-    asked_names=LinuxcncAsked.names,
+    system_numbers=LinuxcncVariables.numbers,
+    system_names=LinuxcncVariables.names,
 )

@@ -15,8 +15,8 @@ import math
 import re
 
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS, LOGICAL
-from planner.nc.language.asked import FIRST_POSITION, PositionAsked
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
+from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
 from planner.nc.language.tree import (
     ONE,
     Expression,
@@ -36,7 +36,7 @@ LANGUAGE = Language(
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
-    asked=PositionAsked.numbers,
+    system_numbers=PositionVariables.numbers,
 )
 _FUNCTIONS = frozenset(
     ["SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP"]

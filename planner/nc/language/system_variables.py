@@ -29,7 +29,7 @@ _FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
 _AXES = 9  # x y z a b c u v w; the last six are zero here
 
 
-class Asked:
+class SystemVariables:
     """Answers for one interpreter. Subclasses name the parameters."""
 
     numbers: frozenset[int] = frozenset()
@@ -70,13 +70,13 @@ class Asked:
 
     def event(self, letter: str, values: tuple[float, ...] = ()) -> float | None:
         """The last event with that letter, and one of the values if any are given."""
-        store = self.interpreter.store
-        seen = slice(0, store.events)
-        found = store.event.letter[seen] == ord(letter)
+        table = self.interpreter.table
+        seen = slice(0, table.events)
+        found = table.event.letter[seen] == ord(letter)
         if values:
-            found &= np.isin(store.event.value[seen], values)
+            found &= np.isin(table.event.value[seen], values)
         at = np.flatnonzero(found)
-        return float(store.event.value[at[-1]]) if len(at) else None
+        return float(table.event.value[at[-1]]) if len(at) else None
 
     def feed(self) -> float:
         """The feed in the program's unit per minute."""
@@ -138,7 +138,7 @@ def _on(condition: bool) -> float:
     return 1.0 if condition else 0.0
 
 
-_LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
+_LINUXCNC_NAMES: dict[str, Callable[[SystemVariables], float]] = {
     "_vmajor": lambda a: 2.9,
     "_vminor": lambda a: 0.0,
     "_task": lambda a: 0.0,
@@ -181,8 +181,8 @@ _LINUXCNC_NAMES: dict[str, Callable[[Asked], float]] = {
 }
 
 
-def _linuxcnc_number(asked: Asked, number: int) -> float:
-    interpreter = asked.interpreter
+def _linuxcnc_number(system: SystemVariables, number: int) -> float:
+    interpreter = system.interpreter
     for code, first in ((280, 5161), (300, 5181)):
         if first <= number < first + _AXES:
             given = interpreter.state.homes.get(code)
@@ -192,10 +192,10 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
     if 5211 <= number < 5211 + _AXES:
         return float(interpreter.state.g92[number - 5211]) if number - 5211 < 3 else 0.0
     if number == 5220:
-        return asked.system() + 1.0
+        return system.system() + 1.0
     if 5221 <= number < 5221 + 20 * len(_SYSTEMS):
         system, axis = divmod(number - 5221, 20)
-        return asked.offset(system, axis)
+        return system.offset(system, axis)
     if number == 5400:
         return float(interpreter.state.tool_loaded)
     if 5401 <= number <= 5403:
@@ -204,7 +204,7 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
         tool = interpreter.state.tools.get(interpreter.state.tool_loaded)
         return 0.0 if tool is None else tool.diameter
     if 5420 <= number < 5420 + _AXES:
-        return asked.here(number - 5420)
+        return system.here(number - 5420)
     return 0.0
 
 
@@ -212,7 +212,7 @@ def _linuxcnc_number(asked: Asked, number: int) -> float:
 FIRST_POSITION = 2001
 
 
-class PositionAsked(Asked):
+class PositionVariables(SystemVariables):
     """Positions of the axes alone, for languages whose parameters do not hold the state of the control."""
 
     numbers = frozenset((FIRST_POSITION, FIRST_POSITION + 1, FIRST_POSITION + 2))
@@ -225,7 +225,7 @@ class PositionAsked(Asked):
         return self.here(axis)
 
 
-class LinuxcncAsked(Asked):
+class LinuxcncVariables(SystemVariables):
     """Numbers 5161 to 5428 and the predefined names of LinuxCNC 2.9."""
 
     numbers = frozenset(
@@ -251,7 +251,7 @@ class LinuxcncAsked(Asked):
 # --- Fanuc ----------------------------------------------------------------------------------------------------------------------
 
 
-class FanucAsked(Asked):
+class FanucVariables(SystemVariables):
     """Modal information 4001 to 4120 and 4201 to 4320, positions 5001 to 5043, work offsets 5201 to 5326."""
 
     numbers = frozenset(

@@ -12,8 +12,8 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.events import EventTable
+from planner.nc.extra_axes import LETTERS, ROTARY, rotary_feed
 from planner.nc.faults import Notes
-from planner.nc.further import LETTERS, ROTARY, rotary_feed
 from planner.nc.program import FEED_MOVES, Frame, Kind, Origins, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State
@@ -65,7 +65,7 @@ class EventColumns(NamedTuple):
         )
 
 
-class Store:
+class BlockTable:
     """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used. New blocks stand in the
     call `frame`.
 

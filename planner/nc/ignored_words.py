@@ -34,7 +34,7 @@ class _Counted:
     line: int
 
 
-class Assumed:
+class IgnoredWords:
     """Assumptions so far in one program.
 
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter

@@ -1,4 +1,4 @@
-"""State of the axes beside x, y and z (further_moves.py has their rules)."""
+"""State of the axes beside x, y and z (extra_axis_moves.py has their rules)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _zeros() -> FloatArray:
 
 
 @dataclass(slots=True)
-class Further:
+class ExtraAxes:
     """Further axes, arrays (6,) in the order of `LETTERS`, in degrees and mm.
 
     letters  : those that the machine has and that are read
@@ -49,15 +49,15 @@ class Further:
         return self.g92 + self.origins.get(system, _zeros())
 
 
-def further_of(machine: Machine | None, code_of: Callable[[str], int]) -> Further:
+def extra_axes_of(machine: Machine | None, code_of: Callable[[str], int]) -> ExtraAxes:
     """The further axes of a machine at their zero; none without a machine.
 
     code_of : code of a work system by its name in a machine file
     """
     if machine is None:
-        return Further()
+        return ExtraAxes()
     letters = "".join(letter for letter in LETTERS if letter.lower() in machine.axes)
-    return Further(
+    return ExtraAxes(
         letters=letters,
         wrapped="".join(letter for letter in letters if machine.axes[letter.lower()].wrapped),
         origins={code_of(name): _vector(given) for name, given in machine.work_offsets.items()},

@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.block import Block
-from planner.nc.further import LETTERS, ROTARY
+from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.moves import WordFault
 from planner.nc.state import State
 

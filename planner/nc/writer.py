@@ -11,7 +11,7 @@ be run in a minute, in every block anew; the first other one after it has G94 an
 mode keeps it.
 
 Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
-up to 0.1 % longer than new_feed.
+up to 0.1 % longer than asked.
 """
 
 from __future__ import annotations

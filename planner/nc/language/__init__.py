@@ -8,7 +8,7 @@ In reading order:
     run         the running program: its parameters, calls and limits
     system_variables  parameters that hold the state of the control
     arithmetic  operators and functions that all dialects have
-    spelling    expressions and words as RS274NGC and Fanuc spell them
+    expression_reader  expressions by the ranks of their operators, for all dialects;  spelling: as RS274NGC and Fanuc write them
     linuxcnc, fanuc, heidenhain, siemens    a folder for each dialect: its text to statements
     source      the lines of a program: which are plain words, which belong to the language
     expand      a program through all of this;  flat: the expanded program as text

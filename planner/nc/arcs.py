@@ -160,3 +160,17 @@ def _sweep(
         angle += 2.0 * math.pi
     angle += 2.0 * math.pi * (turns - 1)
     return -angle if clockwise else angle
+
+
+def in_plane(point: FloatArray, normal: int) -> complex:
+    """A point (3,) in the plane of a normal axis."""
+    a, b = IN_PLANE[normal]
+    return complex(point[a], point[b])
+
+
+def at_place(place: complex, others: FloatArray, normal: int) -> FloatArray:
+    """(3,) a point of the plane, with the coordinate along the normal of `others`."""
+    point = others.copy()
+    a, b = IN_PLANE[normal]
+    point[a], point[b] = place.real, place.imag
+    return point

@@ -29,7 +29,7 @@ import math
 from dataclasses import dataclass, replace
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.offset_lines import NOWHERE, OffsetMove, dot, meeting
 from planner.nc.program import Kind
@@ -281,15 +281,10 @@ class Cutter:
             state.actual[axis] = value
 
     def _plane(self, point: FloatArray) -> complex:
-        a, b = IN_PLANE[self.normal]
-        return complex(point[a], point[b])
+        return in_plane(point, self.normal)
 
     def _at(self, point: complex, others: FloatArray) -> FloatArray:
-        """(3,) a point of the plane, with the coordinate along the normal of `others`."""
-        place = others.copy()
-        a, b = IN_PLANE[self.normal]
-        place[a], place[b] = point.real, point.imag
-        return place
+        return at_place(point, others, self.normal)
 
     def _beside(self, point: complex, tangent: complex) -> complex:
         return point + self._sign * self._radius * 1j * tangent

@@ -24,9 +24,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import IN_PLANE, Arc
+from planner.nc.arcs import IN_PLANE, Arc, at_place, in_plane
 from planner.nc.language.offset_moves import OffsetMoves
-from planner.nc.language.travel_rows import STANDS, Move, TravelRow, at_place, in_plane
+from planner.nc.language.travel_rows import STANDS, Move, TravelRow
 
 _F = ord("F")
 _FULL = 360.0  # largest angle CCA

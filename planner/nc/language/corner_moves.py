@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass, replace
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import IN_PLANE, Arc
-from planner.nc.language.travel_rows import STANDS, Move, TravelRow, at_place, in_plane
+from planner.nc.arcs import IN_PLANE, Arc, at_place, in_plane
+from planner.nc.language.travel_rows import STANDS, Move, TravelRow
 from planner.nc.offset_lines import OffsetMove, meeting
 
 KINDS = ("RND", "CHR", "CHF")

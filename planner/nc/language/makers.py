@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.nc.arcs import IN_PLANE
+from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.language import frames
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
@@ -17,7 +17,6 @@ from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import ASSUMED, Maker, Making, Row
 from planner.nc.language.siemens import cycles as siemens_cycles
-from planner.nc.language.travel_rows import at_place, in_plane
 from planner.nc.program import Kind
 
 

@@ -11,19 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault
-from planner.nc.language.travel_rows import (
-    AXES,
-    G,
-    Move,
-    TravelRow,
-    arc_words,
-    at_place,
-    in_plane,
-    stops_apart,
-)
+from planner.nc.language.travel_rows import AXES, G, Move, TravelRow, arc_words, stops_apart
 from planner.nc.program import Kind
 from planner.nc.state import State
 

@@ -97,7 +97,6 @@ class LineReader(ExpressionReader):
         return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
     def refused(self, message: str, at: int | None = None) -> ProgramFault:
-        """A fault of the character at `at`, or of the next one."""
         return self._fault(self.column(self.at if at is None else at), message)
 
     def _fault(self, column: int, message: str) -> ProgramFault:
@@ -155,7 +154,6 @@ class LineReader(ExpressionReader):
         return float(match.group())
 
     def value(self) -> Expression:
-        """A number, parameter, bracket or function, with signs before it."""
         c = self.peek()
         if c == "-" or c == "+":
             self.at += 1
@@ -214,12 +212,10 @@ class LineReader(ExpressionReader):
         return op(name, operand, self.bracket()) if name == "ATAN" and self.take("/") else op(name, operand)
 
     def operator(self) -> str:
-        """The operator that comes next; empty for none."""
         match = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
         return match.group().upper() if match else ""
 
     def skip(self, operator: str) -> None:
-        """Go past the operator."""
         self.at += len(operator)
 
     # --- words --------------------------------------------------------------------------------------------------------------

@@ -218,7 +218,6 @@ class PositionVariables(SystemVariables):
     numbers = frozenset((FIRST_POSITION, FIRST_POSITION + 1, FIRST_POSITION + 2))
 
     def get(self, parameter: int | str, depth: int) -> float:
-        """The position of an axis in the program's coordinates and unit."""
         axis = int(parameter) - FIRST_POSITION
         if self.travel is not None and self.travel.active:
             return float(self.travel.place[axis]) / self.interpreter.state.unit
@@ -240,7 +239,6 @@ class LinuxcncVariables(SystemVariables):
     names = frozenset((*_LINUXCNC_NAMES, "_call_level"))
 
     def get(self, parameter: int | str, depth: int) -> float:
-        """The value of a parameter, by number or name; `depth` calls are open."""
         if parameter == "_call_level":
             return float(depth)
         if isinstance(parameter, str):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc
+from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, in_plane
 from planner.nc.lexer import Words
 
 G, M = ord("G"), ord("M")
@@ -97,20 +97,6 @@ def stops_apart(row: TravelRow) -> tuple[list[tuple[int, float, int]], list[tupl
     """The words that act before the moves of a row, and the stops behind them."""
     stops = [word for word in row.words if word[0] == M and word[1] in _STOPS]
     return [word for word in row.words if word not in stops], stops
-
-
-def in_plane(point: FloatArray, normal: int) -> complex:
-    """A point (3,) in the plane."""
-    a, b = IN_PLANE[normal]
-    return complex(point[a], point[b])
-
-
-def at_place(place: complex, others: FloatArray, normal: int) -> FloatArray:
-    """(3,) a point of the plane, with the coordinate along the normal of `others`."""
-    point = others.copy()
-    a, b = IN_PLANE[normal]
-    point[a], point[b] = place.real, place.imag
-    return point
 
 
 def travel_rows_of(words: Words) -> Iterator[TravelRow]:

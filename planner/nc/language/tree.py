@@ -7,7 +7,7 @@ split them and are named by their numbers (`PlainRows`): a program of 100,000 li
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 
@@ -240,6 +240,34 @@ def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRow
     """Rows of a maker of values by name."""
     values = ((name, v if isinstance(v, Value) else Number(float(v))) for name, v in given.items())
     return MadeRows(place, maker, tuple(values))
+
+
+@dataclass
+class OpenStatement:
+    """A branch or loop whose end has not come: its body so far, and of a branch the conditions and bodies before it.
+
+    count : of a loop that counts: its variable and last value
+    """
+
+    kind: str
+    place: SourcePlace
+    condition: Expression | None
+    label: str = ""
+    body: list[Statement] = field(default_factory=list)
+    branches: list[tuple[Expression, list[Statement]]] = field(default_factory=list)
+    count: tuple[Parameter, Expression] | None = None
+
+    def another_branch(self, condition: Expression | None) -> None:
+        """The next branch, with its condition; None for the one behind else."""
+        assert self.condition is not None
+        self.branches.append((self.condition, self.body))
+        self.condition, self.body = condition, []
+
+    def branched(self) -> If:
+        """The whole branch, at its end."""
+        if self.condition is not None:
+            self.another_branch(None)
+        return If(self.place, tuple(self.branches), self.body)
 
 
 Statement = (

@@ -156,16 +156,13 @@ class Formula(TokenReader):
         return found
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
-        """A fault at a column of the block, or at the next token."""
         return self.block.fault(message, self.column() if at is None else at)
 
     def expect(self, text: str) -> None:
-        """Go past the token. Raises ProgramFault if another one comes."""
         if not self.take(text):
             raise self.fault(f"{text} is missing")
 
     def operand(self, token: Token) -> Expression | None:
-        """A number, parameter or function; None for anything else."""
         text = token.text
         if token.kind == "number":
             return Number(float(text))

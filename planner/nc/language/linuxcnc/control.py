@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from planner.nc.language.source import SourceLine
 from planner.nc.language.tree import (
     Break,
     Continue,
     Expression,
-    If,
     Loop,
+    OpenStatement,
     Procedure,
     ProgramFault,
     Return,
@@ -25,18 +23,6 @@ KEYWORDS = frozenset(
 )
 
 
-@dataclass
-class _Open:
-    """A control statement whose end has not come: its body so far, and for `if` its branches."""
-
-    kind: str
-    label: str
-    place: SourcePlace
-    condition: Expression | None
-    body: list[Statement]
-    branches: list[tuple[Expression, list[Statement]]]
-
-
 class LinuxcncControl:
     """The statements so far, and those that are open.
 
@@ -49,7 +35,7 @@ class LinuxcncControl:
     def __init__(self) -> None:
         self.procedures: dict[str, Procedure] = {}
         self.main: list[Statement] = []
-        self.open: list[_Open] = []
+        self.open: list[OpenStatement] = []
         self.base = self.body = self.main
 
     def _add(self, label: str, place: SourcePlace, body: list[Statement]) -> None:
@@ -87,11 +73,11 @@ class LinuxcncControl:
             raise ProgramFault(line.place, f"more than {_NESTED_MAX} loops and branches in each other")
         if keyword not in ("sub", "do"):
             _needed(condition, keyword, line)
-        body: list[Statement] = []
-        self.open.append(_Open(keyword, label, line.place, condition, body, []))
+        opened = OpenStatement(keyword, line.place, condition, label)
+        self.open.append(opened)
         if keyword == "sub":
-            self._add(label, line.place, body)
-        self.body = body
+            self._add(label, line.place, opened.body)
+        self.body = opened.body
 
     def _another_branch(
         self, keyword: str, label: str, condition: Expression | None, line: SourceLine
@@ -99,9 +85,8 @@ class LinuxcncControl:
         top = self._innermost("if", keyword, label, line)
         if top.condition is None:
             raise ProgramFault(line.place, f"{keyword} after else; else comes last")
-        top.branches.append((top.condition, top.body))
-        top.condition = _needed(condition, keyword, line) if keyword == "elseif" else None
-        top.body = self.body = []
+        top.another_branch(_needed(condition, keyword, line) if keyword == "elseif" else None)
+        self.body = top.body
 
     def _end(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
         kind = _ENDS[keyword]
@@ -111,16 +96,12 @@ class LinuxcncControl:
             if condition is not None:
                 top.body.append(Return(line.place, condition))
         elif kind == "if":
-            if top.condition is not None:
-                top.branches.append((top.condition, top.body))
-            self.body.append(
-                If(top.place, tuple(top.branches), [] if top.condition is not None else top.body)
-            )
+            self.body.append(top.branched())
         else:
             assert top.condition is not None
             self.body.append(Loop(top.place, kind, label, top.condition, top.body))
 
-    def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> _Open:
+    def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> OpenStatement:
         if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
             last = (
                 f"o{self.open[-1].label} {self.open[-1].kind} on line {self.open[-1].place.line} is open"
@@ -130,7 +111,7 @@ class LinuxcncControl:
             raise ProgramFault(line.place, f"o{label} {keyword} has no o{label} {kind} before it: {last}")
         return self.open[-1]
 
-    def _close(self, top: _Open) -> None:
+    def _close(self, top: OpenStatement) -> None:
         self.open.pop()
         self.body = self.open[-1].body if self.open else self.base
 

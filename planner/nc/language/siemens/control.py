@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container
-from dataclasses import dataclass
 
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.tree import (
@@ -16,7 +15,7 @@ from planner.nc.language.tree import (
     Loop,
     Named,
     Number,
-    Parameter,
+    OpenStatement,
     SourcePlace,
     Statement,
     assign,
@@ -24,18 +23,6 @@ from planner.nc.language.tree import (
 )
 
 _NESTED_MAX = 100  # loops and branches in each other
-
-
-@dataclass
-class _Open:
-    """A control statement whose end has not come."""
-
-    kind: str
-    place: SourcePlace
-    condition: Expression | None
-    body: list[Statement]
-    branches: list[tuple[Expression, list[Statement]]]
-    count: tuple[Parameter, Expression] | None = None  # of FOR: its variable and last value
 
 
 class SiemensControl:
@@ -51,7 +38,7 @@ class SiemensControl:
     def __init__(self) -> None:
         self.main: list[Statement] = []
         self.body = self.main
-        self.open: list[_Open] = []
+        self.open: list[OpenStatement] = []
         self.labels: dict[str, int] = {}
         self.counters = 0
         self.lines: dict[str, list[Statement]] = {}
@@ -62,15 +49,15 @@ class SiemensControl:
     def _number_of(self, label: str) -> int:
         return self.labels.setdefault(label, len(self.labels) + 1)
 
-    def _begin(self, kind: str, reader: LineTokens, condition: Expression | None) -> _Open:
+    def _begin(self, kind: str, reader: LineTokens, condition: Expression | None) -> OpenStatement:
         if len(self.open) >= _NESTED_MAX:
             raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
-        opened = _Open(kind, reader.place, condition, [], [])
+        opened = OpenStatement(kind, reader.place, condition)
         self.open.append(opened)
         self.body = opened.body
         return opened
 
-    def _close(self, kind: str, reader: LineTokens) -> _Open:
+    def _close(self, kind: str, reader: LineTokens) -> OpenStatement:
         if not self.open or self.open[-1].kind != kind:
             raise reader.fault(f"there is no {kind} open that this ends", 0)
         closed = self.open.pop()
@@ -90,18 +77,11 @@ class SiemensControl:
     def _else(self, reader: LineTokens) -> None:
         if not self.open or self.open[-1].kind != "IF" or self.open[-1].condition is None:
             raise reader.fault("there is no IF open that this belongs to", 0)
-        top = self.open[-1]
-        assert top.condition is not None
-        top.branches.append((top.condition, top.body))
-        top.condition, top.body = None, []
-        self.body = top.body
+        self.open[-1].another_branch(None)
+        self.body = self.open[-1].body
 
     def _end_if(self, reader: LineTokens) -> None:
-        closed = self._close("IF", reader)
-        if closed.condition is not None:
-            self.body.append(If(closed.place, ((closed.condition, closed.body),), []))
-        else:
-            self.body.append(If(closed.place, tuple(closed.branches), closed.body))
+        self.body.append(self._close("IF", reader).branched())
 
     def _while(self, reader: LineTokens) -> None:
         self._begin("WHILE", reader, reader.expression())

@@ -82,7 +82,6 @@ class LineTokens(TokenReader):
         super().__init__(text)
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
-        """A fault at a character of the line; that of the next token if none is given."""
         return ProgramFault(
             self.place._replace(at=self.start + (self.column() if at is None else at)), message
         )
@@ -92,7 +91,6 @@ class LineTokens(TokenReader):
         return self.start + self.column()
 
     def value(self) -> Expression:
-        """A number, variable, function or bracket, with signs before it. Raises ProgramFault."""
         if not self.ended and self.tokens[self.next].kind == "word":
             self._take_apart()
         return super().value()
@@ -107,7 +105,6 @@ class LineTokens(TokenReader):
         self.tokens[self.next : self.next + 1] = parts
 
     def operand(self, token: Token) -> Expression | None:
-        """NOT, a number, a variable or a function; None for anything else. Raises ProgramFault."""
         name = token.text
         if name == "NOT":
             return op(name, self.value())

@@ -19,21 +19,16 @@ import numpy as np
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language.fanuc.calls import code_of
-from planner.nc.language.fanuc.lathe_cycles import least_increment, name_of
-from planner.nc.language.fanuc.lathe_singles import LatheSingles
-from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE
+from planner.nc.language.fanuc.lathe_singles import LatheSingles, absolute, shared
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Call,
     Expression,
     Goto,
     Label,
-    Line,
     Message,
-    Named,
     Number,
     Numbered,
-    Operation,
     PlainRows,
     Procedure,
     ProgramFault,
@@ -41,6 +36,7 @@ from planner.nc.language.tree import (
     Statement,
     Turning,
     Word,
+    row,
 )
 
 _CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+).*?P(\d+)")
@@ -79,11 +75,10 @@ class LatheParser(LatheSingles):
                 procedures.append(Procedure(_profile_name(pair), body[first].place, body[first:last]))
         if not self.source.file:
             start = procedures[0].place
-            codes = tuple(Word(ord("G"), start.at, Number(code)) for code in (7.0, 18.0, 95.0))
             after = int(
                 bool(procedures[0].body) and isinstance(procedures[0].body[0], PlainRows)
             )  # the first %
-            procedures[0].body.insert(after, Line(start, codes))
+            procedures[0].body.insert(after, row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
     # --- profiles -----------------------------------------------------------------------------------------------------------
@@ -140,7 +135,7 @@ class LatheParser(LatheSingles):
         values = _ROUGHING[cycle](
             self, {letter: self._length(word, cycle, line) for letter, word in given.items()}, line
         )
-        self.body += [self._assigned(values, line), Turning(line.place, "profile"), call]
+        self.body += [shared(values, line), Turning(line.place, "profile"), call]
         self.body.append(Turning(line.place, cycle, "".join(values)))
 
     @staticmethod
@@ -149,12 +144,6 @@ class LatheParser(LatheSingles):
         if cycle == "G76":
             return not given.keys() & set("XZUWK")
         return "P" not in given or "Q" not in given
-
-    @staticmethod
-    def _assigned(values: dict[str, Expression], line: SourceLine) -> Line:
-        return Line(
-            line.place, (), tuple((Named(name_of(letter), True), value) for letter, value in values.items())
-        )
 
     def _removal(self, given: dict[str, Expression], line: SourceLine, depth: str) -> dict[str, Expression]:
         """G71 (depth in U of its first block) and G72 (in W)."""
@@ -204,12 +193,9 @@ class LatheParser(LatheSingles):
             values.pop("Q", None)  # the angle of the spindle where the thread begins
             values.pop("R", None)
             self._message_once(line)
-        for letter, axis, here in (("U", "X", X_HERE), ("W", "Z", Z_HERE)):
-            if letter in values:
-                values[axis] = Operation("+", (here, values.pop(letter)))
-        values = {letter: value for letter, value in values.items() if letter in "XZKDQRLAIE"}
+        values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
         values["F"] = self.feed
-        self.body.append(self._assigned(values, line))
+        self.body.append(shared(values, line))
         self.body.append(Turning(line.place, "G76", "".join(values)))
         self.threading = False
 
@@ -231,25 +217,13 @@ class LatheParser(LatheSingles):
         match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
         if (match and match.group(1)) or (line.scale != 1.0 and word.letter in LENGTHS):
             return word.value
-        return Operation("*", (word.value, _INCREMENT))
+        return word.value * _INCREMENT
 
 
 # Words of cycles that are in least increments where they have no point; of others D is.
 _INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
-# The least increment in the program's unit: #4006 is 20 under G20 and 21 under G21.
-_INCREMENT = Operation(
-    "+",
-    (
-        Number(least_increment(25.4)),
-        Operation(
-            "*",
-            (
-                Operation("-", (Numbered(Number(4006.0)), Number(20.0))),
-                Number(least_increment(1.0) - least_increment(25.4)),
-            ),
-        ),
-    ),
-)
+# The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
+_INCREMENT = Number(1e-4) + (Numbered(Number(4006.0)) - Number(20.0)) * Number(1e-3 - 1e-4)
 _ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], dict[str, Expression]]] = {
     "G71": lambda parser, given, line: parser._removal(given, line, "U"),
     "G72": lambda parser, given, line: parser._removal(given, line, "W"),

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from planner.base.units import MM_PER_INCH
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Notes
 from planner.nc.language.run import ProgramRun
@@ -268,11 +267,6 @@ _CYCLES: dict[str, Callable[[LatheCycles, Given], Iterable[Words]]] = {
 def name_of(letter: str) -> str:
     """The shared name that holds a cycle's word while it is run."""
     return f"cycle {letter.lower()}"
-
-
-def least_increment(unit: float) -> float:
-    """Lengths without a point in cycles, in the program's unit: 0.001 mm or 0.0001 inch."""
-    return 1e-4 if unit == MM_PER_INCH else 1e-3
 
 
 def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour:

@@ -13,7 +13,7 @@ from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.lathe_cycles import name_of
 from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE, LatheWords
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import Expression, Line, Message, Named, Operation, ProgramFault, Turning, Word
+from planner.nc.language.tree import Expression, Line, Message, Named, ProgramFault, Turning, Word, assign
 
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")
@@ -77,7 +77,7 @@ class LatheSingles(LatheWords):
             raise ProgramFault(
                 line.place, f"{self.cut} does not use {sorted(extra)[0]}; its taper is R or {taper}"
             )
-        values = _absolute(given)
+        values = absolute(given)
         self.cut_given |= values.keys()
         if not self.cut_given >= set("XZ"):
             raise ProgramFault(line.place, f"the {CUTS[self.cut]} cycle {self.cut} needs X or U, and Z or W")
@@ -87,7 +87,7 @@ class LatheSingles(LatheWords):
             self.cut_given.add("F")
             text = "G92: the control's setting for the chamfer of a thread is taken as 0"
             self.body.append(Message(line.place, (text,)))
-        self.body.append(_kept(values, line))
+        self.body.append(shared(values, line))
         self.body.append(Turning(line.place, self.cut, "".join(sorted(self.cut_given))))
         self.threading = False
 
@@ -98,7 +98,7 @@ class LatheSingles(LatheWords):
             self._rest(words, {"R"}, line)
             return
         self._rest(words, set(own), line)
-        values = _absolute({letter: word.value for letter, word in own.items() if letter in _PLACE})
+        values = absolute({letter: word.value for letter, word in own.items() if letter in _PLACE})
         along, across = "ZX" if cycle == "G74" else "XZ"
         if along not in values:
             raise ProgramFault(
@@ -116,7 +116,7 @@ class LatheSingles(LatheWords):
                 values["D"] = own[letter].value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
-        self.body.append(_kept(values, line))
+        self.body.append(shared(values, line))
         self.body.append(Turning(line.place, cycle, "".join(values)))
         self.threading = False
 
@@ -133,17 +133,15 @@ class LatheSingles(LatheWords):
         raise NotImplementedError
 
 
-def _absolute(given: dict[str, Expression]) -> dict[str, Expression]:
+def absolute(given: dict[str, Expression]) -> dict[str, Expression]:
     """Words with X and Z for U and W, which count from where the tool is."""
     values = dict(given)
     for letter, axis, here in (("U", "X", X_HERE), ("W", "Z", Z_HERE)):
         if letter in values:
-            values[axis] = Operation("+", (here, values.pop(letter)))
+            values[axis] = here + values.pop(letter)
     return values
 
 
-def _kept(values: dict[str, Expression], line: SourceLine) -> Line:
+def shared(values: dict[str, Expression], line: SourceLine) -> Line:
     """The words in shared names, where `lathe_cycles.LatheCycles.act` finds them."""
-    return Line(
-        line.place, (), tuple((Named(name_of(letter), True), value) for letter, value in values.items())
-    )
+    return assign(line.place, *((Named(name_of(letter), True), value) for letter, value in values.items()))

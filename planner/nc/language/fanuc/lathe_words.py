@@ -21,10 +21,11 @@ from planner.nc.language.tree import (
     Line,
     Number,
     Numbered,
-    Operation,
     Parameter,
     ProgramFault,
     Word,
+    row,
+    word,
 )
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
@@ -95,8 +96,8 @@ class LatheWords(FanucParser):
         """The word as LinuxCNC's lathes have it; None for one that says nothing."""
         letter, code = chr(word.letter), code_of(word)
         if letter in "UW":
-            from_here = Operation("+", (X_HERE if letter == "U" else Z_HERE, word.value))
-            return word._replace(letter=ord("X" if letter == "U" else "Z"), value=from_here)
+            axis, here = ("X", X_HERE) if letter == "U" else ("Z", Z_HERE)
+            return word._replace(letter=ord(axis), value=here + word.value)
         if letter == "H":
             if word.value != Number(0.0):
                 raise ProgramFault(
@@ -130,13 +131,11 @@ class LatheWords(FanucParser):
             if number.value >= _TOOL_DIGITS
             else (int(number.value),) * 2
         )
-        at = line.place.at
-        change = [Word(ord("T"), at, Number(float(tool))), Word(ord("M"), at, Number(6.0))]
-        length = [Word(ord("G"), at, Number(43.0)), Word(ord("H"), at, Number(float(offset)))]
         if tool != self.tool:
-            self.body.append(Line(line.place, tuple(change)))
+            self.body.append(row(line.place, ("T", float(tool)), ("M", 6.0)))
         self.tool = tool
-        self.body.append(Line(line.place, tuple(length if offset else [Word(ord("G"), at, Number(49.0))])))
+        length = (("G", 43.0), ("H", float(offset))) if offset else (("G", 49.0),)
+        self.body.append(row(line.place, *length))
         return tuple(word for word in words if chr(word.letter) != "T" and code_of(word) != "M6")
 
     def _speeds(
@@ -164,7 +163,5 @@ class LatheWords(FanucParser):
         return words
 
     def _surface(self, line: SourceLine) -> list[Word]:
-        at = line.place.at
-        words = [Word(ord("G"), at, Number(96.0))]
-        words += [Word(ord("S"), at, self.surface)] if self.surface is not None else []
-        return words + ([Word(ord("D"), at, self.speed_max)] if self.speed_max is not None else [])
+        at, speeds = line.place.at, (("S", self.surface), ("D", self.speed_max))
+        return [word("G", at, 96.0), *(word(c, at, speed) for c, speed in speeds if speed is not None)]

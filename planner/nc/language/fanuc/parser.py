@@ -39,6 +39,7 @@ from planner.nc.language.tree import (
     SourcePlace,
     Statement,
     Word,
+    assign,
 )
 
 _LINE_NUMBER = re.compile(r"N(\d+)", re.IGNORECASE)
@@ -261,7 +262,7 @@ class FanucParser(FanucControl):
         for number, value in call.arguments:
             self.hidden += 1
             name = Named(f"g66 {self.hidden}", False)
-            self.body.append(Line(line.place, (), ((name, value),)))
+            self.body.append(assign(line.place, (name, value)))
             kept.append((number, name))
         self.modal = call._replace(arguments=tuple(kept))
 

@@ -8,7 +8,7 @@ from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, integer
-from planner.nc.state import State
+from planner.nc.state import SYSTEMS, State
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
 _OFF = 400
@@ -37,11 +37,7 @@ def check_unchanged(state: State, block: Block) -> None:
 
 def _system_in_force(state: State, block: Block) -> bool:
     number = round(block.value.get("P", 0.0))
-    return (
-        number == 0
-        or {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}.get(state.system)
-        == number
-    )
+    return number == 0 or (state.system in SYSTEMS and SYSTEMS.index(state.system) + 1 == number)
 
 
 def _refusal(name: str) -> str:

@@ -23,9 +23,8 @@ from planner.nc import codes, extra_axis_moves
 from planner.nc.block import Block
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault, coordinate, integer
-from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, State, System, Tool, system_name
+from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
 
-_SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)  # G10 P1 ... P9
 _FIXTURE = 593  # the system of G10 L11
 
 
@@ -133,10 +132,10 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         _set_fanuc_system(state, block, kind)
         return
     number = integer(block, "P", 0) if "P" in block.value else -1
-    if not 0 <= number <= len(_SYSTEMS):
+    if not 0 <= number <= len(SYSTEMS):
         word = block.at["P"] if number >= 0 else block.at["one-shot"]
         raise WordFault(word, f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P9")
-    code = _SYSTEMS[number - 1] if number else state.system
+    code = SYSTEMS[number - 1] if number else state.system
     system = state.work_system(code)
     for letter in "IJQ" if kind == 2 else "IJQR":
         if letter in block.value:
@@ -162,7 +161,7 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
             raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
     if not state.absolute:
         raise WordFault(block.at["one-shot"], f"G10 L{kind} of Fanuc adds after G91; write G90 before it")
-    code = FURTHER_SYSTEMS + number if kind == 20 else _SYSTEMS[number - 1]
+    code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
     extra_axis_moves.set_system(state, block, code, from_place=False)

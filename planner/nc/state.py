@@ -28,8 +28,17 @@ _PATH_CONTROL = {
     "exact_path": PathControl.EXACT_PATH,
     "exact_stop": PathControl.EXACT_STOP,
 }
-# Ten times the G code of a work coordinate system, by its name in the machine file.
-_SYSTEMS = {f"g{n}": 10 * n for n in range(54, 60)} | {"g59.1": 591, "g59.2": 592, "g59.3": 593}
+SYSTEMS = (
+    540,
+    550,
+    560,
+    570,
+    580,
+    590,
+    591,
+    592,
+    593,
+)  # work systems of G10 P1 to P9, by ten times their G codes
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
@@ -260,7 +269,7 @@ class Setup:
 def system_code(name: str) -> int:
     """The code of a work system by its name in a machine file: "g54", "g54.1p3"."""
     first, _, further = name.partition("p")
-    return FURTHER_SYSTEMS + int(further) if further else _SYSTEMS[first]
+    return FURTHER_SYSTEMS + int(further) if further else round(10.0 * float(first[1:]))
 
 
 def system_name(code: int) -> str:

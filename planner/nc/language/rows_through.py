@@ -47,7 +47,6 @@ _PLACING = frozenset(
 )
 # G codes that leave the position and the coordinates as they are.
 _NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
-_EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
 class RowsThrough(Coordinates):
@@ -84,7 +83,7 @@ class RowsThrough(Coordinates):
 
     def through(self, words: Words) -> Iterator[Words]:
         """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises ProgramFault."""
-        self._data, self._files = words.data, words.files
+        self._files = words.files
         if not self.active:
             yield words
             return

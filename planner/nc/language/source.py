@@ -19,10 +19,6 @@ from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
 _BOM = b"\xef\xbb\xbf"
-_CALLS = {
-    ord("M"): (70, 71, 72, 73, 97, 98, 99),
-    ord("G"): (65, 66, 67),
-}  # codes that call, return, save and restore
 _PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
 _MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
 

@@ -14,13 +14,12 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.travel import Travel
 from planner.nc.program import PathControl
-from planner.nc.state import System, system_name
+from planner.nc.state import SYSTEMS, System, system_name
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
 
-# What parameters answer with: work coordinate systems in their order (ten times the G code), and the G codes in force.
-_SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
+# G codes in force, that parameters answer with.
 _PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
 _PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
 _ROTATION = 9  # behind the axes of a work coordinate system
@@ -63,7 +62,7 @@ class SystemVariables:
 
     def offset(self, system: int, axis: int) -> float:
         """The offset of a work coordinate system, G54 is 0 [mm], or its rotation [degrees]."""
-        given = self.interpreter.state.work_system(_SYSTEMS[system])
+        given = self.interpreter.state.work_system(SYSTEMS[system])
         if axis == _ROTATION:
             return given.rotation
         return float(given.origin[axis]) if axis < 3 else 0.0
@@ -86,9 +85,9 @@ class SystemVariables:
     def system(self) -> int:
         """The work coordinate system in force, G54 is 0."""
         system = self.interpreter.state.system
-        if system not in _SYSTEMS:
+        if system not in SYSTEMS:
             raise ValueError(f"{system_name(system)} has no number that a program can ask for here")
-        return _SYSTEMS.index(system)
+        return SYSTEMS.index(system)
 
     def modes(self) -> Modes:
         """The words that bring back the present modes, all but the motion code: M70 and M72."""
@@ -96,7 +95,7 @@ class SystemVariables:
         path: list[tuple[str, float]] = [("G", _PATH[state.path_control])]
         if state.path_control == PathControl.BLEND and not np.isnan(state.tolerance):
             path.append(("P", state.tolerance / state.unit))
-        system = _SYSTEMS[self.system()] / 10
+        system = SYSTEMS[self.system()] / 10
         codes = (
             _PLANE[state.normal],
             90.0 if state.absolute else 91.0,
@@ -193,7 +192,7 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
         return float(interpreter.state.g92[number - 5211]) if number - 5211 < 3 else 0.0
     if number == 5220:
         return system.system() + 1.0
-    if 5221 <= number < 5221 + 20 * len(_SYSTEMS):
+    if 5221 <= number < 5221 + 20 * len(SYSTEMS):
         system, axis = divmod(number - 5221, 20)
         return system.offset(system, axis)
     if number == 5400:
@@ -306,7 +305,7 @@ class FanucVariables(SystemVariables):
 
     def _set_offset(self, place: int, value: float) -> None:
         state = self.interpreter.state
-        code = _SYSTEMS[place // 20]
+        code = SYSTEMS[place // 20]
         old = state.work_system(code)
         origin = old.origin.copy()
         origin[place % 20] = value * state.unit

@@ -193,8 +193,8 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     if number == 5220:
         return system.system() + 1.0
     if 5221 <= number < 5221 + 20 * len(SYSTEMS):
-        system, axis = divmod(number - 5221, 20)
-        return system.offset(system, axis)
+        work_system, axis = divmod(number - 5221, 20)
+        return system.offset(work_system, axis)
     if number == 5400:
         return float(interpreter.state.tool_loaded)
     if 5401 <= number <= 5403:

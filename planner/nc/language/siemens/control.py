@@ -81,7 +81,8 @@ class SiemensControl:
         self.body = self.open[-1].body
 
     def _end_if(self, reader: LineTokens) -> None:
-        self.body.append(self._close("IF", reader).branched())
+        closed = self._close("IF", reader)
+        self.body.append(closed.branched())
 
     def _while(self, reader: LineTokens) -> None:
         self._begin("WHILE", reader, reader.expression())

@@ -17,7 +17,7 @@ from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
-KERNELS = "planner/kernels"  # in the installation; planner/base/kept.py reads them there
+KERNELS = "planner/kernels"  # in the installation; planner/base/kernel_files.py reads them there
 AHEAD = (
     os.environ.get("PLANNER_COMPILE_AHEAD", "1") != "0"
     and sys.platform.startswith("linux")

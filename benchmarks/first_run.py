@@ -4,7 +4,7 @@
 
 Every run is `planner plan` in a new process with an empty NUMBA_CACHE_DIR, in one of three ways:
 
-    numba       every kernel as numba compiles it, in one process
+    numba       every kernel as numba compiles it by itself: no parts, one process
     one         as planner/base/compiling.py has it, in one process
     two         the same with the second process of planner/commands/first_run.py: what a user gets
 
@@ -31,7 +31,7 @@ PROGRAM = "G21 G90 G17\nG64 P0.02\nG1 X20 F3000\nX40 Y10\nX60\nX70 Y30\nX50 Y50\
 METHODS = ("optimal", "second-order", "kinematic", "fir", "stop")
 ONE = "import planner.commands.first_run as first; first.cores = lambda: 1; "
 WAYS = {
-    "numba": ONE + "import planner.base.kernels as kernels; kernels.known_numba = lambda: False; ",
+    "numba": ONE + "import planner.base.kernels as kernels; kernels.Kernel.part = property(lambda own: own.whole); ",
     "one": ONE,
     "two": "",
 }

@@ -39,8 +39,7 @@ NETWORK = {
 FROM_DATA = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "yaml"}
 CALLS = {"eval", "exec", "compile", "__import__"}
 EXPLAINED = {
-    ("planner/base/kept.py", "pickle"),
-    ("planner/base/linking.py", "pickle"),
+    ("planner/base/compiling.py", "pickle"),
     ("planner/nc/language/compiled.py", "compile"),
     ("planner/nc/language/compiled.py", "exec"),
     ("planner/study/workers.py", "joblib"),

@@ -1,85 +1,64 @@
-"""numba compiles the planner's kernels in about half the time: the same code for the processor, without work that nobody needs.
+"""How numba compiles a kernel, and finds it on the disk again.
 
-A kernel that Python calls (a root) contains all the kernels that it calls, optimised once as a whole. As it comes, numba also
-optimises each of these by itself, turns each into machine code, and makes an entry for Python and one for C, none of which is used. So
+Each kernel is two of numba's dispatchers. The `whole` is what Python calls: it is optimised with everything that it calls, turned into
+machine code and kept on the disk. The `part` is what other kernels call, and is no more than instructions for them: as it comes, numba
+would optimise it by itself, turn it into machine code and make entries for Python and C, none of which would be used, and would compile
+it once more for every number that an argument is somewhere. That would be about half of the time that all takes.
 
-  processor   code is made for a level of the architecture (processor.py): `_Generator`
-  libraries   what is compiled inside a root stays a library of instructions that the root links: `_Inner`; only the root is optimised
-              as a whole and turned into machine code, with everything in it
-  entries     kernels inside a root have no entry for Python: `ENTRIES`; nor have functions of numba's own: `_of_roots`
-  values      they are not compiled once more for every number that an argument is in some call: `_without_values`
-  typing      numba asks all of its definitions of an operator again at every place; here each question is asked once: `_call_type`
-  settings    of which numba compares and hashes 20 values, many times for each expression: `_same_settings`, `_hash_of_settings`
-  garbage     is not collected meanwhile
-
-Numbers are in docs/speed.md. The replacements work while a root is compiled, and numba is as it was afterwards. They reach into
-numba, and are used with the versions only that they are tested with (kernels.py).
+Code is made for a level of the architecture, not for the one processor that is here, so that plans agree on every machine of that level
+to the last bit as far as kernels make them, and kernels that come with an installation are of use elsewhere. Level 3 of x86-64 (AVX2,
+FMA: since 2013) has what the solvers gain by. It is set as numba's own setting, and holds for all that the process compiles.
 """
 
 from __future__ import annotations
 
-import functools
-import gc
-import weakref
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import itertools
+import os
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numba
-from numba.core import codegen, compiler, registry, targetconfig, types
-from numba.core.types import functions
+from llvmlite import binding
+from numba.core import bytecode, caching, codegen, compiler, config, serialize, types
 
-from planner.base.kept import Kept
-from planner.base.processor import processor
+from planner.base import kernel_files
+from planner.base.kernel_files import KernelFile
 
-ENTRIES = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-WRAPPERS = ("create_cpython_wrapper", "create_cfunc_wrapper")
+LEVEL = "x86-64-v3"
+# What LLVM calls the features of the level beyond those of every x86-64 (x86-64 psABI, table 3.1).
+FEATURES = "cx16 sahf popcnt sse3 ssse3 sse4.1 sse4.2 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
 
-_environments: dict[str, Any] = {}  # of what is compiled inside roots, until a root has their place
-_by_function: weakref.WeakKeyDictionary[Any, dict[Any, Any]] = weakref.WeakKeyDictionary()
-
-
-def root(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
-    """The kernel of a function, with these settings of `numba.njit`."""
-    made = numba.njit(pipeline_class=_RootCompiler, **{"no_cfunc_wrapper": True, **settings})(function)
-    made._compiler = _Compiler(made._compiler)
-    made.inside_others = inside = numba.njit(**{**settings, **ENTRIES})(function)
-    inside.get_call_template = functools.partial(_without_values, inside.get_call_template)
-    return made
+REDUCED_TYPES = 5  # where the text of all types is in what `CompileResult._reduce` returns, after the library
+# numba tells functions in machine code apart by a number that begins at 1 in every process, and has one name for records of two and of
+# nine axes: a third process would load two functions of one name.
+bytecode.FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6)))
 
 
-def _without_values(numba_s: Callable[..., Any], args: Any, kws: Any) -> Any:
-    """How a kernel is called with arguments of these types: f(x, 0) as f(x, n)."""
-    return numba_s(
-        [types.unliteral(of) for of in args], {name: types.unliteral(of) for name, of in kws.items()}
-    )
+def choose_processor() -> None:
+    """Set the level as numba's processor, unless NUMBA_CPU_... say another or this one has not all of it."""
+    if config.CPU_NAME is None and config.CPU_FEATURES is None:
+        here = binding.get_host_cpu_features()
+        if all(here.get(feature) for feature in FEATURES.split()):
+            config.CPU_NAME, config.CPU_FEATURES = LEVEL, ""
 
 
-def type_inside(kernel: Any) -> Any:
-    """numba's type of a kernel that another one calls."""
-    return types.Dispatcher(kernel.dispatcher.inside_others)
+choose_processor()
 
 
-def compiled(dispatcher: Any, args: tuple[Any, ...]) -> Any:
-    """numba's result of compiling for arguments of the types of these. Raises numba's errors."""
-    signature = tuple(dispatcher.typeof_pyval(value) for value in args)
-    dispatcher.compile(signature)
-    return dispatcher.overloads[signature]
+class _NoEnvironment:
+    """What numba's code generator is to a part: the Python objects that its code uses, such as the text of an exception, are set in the
+    wholes that it becomes a piece of."""
+
+    @staticmethod
+    def set_env(name: str, environment: Any) -> None:
+        pass
 
 
-def to_keep(made: Any) -> Kept:
-    """What of numba's result is kept."""
-    environments = [made.environment, *made._find_referenced_environments()]
-    return Kept(
-        made.fndesc.llvm_cpython_wrapper_name,
-        [(of.env_name, of.globals.get("__name__", ""), list(of.consts)) for of in environments],
-        made.library._get_compiled_object(),
-    )
+class _PartLibrary(codegen.JITCodeLibrary):
+    """Instructions to be linked: each function by itself is simplified, as numba does it, and that is all."""
 
-
-class _Inner(codegen.JITCodeLibrary):
-    """What is compiled inside a root: instructions to be linked. Each function by itself is simplified, as numba does it, and that is
-    all: without that, roots are no faster to compile and up to twice as slow to run."""
+    codegen = _NoEnvironment()
 
     def _optimize_final_module(self) -> None:
         pass
@@ -92,134 +71,103 @@ class _Inner(codegen.JITCodeLibrary):
         self._ensure_finalized()
         return 0
 
-    @property
-    def codegen(self) -> Any:
-        return _LaterEnvironment(self._codegen)
 
-
-class _LaterEnvironment:
-    """numba's code generator for a library without machine code: the place of the Python objects that it uses, such as the text of an
-    exception, is in the root's."""
-
-    def __init__(self, numba_s: Any):
-        self._numba_s = numba_s
-
-    def set_env(self, name: str, env: Any) -> None:
-        _environments[name] = env
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._numba_s, name)
-
-
-class _Generator(codegen.JITCPUCodegen):
-    """numba's code generator, for the processor of processor.py."""
-
-    _library_class = _Inner
-
-    def _get_host_cpu_name(self) -> str:
-        return processor().name
-
-    def _get_host_cpu_features(self) -> str:
-        return processor().features
-
-
-@functools.cache
-def _generator() -> _Generator:
-    """The one of this process."""
-    return _Generator("planner")
-
-
-class _RootCompiler(compiler.Compiler):
-    """Gives a root a library with machine code, as numba does it."""
+class _PartCompiler(compiler.Compiler):
+    """numba's compiler, for parts."""
 
     def define_pipelines(self) -> Any:
         state = self.state
-        state.library = codegen.JITCodeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return super().define_pipelines()
 
 
-class _Compiler:
-    """numba's compiler of one kernel, at work with the replacements. numba holds its lock meanwhile."""
+def part(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
+    """What other kernels call."""
+    entries = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    made = numba.njit(pipeline_class=_PartCompiler, **{**settings, **entries})(function)
+    numba_s = made.get_call_template
 
-    def __init__(self, numba_s: Any):
-        self._numba_s = numba_s
+    def of_any_value(args: Any, kws: Any) -> Any:
+        return numba_s(
+            [types.unliteral(of) for of in args], {k: types.unliteral(of) for k, of in kws.items()}
+        )
 
-    def compile(self, args: Any, return_type: Any) -> Any:
-        with _replaced():
-            made = self._numba_s.compile(args, return_type)
-        generator = _generator()
-        for name in [name for name in _environments if generator._engine.is_symbol_defined(name)]:
-            generator.set_env(name, _environments.pop(name))
-        return made
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._numba_s, name)
+    made.get_call_template = of_any_value
+    return made
 
 
-@contextmanager
-def _replaced() -> Iterator[None]:
-    settings, context = targetconfig.TargetConfig, registry.cpu_target.target_context
-    replacements: list[tuple[Any, str, Any]] = [
-        (context, "_internal_codegen", _generator()),
-        *((type(context), name, _of_roots(getattr(type(context), name))) for name in WRAPPERS),
-        (functions.BaseFunction, "get_call_type", _call_type),
-        (settings, "__eq__", _same_settings),
-        (settings, "__hash__", _hash_of_settings),
-    ]
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replacements]
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        for owner, name, value in replacements:
-            setattr(owner, name, value)
-        yield
-    finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
-        if collecting:
-            gc.enable()
+def whole(function: Callable[..., Any], settings: dict[str, Any], cache: KernelCache) -> Any:
+    """What Python calls."""
+    made = numba.njit(**{"no_cfunc_wrapper": True, **settings})(function)
+    made._cache = cache
+    return made
 
 
-def _of_roots(numba_s: Callable[..., None]) -> Callable[..., None]:
-    """numba's function that adds an entry to a library, for libraries of roots only."""
+class KernelCache(caching.NullCache):
+    """numba's cache of a whole, in files with a checksum from folders that nobody else can write (kernel_files.py).
 
-    def add(context: Any, library: Any, *args: Any, **kws: Any) -> None:
-        if not isinstance(library, _Inner):
-            numba_s(context, library, *args, **kws)
+    function : of Python
+    content  : `content_of` it; None for one that is not kept
+    begins   : called before the kernel is compiled
+    ends     : called when it is
+    fails    : called with the fault when it cannot be kept
+    """
 
-    return add
+    def __init__(
+        self,
+        function: Any,
+        content: bytes | None,
+        begins: Callable[[bool], None],
+        ends: Callable[[], None],
+        fails: Callable[[OSError], None],
+    ):
+        self._function, self._content = function, content
+        self._begins, self._ends, self._fails = begins, ends, fails
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled for these types; None if there is nothing, or nothing of use."""
+        target_context.refresh()
+        kept = None if self._content is None else kernel_files.read(self._file(sig, target_context.codegen()))
+        if kept is not None:
+            try:
+                made = compiler.CompileResult._rebuild(target_context, *pickle.loads(kept))
+                if made.signature.args == tuple(sig):
+                    return made
+            except Exception:  # whatever it is, the kernel can be compiled
+                pass
+        self._begins(self._content is not None)
+        return None
+
+    def save_overload(self, sig: Any, made: Any) -> None:
+        """Keep what was compiled for these types."""
+        for environment in made._find_referenced_environments():
+            made.codegen.set_env(environment.env_name, environment)
+        self._ends()
+        if self._content is not None:
+            try:
+                kernel_files.write(self._file(sig, made.codegen), serialize.dumps(_to_keep(made)))
+            except OSError as fault:
+                self._fails(fault)
+
+    def _file(self, sig: Any, generator: Any) -> KernelFile:
+        settings = sorted(
+            item
+            for item in os.environ.items()
+            if item[0].startswith("NUMBA_") and item[0] not in _NOT_OF_CODE
+        )
+        types_and_tools = repr((tuple(sig), generator.magic_tuple(), numba.__version__, settings))
+        assert self._content is not None
+        return kernel_files.place(self._function, self._content, types_and_tools)
 
 
-_numba_s_call_type = functions.BaseFunction.get_call_type
+def _to_keep(made: Any) -> tuple[Any, ...]:
+    """numba's pickle of a whole without what is for being linked into others and for people to read: a third of its size is left."""
+    library, *others = made._reduce()
+    name, kind, (code, _) = library
+    others[REDUCED_TYPES] = ""
+    entry = f'define void @"{made.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
+    return (name, kind, (code, binding.parse_assembly(entry).as_bitcode())), *others
 
 
-@functools.wraps(_numba_s_call_type)
-def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-    """The signature of a function of numba's own for arguments of these types. It also depends on the compiler's settings."""
-    known = _by_function.setdefault(self, {})
-    asked = context, tuple(args), tuple(kws.items()), targetconfig.ConfigStack.top_or_none()
-    found = known.get(asked)
-    if found is None:
-        found = _numba_s_call_type(self, context, args, kws)
-        if all(of_argument.is_precise() for of_argument in args):
-            known[asked] = found
-    return found
-
-
-_numba_s_same_settings = targetconfig.TargetConfig.__eq__
-
-
-def _same_settings(self: Any, other: Any) -> Any:
-    if type(self) is not type(other):
-        return _numba_s_same_settings(self, other)
-    a, b = self._values, other._values  # those that are set
-    return self is other or all(
-        a.get(name, option.default) == b.get(name, option.default)
-        for name, option in self.options.items()
-        if name in a or name in b
-    )
-
-
-def _hash_of_settings(self: Any) -> int:
-    return hash(type(self))
+# numba's variables that machine code does not depend on.
+_NOT_OF_CODE = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}

@@ -9,7 +9,7 @@ method, a curve of another kind or a longer job needs is compiled when it is fir
 
 from __future__ import annotations
 
-from planner.base import kernels
+from planner.base import kernel_files, kernels
 from planner.base.names import OPTIMAL
 from planner.commands.first_run import Helper
 
@@ -50,13 +50,11 @@ class _Starts(kernels.Compilation):
 
 
 def compile_ahead() -> list[str]:
-    """Plan `PROGRAMS`; returns the files of the kernels that this took, sorted. Empty where kernels are numba's own."""
+    """Plan `PROGRAMS`; returns the files of the kernels that this took, sorted."""
     from planner.machine import load_machine
     from planner.methods.registry import plan
     from planner.nc.reader import parse_program
 
-    if not kernels.known_numba():
-        return []
     machine = load_machine(MACHINE)
     with Helper(MACHINE, OPTIMAL) as helper:
         kernels.at_compilation(_Starts(helper))
@@ -65,7 +63,7 @@ def compile_ahead() -> list[str]:
                 plan(parse_program(program, machine), machine)
         finally:
             kernels.at_compilation(None)
-    return kernels.files_used()
+    return kernel_files.used()
 
 
 if __name__ == "__main__":

@@ -1,20 +1,15 @@
-"""How kernels are compiled: the results and the errors are numba's, and numba is left as it was."""
+"""How kernels are compiled: the results and the errors are numba's, and what numba compiles besides is as it was."""
 
 from __future__ import annotations
-
-import operator
 
 import numba
 import numpy as np
 import pytest
-from numba.core import errors, registry, targetconfig, types
-from numba.core.compiler import Flags
-from numba.core.types import functions
+from llvmlite import binding
+from numba.core import config, errors
 
-from planner.base import compiling, kept, kernels
+from planner.base import compiling
 from planner.base.kernels import njit
-
-pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="another version of numba")
 
 
 @njit(cache=False)
@@ -36,14 +31,6 @@ def nonsense(x):
     return x + "text"
 
 
-def state_of_numba() -> list[object]:
-    settings = targetconfig.TargetConfig
-    owners = (functions.BaseFunction.get_call_type, settings.__eq__, settings.__hash__)
-    context = registry.cpu_target.target_context
-    wrappers = [getattr(type(context), name) for name in compiling.WRAPPERS]
-    return [*owners, *wrappers, context.codegen(), context.codegen()._library_class]
-
-
 @njit(cache=False)
 def spread(x):
     return np.arange(x).sum() + np.empty(int(x)).shape[0] * 0.5
@@ -51,7 +38,6 @@ def spread(x):
 
 @pytest.mark.slow
 def test_a_function_of_numba_s_own_is_of_use_outside_after_a_kernel_had_it() -> None:
-    """Its library is one without entries."""
     assert spread(4) == 8.0
 
     @numba.njit
@@ -59,15 +45,6 @@ def test_a_function_of_numba_s_own_is_of_use_outside_after_a_kernel_had_it() -> 
         return np.empty(x).shape[0] + np.arange(x).sum()
 
     assert outside(4) == 10
-
-
-def test_numba_is_as_it_was_after_a_kernel_and_after_a_fault() -> None:
-    before = state_of_numba()
-    assert njit(cache=False)(lambda x: x + 1)(1) == 2
-    with pytest.raises(errors.TypingError):
-        nonsense(1.0)
-    assert state_of_numba() == before
-    assert numba.njit(lambda x: x + 1)(1) == 2
 
 
 @pytest.mark.slow
@@ -84,6 +61,11 @@ def test_results_and_exceptions_of_a_kernel_inside_another() -> None:
                 kernel(x, n)
 
 
+def test_a_kernel_that_numba_cannot_compile_is_its_error() -> None:
+    with pytest.raises(errors.TypingError):
+        nonsense(1.0)
+
+
 def test_a_kernel_inside_a_function_of_numba_s_own() -> None:
     @numba.njit
     def outside(x: np.ndarray) -> float:
@@ -97,42 +79,53 @@ def test_a_number_as_an_argument_is_no_other_kernel() -> None:
     def sum_of(x: np.ndarray, n: int) -> float:
         return share(x, 1) + share(x, 2) + share(x, n=4) + share(x, n)
 
-    before = len(share.dispatcher.inside_others.overloads)
+    before = len(share.part.overloads)
     assert sum_of(np.ones(9), 4) == 2.0
-    assert len(share.dispatcher.inside_others.overloads) <= max(before, 1)
+    assert len(share.part.overloads) <= max(before, 1)
 
 
-def test_signatures_are_those_that_numba_finds_and_depend_on_the_settings() -> None:
-    context = registry.cpu_target.typing_context
-    context.refresh()
-    add = context.resolve_value_type(operator.add)
-    array = types.Array(types.float64, 1, "C")
-    for args in ((types.int64, types.float64), (types.intp, types.intp), (array, types.float64)):
-        with targetconfig.ConfigStack().enter(Flags()):
-            found = [compiling._call_type(add, context, args, {}) for _ in range(2)]
-            assert found[0] is found[1]
-            assert found[0] == compiling._numba_s_call_type(add, context, args, {})
-    other = Flags()
-    other.error_model = "numpy"
-    known = len(compiling._by_function[add])
-    with targetconfig.ConfigStack().enter(other):
-        compiling._call_type(add, context, (types.int64, types.float64), {})
-    assert len(compiling._by_function[add]) == known + 1
+def test_a_part_is_no_machine_code() -> None:
+    """Or every kernel would be made twice: for itself, and as a piece of those that call it."""
+    assert twice(np.ones(9), 3) == 2.0 / 3.0
+    (made,) = share.part.overloads.values()
+    assert made.library.get_pointer_to_function(made.fndesc.llvm_func_name) == 0
 
 
-def test_equal_settings_are_equal_and_hash_equal() -> None:
-    given, defaults, others = Flags(), Flags(), Flags()
-    given.nrt = defaults.nrt  # its default, set
-    others.nrt = not defaults.nrt
-    for a, b in ((given, defaults), (defaults, defaults), (others, defaults), (others, Flags(others))):
-        assert compiling._same_settings(a, b) == (a == b)
-        assert a != b or compiling._hash_of_settings(a) == compiling._hash_of_settings(b)
-    assert given == defaults != others
+def test_code_is_for_a_level_of_the_architecture_that_the_processor_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = binding.get_host_cpu_features()
+    for has in (True, False):
+        monkeypatch.setattr(config, "CPU_NAME", None)
+        monkeypatch.setattr(config, "CPU_FEATURES", None)
+        features = dict(here) | dict.fromkeys(compiling.FEATURES.split(), True) | {"avx2": has}
+        monkeypatch.setattr(binding, "get_host_cpu_features", lambda of=features: of)
+        compiling.choose_processor()
+        assert ((compiling.LEVEL, "") if has else (None, None)) == (config.CPU_NAME, config.CPU_FEATURES)
+    monkeypatch.setattr(config, "CPU_NAME", "generic")  # as NUMBA_CPU_NAME says
+    compiling.choose_processor()
+    assert config.CPU_NAME == "generic"
 
 
-def test_another_version_of_numba_compiles_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "numba_version", lambda: "1.0.0rc1")
-    assert not kernels.known_numba()
-    plain = njit(cache=False)(twice.py_func)
-    assert not isinstance(plain, kernels.Kernel)
-    assert plain(np.ones(9), 2) == 1.0
+def test_llvm_gives_the_level_the_features_that_are_looked_for() -> None:
+    """What is compiled for it asks for no others: a loop of fused steps runs where AVX2 and FMA are."""
+    if not binding.get_process_triple().startswith("x86_64"):
+        pytest.skip("levels of x86-64")
+    module = """
+    define <4 x double> @fused(<4 x double> %a, <4 x double> %b, <4 x double> %c) {
+      %r = call <4 x double> @llvm.fma.v4f64(<4 x double> %a, <4 x double> %b, <4 x double> %c)
+      ret <4 x double> %r
+    }
+    declare <4 x double> @llvm.fma.v4f64(<4 x double>, <4 x double>, <4 x double>)
+    """
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    target = binding.Target.from_triple(binding.get_process_triple())
+    codes = {}
+    for name in (compiling.LEVEL, "x86-64"):
+        codes[name] = target.create_target_machine(cpu=name).emit_assembly(binding.parse_assembly(module))
+    level = codes[compiling.LEVEL]
+    assert "vfmadd" in level
+    assert "ymm" in level
+    assert "zmm" not in level
+    assert "vfmadd" not in codes["x86-64"]

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from planner.base import kept, kernels
+from planner.base import kernel_files
 from planner.base.kernels import Kernel, njit
-
-# Elsewhere kernels are numba's own dispatchers.
-pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="another version of numba")
 
 KERNELS = """
 from typing import NamedTuple
@@ -52,10 +46,8 @@ def share(x, n):
     return x / n
 """
 USE = """
-import sys
-import roots
-from roots import Parts, parts, twice
 import numpy as np
+from roots import Parts, parts, twice
 
 made = parts(6.0, 3)
 assert type(made) is Parts and made.each.dtype == np.float64 and made.each.flags.writeable
@@ -64,14 +56,15 @@ try:
 except ValueError as error:
     assert error.args == ("no parts", 3)
 assert twice(made) == 2.0 * made.whole
-numbers = made.whole, *made.each, parts(6.0).whole
-print(*numbers, "|", parts.compiled, parts.loaded, twice.compiled, "numba" in sys.modules)
+numbers = made.whole, *made.each, parts(6.0, 2).whole
+compiled, loaded = (sum(of.values()) for of in (parts.whole.stats.cache_misses, parts.whole.stats.cache_hits))
+print(*numbers, "|", compiled, loaded, sum(twice.whole.stats.cache_misses.values()))
 """
 
 
 @pytest.fixture
 def use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
-    """Write two modules of kernels and use them in a process of its own: values | kernels compiled, loaded; whether numba was there."""
+    """Write two modules of kernels and use them in a process of its own: values | kernels compiled, loaded, compiled."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
 
@@ -93,24 +86,18 @@ def files(tmp_path: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_kernels_from_the_disk(use: Callable[..., str], tmp_path: Path) -> None:
-    assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
+    assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1"
     written = files(tmp_path)
     assert [name.partition("-")[0] for name in written] == ["roots.parts", "roots.twice"]
-    assert use() == "6.0 2.0 2.0 2.0 6.0 | 0 1 0 False"  # the same, without numba
-    # a comment is nothing to compile for; a kernel inside it, in another file, or a constant is, and what is old goes
-    assert use(INNER + "# as before\n", "# the same\n" + KERNELS).endswith("| 0 1 0 False")
+    # a comment is nothing to compile for; a kernel inside it, in another file, or a constant is, and takes the place of what was there
+    assert use(INNER + "# as before\n", "# the same\n" + KERNELS) == "6.0 2.0 2.0 2.0 6.0 | 0 1 0"
+    assert use(INNER.replace("x / n", "x / n + 1.0")) == "9.0 3.0 3.0 3.0 8.0 | 1 0 0"
+    assert use(INNER.replace("FACTOR = 1.0", "FACTOR = 2.0")) == "12.0 2.0 2.0 2.0 12.0 | 1 0 0"
     assert files(tmp_path) == written
-    assert use(INNER.replace("x / n", "x / n + 1.0")) == "9.0 3.0 3.0 3.0 8.0 | 1 0 0 True"
-    assert use(INNER.replace("FACTOR = 1.0", "FACTOR = 2.0")) == "12.0 2.0 2.0 2.0 12.0 | 1 0 0 True"
-    assert len(files(tmp_path)) == 4  # those before may be somebody else's, for some time
-    for file in (tmp_path / "cache").rglob("*.kernel"):
-        os.utime(file, (0.0, time.time() - 2.0 * kept.OTHERS_KEPT))
-    assert use(INNER.replace("x / n", "x / n + 2.0")) == "12.0 4.0 4.0 4.0 10.0 | 1 0 0 True"
-    assert len(files(tmp_path)) == 2
     # half a file is none
     for file in (tmp_path / "cache").rglob("*.kernel"):
         file.write_bytes(file.read_bytes()[:1000])
-    assert use() == "6.0 2.0 2.0 2.0 6.0 | 1 0 1 True"
+    assert use(INNER.replace("FACTOR = 1.0", "FACTOR = 2.0")).endswith("| 1 0 1")
 
 
 OF_RECORDS = """
@@ -151,7 +138,10 @@ def test_kernels_of_records_of_two_sizes_do_not_mix(tmp_path: Path, monkeypatch:
     (tmp_path / "sums.py").write_text(OF_RECORDS, encoding="utf-8")
 
     def said(*counts: int) -> str:
-        code = f"from sums import records, total\nprint(*(total(records(n)) for n in {counts}), total.loaded)"
+        code = (
+            "from sums import records, total\n"
+            f"print(*(total(records(n)) for n in {counts}), sum(total.whole.stats.cache_hits.values()))"
+        )
         command = [sys.executable, "-c", code]
         return subprocess.run(
             command, cwd=tmp_path, capture_output=True, text=True, check=True
@@ -167,17 +157,18 @@ def test_kernels_that_came_with_the_installation_are_found_and_stay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(kept, "installed", lambda: str(tmp_path / "installed"))
-    where = kept.place(six.py_func, six.content, ("f8",))
-    kernel = kept.Kept("entry", [], b"code")
-    assert kept.read(where) is None
-    written = Path(kept.write(where, kernel))
-    assert kept.read(where) == (kernel, str(written))
+    monkeypatch.setattr(kernel_files, "installed", lambda: str(tmp_path / "installed"))
+    file = kernel_files.place(six.py_func, six.content, "(float64,)")
+    assert kernel_files.read(file) is None
+    written = Path(kernel_files.write(file, b"code"))
+    assert kernel_files.read(file) == b"code"
     came = tmp_path / "installed" / written.name
     came.parent.mkdir()
     written.rename(came)
-    assert kept.read(where) == (kernel, str(came))
-    kept.write(where, kernel)  # as another version of it would be
+    assert kernel_files.read(file) == b"code"
+    assert {str(written), str(came)} <= set(kernel_files.used())
+    kernel_files.write(file._replace(content=bytes(32)), b"other")  # as another version of it would be
+    assert kernel_files.read(file) == b"code"
     assert came.exists()
 
 
@@ -187,46 +178,6 @@ SIX = 6
 @njit(cache=False)
 def six(x):
     return x + SIX
-
-
-@njit(cache=False)
-def type_of(x):
-    return x
-
-
-@pytest.mark.slow
-def test_the_kind_of_an_argument_is_its_numba_type() -> None:
-    """Kinds are told apart as numba does: every argument here but one has a kernel of its own."""
-    from numba import typeof
-
-    whole = np.arange(12.0).reshape(3, 4)
-    fixed = whole.copy()
-    fixed.flags.writeable = False
-    packed = np.zeros(3, np.dtype([("a", "?"), ("b", "f8")]))["b"]  # not aligned
-    given = [
-        1,
-        1.0,
-        True,
-        whole,
-        fixed,
-        packed,
-        whole.T,
-        whole[:, ::2],
-        whole[0],
-        whole[:1],  # in both orders: as `whole`
-        whole.astype("i8"),
-        (1, 2.0),
-        (1, (2.0,)),
-    ]
-    for value in given:
-        type_of(value)
-    assert type_of.compiled == len({typeof(value) for value in given}) == len(given) - 1
-    for value in (np.float64(2.0), np.int64(3), np.bool_(True), (2, 3.0), whole + 1.0):
-        before = type_of.compiled
-        type_of(value)
-        assert type_of.compiled - before == isinstance(
-            value, np.generic
-        )  # of the same numba type, compiled for NumPy's numbers
 
 
 def test_what_a_kernel_computes_is_its_content() -> None:
@@ -241,14 +192,4 @@ def test_what_a_kernel_computes_is_its_content() -> None:
     ):
         contents.add(Kernel(function, settings, cache=False).content)
     assert len(contents) == 6  # the first is the same as the one before
-    assert (
-        kept.place(six.py_func, six.content, (1,)).kernel != kept.place(six.py_func, six.content, (2,)).kernel
-    )
-
-
-@pytest.mark.slow
-def test_a_kernel_of_something_that_only_numba_knows() -> None:
-    from numba.typed import List
-
-    assert type_of(List([1.5]))[0] == 1.5
-    assert type_of.dispatcher.nopython_signatures
+    assert len({kernel_files.place(six.py_func, six.content, of).name for of in ("float64", "int64")}) == 2

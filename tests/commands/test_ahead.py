@@ -11,13 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from planner.base import kernels
 from planner.commands.ahead import PROGRAMS
 
 ROOT = Path(__file__).resolve().parents[2]
 SETUPTOOLS = 77  # pyproject.toml asks for it to build
-
-pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="kernels are numba's own here")
 
 
 def cycle_time(job: Path, package: Path, **variables: str) -> str:

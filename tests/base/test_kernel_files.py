@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 import subprocess
@@ -11,30 +12,36 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.base import kept, kernels, own_folders
-from planner.base.kept import Kept, KernelName
+from planner.base import kernel_files, own_folders
+from planner.base.kernel_files import KernelCacheWarning, KernelFile, folders, read, write
 from planner.base.own_folders import fault_of
 
-pytestmark = pytest.mark.skipif(not kernels.known_numba(), reason="elsewhere numba keeps its own kernels")
-
-KERNEL = Kept("entry", [("name", "module", [1.5, "text"])], bytes(range(256)) * 8)
-WHERE = KernelName("module.kernel-0123", "4567", True)
+KERNEL = bytes(range(256)) * 8
+FILE = KernelFile("module.kernel-0123.kernel", bytes(32))
 
 
 @pytest.fixture
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A kernel that was kept."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    written = Path(kept.write(WHERE, KERNEL))
-    assert kept.read(WHERE) == (KERNEL, str(written))
+    written = Path(write(FILE, KERNEL))
+    assert read(FILE) == KERNEL
     return written
+
+
+def test_a_kernel_that_computes_something_else_takes_the_place(file: Path) -> None:
+    other = FILE._replace(content=bytes([1] * 32))
+    assert read(other) is None
+    assert write(other, b"other") == str(file)
+    assert (read(other), read(FILE)) == (b"other", None)
+    assert [path.name for path in file.parent.iterdir()] == [FILE.name]
 
 
 def test_a_bit_anywhere_makes_it_another_file(file: Path) -> None:
     whole = file.read_bytes()
     for at in range(len(whole)):
         file.write_bytes(whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :])
-        assert kept.read(WHERE) is None, at
+        assert read(FILE) is None, at
 
 
 def test_blocks_of_zeros_and_less_or_more_than_all_of_it_are_none(file: Path) -> None:
@@ -42,16 +49,16 @@ def test_blocks_of_zeros_and_less_or_more_than_all_of_it_are_none(file: Path) ->
     whole, rng = file.read_bytes(), np.random.default_rng(7)
     for at in rng.integers(0, len(whole) - 512, 50).tolist():
         file.write_bytes(whole[:at] + bytes(512) + whole[at + 512 :])
-        assert kept.read(WHERE) is None, at
+        assert read(FILE) is None, at
     for length in (0, 1, 31, 32, 33, *rng.integers(34, len(whole) - 1, 50).tolist(), len(whole) - 1):
         file.write_bytes(whole[:length])
-        assert kept.read(WHERE) is None, length
+        assert read(FILE) is None, length
     file.write_bytes(whole + b"\0")
-    assert kept.read(WHERE) is None
+    assert read(FILE) is None
     file.write_bytes(bytes(len(whole)))
-    assert kept.read(WHERE) is None
-    kept.write(WHERE, KERNEL)
-    assert kept.read(WHERE) == (KERNEL, str(file))
+    assert read(FILE) is None
+    write(FILE, KERNEL)
+    assert read(FILE) == KERNEL
 
 
 def test_a_file_without_a_checksum_is_not_unpickled(file: Path, tmp_path: Path) -> None:
@@ -60,8 +67,21 @@ def test_a_file_without_a_checksum_is_not_unpickled(file: Path, tmp_path: Path) 
             return os.mkdir, (str(tmp_path / "ran"),)
 
     file.write_bytes(pickle.dumps(Runs()))
-    assert kept.read(WHERE) is None
+    assert read(FILE) is None
     assert not (tmp_path / "ran").exists()
+
+
+def test_an_interrupt_while_a_kernel_is_written_leaves_nothing(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(descriptor: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupted)
+    other = FILE._replace(name="module.other.kernel")
+    with pytest.raises(KeyboardInterrupt):
+        write(other, KERNEL)
+    assert [path.name for path in file.parent.iterdir()] == [FILE.name]
 
 
 USE = """
@@ -71,13 +91,17 @@ from planner.base.kernels import njit
 def doubled(x):
     return 2.0 * x
 
-print(doubled(4.5), doubled.compiled, doubled.loaded)
+@njit()
+def halved(x):
+    return 0.5 * x
+
+print(doubled(4.5), halved(9.0), sum(sum(kernel.whole.stats.cache_misses.values()) for kernel in (doubled, halved)))
 """
 
 
 @pytest.mark.slow
 def test_a_kernel_that_cannot_be_linked_is_compiled_anew(tmp_path: Path) -> None:
-    """Its checksum is right, and its code no object code, or without the entry."""
+    """Its checksum is right, and it is no pickle, half of one, or one of another kernel."""
     (tmp_path / "use.py").write_text(USE, encoding="utf-8")
 
     def said() -> str:
@@ -90,17 +114,15 @@ def test_a_kernel_that_cannot_be_linked_is_compiled_anew(tmp_path: Path) -> None
         )
         return done.stdout.strip()
 
-    assert said() == "9.0 1 0"
-    assert said() == "9.0 0 1"
-    (written,) = (tmp_path / "cache").rglob("*.kernel")
-    name = KernelName(*written.name.removesuffix(".kernel").rsplit(".", 1), True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-        found = kept.read(name)
-        assert found is not None
-        kept.write(name, found[0]._replace(entry="no_such_entry"))
-    assert said() == "9.0 1 0"
-    assert said() == "9.0 0 1"
+    assert said() == "9.0 4.5 2"
+    assert said() == "9.0 4.5 0"
+    (doubled, halved) = sorted((tmp_path / "cache").rglob("*.kernel"))
+    for path in (doubled, halved):
+        rest = path.read_bytes()[32:]
+        rest = rest[:32] + b"no pickle" if path == doubled else rest[: len(rest) // 2]
+        path.write_bytes(hashlib.sha256(rest).digest() + rest)
+    assert said() == "9.0 4.5 2"
+    assert said() == "9.0 4.5 0"
 
 
 def test_without_a_home_the_present_folder_is_none_for_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,11 +130,11 @@ def test_without_a_home_the_present_folder_is_none_for_kernels(monkeypatch: pyte
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    assert all(os.path.isabs(folder) for folder in kept.folders())
-    monkeypatch.setattr(kept, "folders", list)
+    assert all(os.path.isabs(folder) for folder in folders())
+    monkeypatch.setattr(kernel_files, "folders", list)
     with pytest.raises(OSError, match="yours alone"):
-        kept.write(WHERE, KERNEL)
-    assert kept.read(WHERE) is None
+        write(FILE, KERNEL)
+    assert read(FILE) is None
 
 
 def test_a_relative_cache_home_counts_as_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -124,7 +146,7 @@ def test_a_relative_cache_home_counts_as_none(monkeypatch: pytest.MonkeyPatch, t
         (str(tmp_path / "c"), tmp_path / "c"),
     ):
         monkeypatch.setenv("XDG_CACHE_HOME", named)
-        assert kept.folders()[-1] == str(wanted / "planner" / "kernels")
+        assert folders()[-1] == str(wanted / "planner" / "kernels")
 
 
 def test_an_installation_gets_no_further_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -133,11 +155,11 @@ def test_an_installation_gets_no_further_files(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     package = tmp_path / "site-packages" / "planner"
     package.mkdir(parents=True)
-    monkeypatch.setattr(kept, "PACKAGE", str(package))
+    monkeypatch.setattr(kernel_files, "PACKAGE", str(package))
     of_user = str(tmp_path / "user" / "planner" / "kernels")
-    assert kept.folders() == [of_user]
+    assert folders() == [of_user]
     (package.parent / "pyproject.toml").touch()
-    assert kept.folders() == [str(package / "__pycache__" / "kernels"), of_user]
+    assert folders() == [str(package / "__pycache__" / "kernels"), of_user]
 
 
 @pytest.mark.parametrize("named", ["kernels", "./kernels", "~/kernels"])
@@ -145,8 +167,8 @@ def test_a_cache_that_is_not_absolute_is_refused_with_a_word(
     named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", named)
-    with pytest.warns(kernels.KernelCacheWarning, match="is not an absolute path"):
-        assert not [folder for folder in kept.folders() if not os.path.isabs(folder)]
+    with pytest.warns(KernelCacheWarning, match="is not an absolute path"):
+        assert not [folder for folder in folders() if not os.path.isabs(folder)]
 
 
 class TestWhoCanWrite:
@@ -200,9 +222,9 @@ class TestWhoCanWrite:
 
     def test_a_file_that_others_can_write_is_not_read(self, file: Path) -> None:
         file.chmod(0o646)
-        assert kept.read(WHERE) is None
+        assert read(FILE) is None
         file.chmod(0o644)
-        assert kept.read(WHERE) is not None
+        assert read(FILE) is not None
 
     def test_without_owners_the_path_alone_counts(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.leaf.chmod(0o777)

@@ -1,0 +1,135 @@
+"""Where compiled kernels lie on the disk.
+
+A file is named by a kernel's function, the types of its arguments, the processor and the versions of Python and numba, and holds a
+digest of what the kernel computes (kernel_content.py). A kernel is compiled again, and takes the place of its file, when it or one that
+it calls in another file computes something else, and not when a comment changes, a file is copied or gets a new date.
+
+A file begins with the SHA-256 of what is behind: what a disk, a crash or another program has changed is not there, and is compiled
+anew. It says nothing of who wrote the file: kernels come only from where nobody else can write (own_folders.py).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import sys
+import warnings
+from functools import cache
+from types import FunctionType
+from typing import NamedTuple
+
+from planner.base.own_folders import fault_of, fault_of_file
+
+PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_DIGEST = hashlib.sha256().digest_size
+_used: set[str] = set()
+
+
+class KernelCacheWarning(UserWarning):
+    """Compiled kernels cannot be kept, or not where they were to be."""
+
+
+class KernelFile(NamedTuple):
+    """The name of a kernel's file without its folder, and the digest of what the kernel computes."""
+
+    name: str
+    content: bytes
+
+
+def place(function: FunctionType, content: bytes, types_and_tools: str) -> KernelFile:
+    """The file of the kernel of a function, for arguments of some types, compiled by some tools."""
+    several = content if "<" in function.__qualname__ else b""  # functions made by one function have one name
+    of = repr((function.__module__, types_and_tools, sys.implementation.cache_tag, several))
+    named = re.sub(r"[^\w.]", "", f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}")[:80]
+    return KernelFile(f"{named}-{hashlib.sha256(of.encode()).hexdigest()[:16]}.kernel", content)
+
+
+def read(file: KernelFile) -> bytes | None:
+    """What was written to it, or None: what is damaged, of another content, or may be somebody else's, is not there."""
+    for folder in (*folders(), *([] if fault_of(installed()) else [installed()])):
+        path = os.path.join(folder, file.name)
+        try:
+            with open(path, "rb") as opened:
+                if fault_of_file(os.fstat(opened.fileno())):
+                    continue
+                whole = opened.read()
+        except OSError:
+            continue
+        checksum, rest = whole[:_DIGEST], whole[_DIGEST:]
+        if hashlib.sha256(rest).digest() == checksum and rest[:_DIGEST] == file.content:
+            _used.add(path)
+            return rest[_DIGEST:]
+    return None
+
+
+def write(file: KernelFile, kernel: bytes) -> str:
+    """Keep a kernel, in place of what had its name; returns the path. Raises OSError if it can be written nowhere."""
+    faults: list[OSError] = []
+    rest = file.content + kernel
+    for folder in folders():
+        path = os.path.join(folder, file.name)
+        part = f"{path}.{os.getpid()}"
+        try:
+            os.makedirs(folder, mode=0o755, exist_ok=True)
+            try:
+                with open(part, "wb") as opened:
+                    opened.write(hashlib.sha256(rest).digest() + rest)
+                    opened.flush()
+                    os.fsync(opened.fileno())  # or a power failure could leave the name without the content
+                os.replace(part, path)
+            except BaseException:  # Ctrl-C too
+                if os.path.exists(part):
+                    os.remove(part)
+                raise
+        except OSError as fault:
+            faults.append(fault)
+            continue
+        _used.add(path)
+        return path
+    raise faults[0] if faults else OSError("there is no folder that is yours alone")
+
+
+def used() -> list[str]:
+    """The paths of all kernels that this process has read or written, sorted."""
+    return sorted(_used)
+
+
+def folders() -> list[str]:
+    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the sources of a checkout, or
+    the user's cache directory. An installation gets no further files: who removes it removes all of it.
+
+    Folders that others can write are left out (own_folders.py); one that NUMBA_CACHE_DIR names with a warning.
+    """
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named:
+        folder = os.path.join(named, "planner")
+        fault = fault_of(folder)
+        if not fault:
+            return [folder]
+        _say_once(f"NUMBA_CACHE_DIR: {folder} {fault}; compiled kernels are neither read nor kept there")
+    checkout = os.path.isfile(os.path.join(os.path.dirname(PACKAGE), "pyproject.toml"))
+    beside = [os.path.join(PACKAGE, "__pycache__", "kernels")] if checkout else []
+    return [
+        folder for folder in (*beside, os.path.join(_of_user(), "planner", "kernels")) if not fault_of(folder)
+    ]
+
+
+def _of_user() -> str:
+    """The user's cache directory. A relative one in XDG_CACHE_HOME counts as none, as its specification says."""
+    if sys.platform == "win32":
+        return os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
+    if sys.platform == "darwin":
+        return os.path.expanduser("~/Library/Caches")
+    named = os.environ.get("XDG_CACHE_HOME", "")
+    return named if os.path.isabs(named) else os.path.expanduser("~/.cache")
+
+
+@cache
+def _say_once(sentence: str) -> None:
+    warnings.warn(sentence, KernelCacheWarning, stacklevel=4)
+
+
+def installed() -> str:
+    """Where those lie that came with the installation (setup.py)."""
+    return os.path.join(PACKAGE, "kernels")

@@ -34,13 +34,18 @@ class BuildWithKernels(build_py):
             return
         self.announce("compiling kernels", level=2)
         path = os.pathsep.join([str(ROOT), *sys.path])
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", "planner.commands.ahead"],
-            env={**os.environ, "PYTHONPATH": path},
-            stdout=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        env = {**os.environ, "PYTHONPATH": path}
+        command = [sys.executable, "-P", "-m", "planner.commands.ahead"]
+        beside = None
+        if (os.cpu_count() or 1) > 1:
+            quiet = subprocess.DEVNULL
+            beside = subprocess.Popen([*command, "corners"], env=env, stdout=quiet, stderr=quiet)
+        try:
+            done = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=False)
+        finally:
+            if beside is not None:
+                beside.terminate()
+                beside.wait()
         if done.returncode:
             self.warn("kernels are not compiled ahead, see above; the first plan compiles them")
         elif (

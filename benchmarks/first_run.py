@@ -2,11 +2,10 @@
 
     python -m benchmarks.first_run [--methods optimal,second-order,...] [--ways ...]     into results/first-run.json and .md
 
-Every run is `planner plan` in a new process with an empty NUMBA_CACHE_DIR, in one of three ways:
+Every run is `planner plan` in a new process with an empty NUMBA_CACHE_DIR, in one of two ways:
 
-    numba       every kernel as numba compiles it by itself: no parts, one process
-    one         as planner/base/compiling.py has it, in one process
-    two         the same with the second process of planner/commands/first_run.py: what a user gets
+    numba       every kernel as numba compiles it by itself
+    planner     as planner/base/compiling.py has it: what a user gets
 
 CPU seconds are those of all its processes. Kernels are counted by what lies in the cache afterwards: a kernel for arguments of two
 kinds counts twice.
@@ -29,11 +28,9 @@ from benchmarks.record import markdown, write_results
 
 PROGRAM = "G21 G90 G17\nG64 P0.02\nG1 X20 F3000\nX40 Y10\nX60\nX70 Y30\nX50 Y50\nX20 Y40\nX0 Y20\nM2\n"
 METHODS = ("optimal", "second-order", "kinematic", "fir", "stop")
-ONE = "import planner.commands.first_run as first; first.cores = lambda: 1; "
 WAYS = {
-    "numba": ONE + "import planner.base.kernels as kernels; kernels.Kernel.part = property(lambda own: own.whole); ",
-    "one": ONE,
-    "two": "",
+    "numba": "import planner.base.kernels as kernels; kernels.Kernel.part = property(lambda own: own.whole); ",
+    "planner": "",
 }
 COMMAND = "from planner.cli import main; main()"
 

@@ -1,17 +1,21 @@
 """Kernels compiled ahead: at installation, what the first plans will need.
 
-    python -m planner.commands.ahead
+    python -m planner.commands.ahead [corners]
 
-plans two programs with the usual method, which compiles what is not kept yet, with the second process of first_run.py beside it, and
-prints the files of all kernels that the plans have used. `setup.py` runs it and puts these files into the installation. What another
-method, a curve of another kind or a longer job needs is compiled when it is first used.
+plans two programs with the usual method, which compiles what is not kept yet, and prints the files of all kernels that the plans have
+used. What another method, a curve of another kind or a longer job needs is compiled when it is first used.
+
+Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by side, the second time with
+`corners`: three moves that need not be read, on corners that need no splines. That comes to geometry, path, feedrate, samples and
+verdict while the first compiles the reading and the splines. Both keep their kernels in the same place, and each loads what it finds.
 """
 
 from __future__ import annotations
 
-from planner.base import kernel_files, kernels
-from planner.base.names import OPTIMAL
-from planner.commands.first_run import Helper
+import sys
+
+from planner.base import kernel_files
+from planner.base.names import OPTIMAL, SINGLE_CORNERS
 
 MACHINE = "mill"
 # Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so short that other corners
@@ -35,18 +39,9 @@ M2
 """,
     "G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X6 Y11 I-5 J1\nM2\n",
 )
-
-
-class _Starts(kernels.Compilation):
-    """Starts the second process with the first kernel that is kept."""
-
-    def __init__(self, helper: Helper):
-        self._helper = helper
-
-    def begins(self, is_kept: bool) -> None:
-        """A kernel is about to be compiled."""
-        if is_kept:
-            self._helper.start()
+POINTS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 1.0, 0.0))  # [mm]
+FEED = 10.0  # [mm/s]
+CORNERS = "corners"  # on the command line
 
 
 def compile_ahead() -> list[str]:
@@ -56,15 +51,26 @@ def compile_ahead() -> list[str]:
     from planner.nc.reader import parse_program
 
     machine = load_machine(MACHINE)
-    with Helper(MACHINE, OPTIMAL) as helper:
-        kernels.at_compilation(_Starts(helper))
-        try:
-            for program in PROGRAMS:
-                plan(parse_program(program, machine), machine)
-        finally:
-            kernels.at_compilation(None)
+    for program in PROGRAMS:
+        plan(parse_program(program, machine), machine)
     return kernel_files.used()
 
 
+def compile_corners() -> bool:
+    """Plan moves through `POINTS`; returns whether the plan passed."""
+    import numpy as np
+
+    from planner.machine import load_machine
+    from planner.methods.registry import plan
+    from planner.nc.points import program_of_points
+
+    program = program_of_points(np.array(POINTS), np.full(len(POINTS) - 1, FEED), None)
+    made = plan(program, load_machine(MACHINE), method=OPTIMAL, geometry=SINGLE_CORNERS)
+    return made.verdict is not None and made.verdict.passed
+
+
 if __name__ == "__main__":
-    print(*compile_ahead(), sep="\n")
+    if sys.argv[1:] == [CORNERS]:
+        compile_corners()
+    else:
+        print(*compile_ahead(), sep="\n")

@@ -12,7 +12,6 @@ import typer
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import OPTIMAL, users_of
 from planner.commands.exit_codes import FAILED
-from planner.commands.first_run import Helper
 from planner.commands.options import (
     DEFAULT_MACHINE,
     CornerOption,
@@ -148,10 +147,7 @@ def plan_command(
     if trace is not None:
         trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
-    with (
-        Helper(str(machine or DEFAULT_MACHINE), method) as helper,
-        ProgressBar(quiet=quiet or verbose, at_first_kernel=helper.start) as progress,
-    ):
+    with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan(
             job,
             machine or DEFAULT_MACHINE,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from typing import Any
 
 from planner.base import kernels
@@ -32,13 +31,11 @@ def duration_text(seconds: float) -> str:
 class ProgressBar(kernels.Compilation):
     """The bar: clock, share of the stage, time left of it, stage. Elsewhere clock and stage as text.
 
-    quiet           : print nothing
-    at_first_kernel : called once when the first kernel is about to be compiled that can be kept
+    quiet : print nothing
     """
 
-    def __init__(self, *, quiet: bool = False, at_first_kernel: Callable[[], None] | None = None) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         self._quiet = quiet
-        self._at_first_kernel = at_first_kernel
         self._compiled = 0
         self._bar: Any = None
         self._task: Any = None
@@ -72,9 +69,6 @@ class ProgressBar(kernels.Compilation):
     def begins(self, is_kept: bool) -> None:
         """Say that a kernel is compiled."""
         self._compiled += 1
-        if is_kept and self._at_first_kernel is not None:
-            self._at_first_kernel()
-            self._at_first_kernel = None
         self._show(f"{COMPILING}: kernel {self._compiled}{f', {KEPT}' if is_kept else ''}", 0.0)
 
     def ends(self) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from planner.commands.ahead import PROGRAMS
+from planner.commands.ahead import PROGRAMS, compile_corners
 
 ROOT = Path(__file__).resolve().parents[2]
 SETUPTOOLS = 77  # pyproject.toml asks for it to build
@@ -53,3 +53,9 @@ def test_the_programs_have_every_kind_of_move() -> None:
     """A move of another kind would be compiled by the first plan that has one."""
     words = set(re.findall(r"\bG\d+", " ".join(PROGRAMS)))
     assert {"G1", "G2", "G3", "G61", "G64"} <= words
+
+
+@pytest.mark.slow
+def test_the_plan_beside_is_made() -> None:
+    """One that ends early would leave its kernels to the other process."""
+    assert compile_corners()

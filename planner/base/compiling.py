@@ -37,10 +37,11 @@ bytecode.FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urando
 
 def choose_processor() -> None:
     """Set the level as numba's processor, unless NUMBA_CPU_... say another or this one has not all of it."""
-    if config.CPU_NAME is None and config.CPU_FEATURES is None:
+    settings: Any = config  # made by numba of its variables
+    if settings.CPU_NAME is None and settings.CPU_FEATURES is None:
         here = binding.get_host_cpu_features()
         if all(here.get(feature) for feature in FEATURES.split()):
-            config.CPU_NAME, config.CPU_FEATURES = LEVEL, ""
+            settings.CPU_NAME, settings.CPU_FEATURES = LEVEL, ""
 
 
 choose_processor()

@@ -21,6 +21,7 @@ from typing import Any
 import numba
 from llvmlite import binding
 from numba.core import bytecode, caching, codegen, compiler, config, serialize, types
+from numba.core.runtime import rtsys
 
 from planner.base import kernel_files
 from planner.base.kernel_files import KernelFile
@@ -29,7 +30,6 @@ LEVEL = "x86-64-v3"
 # What LLVM calls the features of the level beyond those of every x86-64 (x86-64 psABI, table 3.1).
 FEATURES = "cx16 sahf popcnt sse3 ssse3 sse4.1 sse4.2 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
 
-REDUCED_TYPES = 5  # where the text of all types is in what `CompileResult._reduce` returns, after the library
 # numba tells functions in machine code apart by a number that begins at 1 in every process, and has one name for records of two and of
 # nine axes: a third process would load two functions of one name.
 bytecode.FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6)))
@@ -127,7 +127,7 @@ class KernelCache(caching.NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled for these types; None if there is nothing, or nothing of use."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # all that machine code needs; compiling has numba load more
         kept = None if self._content is None else kernel_files.read(self._file(sig, target_context.codegen()))
         if kept is not None:
             try:
@@ -162,12 +162,12 @@ class KernelCache(caching.NullCache):
 
 
 def _to_keep(made: Any) -> tuple[Any, ...]:
-    """numba's pickle of a whole without what is for being linked into others and for people to read: a third of its size is left."""
-    library, *others = made._reduce()
-    name, kind, (code, _) = library
-    others[REDUCED_TYPES] = ""
+    """What numba pickles of a whole, without what is for being linked into others and for people to read, and without environments that
+    have nothing in them, of numba's own functions, whose modules would be imported for that."""
+    (name, kind, (code, _)), *others, _, reload_init, environments = made._reduce()
     entry = f'define void @"{made.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
-    return (name, kind, (code, binding.parse_assembly(entry).as_bitcode())), *others
+    library = name, kind, (code, binding.parse_assembly(entry).as_bitcode())
+    return library, *others, "", reload_init, tuple(of for of in environments if of.consts)
 
 
 # numba's variables that machine code does not depend on.

@@ -9,11 +9,11 @@ import numpy as np
 from planner.base.units import MILLISECOND
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.ignored_words import IgnoredWords
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import integer
 from planner.nc.program import Kind, PathControl
 from planner.nc.state import State
 
@@ -27,13 +27,12 @@ def signal(table: BlockTable, block: Block) -> None:
     code = block.m["signals"]
     for letter in _NEEDED[code]:
         if letter not in block.value:
-            raise WordFault(
-                block.at["signals"], f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}"
-            )
+            raise block.fault(f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}", "signals")
     if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
-        raise WordFault(
-            block.at["signals"],
-            "M66 waits for an input of the control, which only the machine knows; plan the parts before and after it",
+        raise block.fault(
+            "M66 waits for an input of the control, which only the machine knows; "
+            "plan the parts before and after it",
+            "signals",
         )
     table.add_event("M", code / 10, block.line)
 
@@ -53,9 +52,7 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
     line = block.line
     if "S" in block.value:
         if block.value["S"] < 0:
-            raise WordFault(
-                block.at["S"], "a spindle speed must not be negative; write M4 to turn the other way"
-            )
+            raise block.fault("a spindle speed must not be negative; write M4 to turn the other way", "S")
         table.add_event("S", block.value["S"], line)
         state.spindle.speed = block.value["S"]
     if "T" in block.value:
@@ -65,7 +62,7 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
         signal(table, block)
     if "tool number" in block.m:
         if "Q" not in block.value:
-            raise WordFault(block.at["tool number"], "M61 needs the tool's number as a Q word")
+            raise block.fault("M61 needs the tool's number as a Q word", "tool number")
         state.tool_loaded = integer(block, "Q", 0)
     if "tool change" in block.m:
         state.tool_loaded = state.tool_selected
@@ -87,7 +84,7 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
     if "spindle mode" in block.g:
         state.spindle.surface_speed = block.g["spindle mode"] == 960
         if state.spindle.surface_speed and "S" not in block.value:
-            raise WordFault(block.at["spindle mode"], "G96 needs the surface speed as an S word")
+            raise block.fault("G96 needs the surface speed as an S word", "spindle mode")
         state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
@@ -144,11 +141,11 @@ def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Fi
     if "P" in block.value and block.g["path control"] == 640:
         tolerance = block.value["P"]
         if tolerance < 0:
-            raise WordFault(block.at["P"], "a tolerance must not be negative; write G64 P0.05")
+            raise block.fault("a tolerance must not be negative; write G64 P0.05", "P")
         if tolerance > 0 and tolerance * state.unit < TOLERANCE_MIN:
-            raise WordFault(
-                block.at["P"],
+            raise block.fault(
                 f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself",
+                "P",
             )
         if tolerance > 0:
             state.tolerance = tolerance * state.unit

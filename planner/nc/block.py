@@ -19,6 +19,14 @@ OFFSET_NUMBER = codes.Assumption(
 Report = Callable[[int, str], None]
 
 
+class WordFault(Exception):
+    """The line cannot be executed further; carries the index of the word and the message."""
+
+    def __init__(self, word: int, message: str):
+        super().__init__(message)
+        self.word, self.message = word, message
+
+
 @dataclass(slots=True)
 class Block:
     """One line of a program.
@@ -68,6 +76,10 @@ class Block:
         if "motion" in self.at:
             return self.at["motion"]
         return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
+
+    def fault(self, message: str, at: str = "") -> WordFault:
+        """A fault of the word of a letter or modal group; of the one that makes the block move if none is given."""
+        return WordFault(self.at[at] if at else self.motion_word(), message)
 
 
 def unused(letter: str) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from planner.nc import codes
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import integer
 from planner.nc.state import SYSTEMS, State
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
@@ -28,11 +28,11 @@ def check_unchanged(state: State, block: Block) -> None:
     sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
     refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block))
     if one_shot is not None and refused:
-        raise WordFault(block.at["one-shot"], _refusal(f"G{codes.number(one_shot)}"))
+        raise block.fault(_refusal(f"G{codes.number(one_shot)}"), "one-shot")
     if block.homing:
         raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
     if "tool change" in block.m:
-        raise WordFault(block.at["tool change"], _refusal("M6"))
+        raise block.fault(_refusal("M6"), "tool change")
 
 
 def _system_in_force(state: State, block: Block) -> bool:
@@ -47,7 +47,7 @@ def _refusal(name: str) -> str:
 def check_motion(state: State, block: Block) -> None:
     """Cycles and threads are not compensated. Raises WordFault."""
     if state.motion > 3:
-        raise WordFault(block.motion_word(), _refusal(f"G{codes.number(state.motion)}"))
+        raise block.fault(_refusal(f"G{codes.number(state.motion)}"))
 
 
 def switch(
@@ -70,9 +70,8 @@ def switch(
     if state.normal == 1 and state.rotated:
         raise WordFault(word, f"{name} in G18 while the work system is rotated is not supported")
     if "L" in block.value:
-        raise WordFault(
-            block.at["L"],
-            f"the edge orientation L of {name} is not supported; remove it and write the tool's path",
+        raise block.fault(
+            f"the edge orientation L of {name} is not supported; remove it and write the tool's path", "L"
         )
     diameter = _diameter(state, block, code, findings)
     if diameter == 0.0:
@@ -86,7 +85,7 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
     name = f"G{codes.number(code)}"
     if code in _DYNAMIC:
         if "D" not in block.value:
-            raise WordFault(block.at["cutter compensation"], f"{name} needs the tool's diameter as a D word")
+            raise block.fault(f"{name} needs the tool's diameter as a D word", "cutter compensation")
         return block.value["D"] * state.unit
     number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
     tool = state.tools.get(number)

@@ -29,10 +29,10 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc import auxiliary, codes
 from planner.nc.arcs import AXES, IN_PLANE
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import integer
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 
@@ -176,7 +176,7 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
     if code in PECKING and not words["Q"] > 0:
         raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
     if code in DWELLING and words["P"] < 0:
-        raise WordFault(block.at["P"], "a dwell must not be negative; write its seconds, such as P0.5")
+        raise block.fault("a dwell must not be negative; write its seconds, such as P0.5", "P")
     _check_spindle(state, code, word)
     if "P" in block.value and code in DWELLING | TAPPING.keys():
         auxiliary.assume_seconds(state, block, words["P"], findings)
@@ -190,10 +190,10 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     clear = words["R"] + (0.0 if state.absolute else series.level)
     bottom = words["XYZ"[axis]] + (0.0 if state.absolute else clear)
     if bottom > clear:
-        raise WordFault(
-            block.motion_word(),
-            f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth {AXES[axis].upper()} = {bottom:g}; "
-            "write R above it",
+        raise block.fault(
+            f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth "
+            f"{AXES[axis].upper()} = {bottom:g}; "
+            "write R above it"
         )
     return Hole(
         state.motion,
@@ -218,7 +218,7 @@ def _repeats(block: Block, hole: Hole) -> int:
         text = (
             f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
         )
-        raise WordFault(block.motion_word(), text)
+        raise block.fault(text)
     return repeats
 
 
@@ -257,7 +257,7 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
     needed += "Q" * (code in PECKING) + "P" * (code in DWELLING)
     for letter in needed:
         if letter not in series.words:
-            raise WordFault(block.motion_word(), f"G{codes.number(code)} needs {_meaning(letter)}")
+            raise block.fault(f"G{codes.number(code)} needs {_meaning(letter)}")
     words = dict(series.words)
     words[axis] = _length(state, words, state.normal)
     return words

@@ -18,9 +18,8 @@ import math
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.extra_axes import LETTERS, ROTARY
-from planner.nc.moves import WordFault
 from planner.nc.state import State
 
 _TURN = 360.0  # degrees

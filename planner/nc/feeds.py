@@ -15,9 +15,8 @@ import math
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault
 from planner.nc.state import FeedMode, State
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
@@ -39,8 +38,8 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
         return
     feed = block.value["F"]
     if not feed > 0:
-        raise WordFault(
-            block.at["F"], "a feed must be positive; write the feed of the moves that follow, such as F1000"
+        raise block.fault(
+            "a feed must be positive; write the feed of the moves that follow, such as F1000", "F"
         )
     if mode == "inverse time":
         return

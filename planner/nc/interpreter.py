@@ -21,7 +21,7 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_reader import read_block
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
@@ -30,7 +30,6 @@ from planner.nc.faults import FaultList, Findings, Notes
 from planner.nc.ignored_words import IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover
-from planner.nc.moves import WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
@@ -318,9 +317,10 @@ class Interpreter:
                 f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
             )
         elif code in COVET_AXES and motion is not None:
-            raise WordFault(
-                block.at["one-shot"],
-                f"G{codes.number(code)} and G{codes.number(motion)} both use the axis words of the line; write two lines",
+            raise block.fault(
+                f"G{codes.number(code)} and G{codes.number(motion)} "
+                f"both use the axis words of the line; write two lines",
+                "one-shot",
             )
         if code in (280, 300):
             homing.go_home(self.state, self.table, block, self.findings)

@@ -7,12 +7,11 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc import codes, compensation, drilling, extra_axis_moves, feeds, moves, offsets, threads
 from planner.nc.arcs import is_hardly_turned
-from planner.nc.block import OFFSET_NUMBER, Block
+from planner.nc.block import OFFSET_NUMBER, Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings
 from planner.nc.ignored_words import IgnoredWords
-from planner.nc.moves import WordFault
 from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, State
@@ -66,7 +65,7 @@ class Mover:
             self._move(block)
         elif "motion" in block.g and state.motion > 3:
             text = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
-            raise WordFault(block.at["motion"], text)
+            raise block.fault(text, "motion")
 
     def _take_code(self, block: Block) -> None:
         """The motion code of a block stays in force, until another one or G80."""
@@ -152,10 +151,7 @@ class Mover:
         extra_axis_moves.move(state, block)
         feeds.check_feed(state, block)
         if self.cutter is None and state.actual is not None:
-            raise WordFault(
-                block.motion_word(),
-                "the move after G40 must be straight; write G0 or G1 to where this arc begins",
-            )
+            raise block.fault("the move after G40 must be straight; write G0 or G1 to where this arc begins")
         try:
             if not state.plane_known:
                 state.plane_known = True
@@ -187,13 +183,10 @@ class Mover:
             return
         extra_axis_moves.refuse(state, block, "on a spline")
         if self.cutter is not None:
-            raise WordFault(
-                block.motion_word(), "a spline under cutter radius compensation; write G40 before it"
-            )
+            raise block.fault("a spline under cutter radius compensation; write G40 before it")
         if state.actual is not None:
-            raise WordFault(
-                block.motion_word(),
-                "the move after G40 must be straight; write G0 or G1 to where this spline begins",
+            raise block.fault(
+                "the move after G40 must be straight; write G0 or G1 to where this spline begins"
             )
         state.series = None
         if state.in_thread:

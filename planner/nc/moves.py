@@ -17,7 +17,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_from_radius, closes
-from planner.nc.block import Block, unused
+from planner.nc.block import Block, WordFault, unused
 from planner.nc.state import REFUSED_MOTION, State
 
 _CLOSES_IF = "the arc would close if its centre were"
@@ -29,14 +29,6 @@ _ROUNDING = {
     "Q": 1e-4,
     "P": 1e-3,
 }  # what RS274NGC rounds away from a whole number
-
-
-class WordFault(Exception):
-    """The line cannot be executed further; carries the index of the word and the message."""
-
-    def __init__(self, word: int, message: str):
-        super().__init__(message)
-        self.word, self.message = word, message
 
 
 class ArcFault(WordFault):
@@ -182,9 +174,9 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
 def check_machine_coordinates(state: State, block: Block) -> None:
     """G53 goes with G0 and G1, and with absolute coordinates. Raises WordFault."""
     if state.motion not in (0, 1) or not ("motion" in block.g or block.has(state.letters)):
-        raise WordFault(block.at["one-shot"], "G53 goes with G0 or G1 only; write G53 G0 or G53 G1")
+        raise block.fault("G53 goes with G0 or G1 only; write G53 G0 or G53 G1", "one-shot")
     if not state.absolute:
-        raise WordFault(block.at["one-shot"], "G53 goes with absolute coordinates only; write G90 before it")
+        raise block.fault("G53 goes with absolute coordinates only; write G90 before it", "one-shot")
 
 
 def used_in_force(state: State) -> set[str]:

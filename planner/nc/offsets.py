@@ -20,9 +20,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import codes, extra_axis_moves
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault, coordinate, integer
+from planner.nc.moves import coordinate, integer
 from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
 
 _FIXTURE = 593  # the system of G10 L11
@@ -42,14 +42,12 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
         state.tool_offset = _offset_of(state, tool, block, findings)
     elif "H" in block.value:
         if block.has("XYZ"):
-            raise WordFault(
-                block.at["H"], "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines"
-            )
+            raise block.fault("G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines", "H")
         state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, findings)
     elif block.has("XYZ"):
         state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
     else:
-        raise WordFault(block.at["tool length"], "G43.2 needs a tool as an H word, or lengths as X, Y and Z")
+        raise block.fault("G43.2 needs a tool as an H word, or lengths as X, Y and Z", "tool length")
 
 
 def system_of(block: Block) -> int:
@@ -95,9 +93,7 @@ def shift_origin(state: State, block: Block) -> None:
     if code in (520, 920):
         if not block.has(state.letters):
             what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
-            raise WordFault(
-                block.at["one-shot"], f"G{codes.number(code)} needs at least one of X, Y and Z: {what}"
-            )
+            raise block.fault(f"G{codes.number(code)} needs at least one of X, Y and Z: {what}", "one-shot")
         here = state.in_system()
         for axis in _axes(block):
             length = coordinate(state, block, axis)
@@ -160,7 +156,7 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
         if letter in block.value:
             raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
     if not state.absolute:
-        raise WordFault(block.at["one-shot"], f"G10 L{kind} of Fanuc adds after G91; write G90 before it")
+        raise block.fault(f"G10 L{kind} of Fanuc adds after G91; write G90 before it", "one-shot")
     code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
@@ -170,7 +166,7 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
     extra_axis_moves.refuse(state, block, "of a tool offset")
     if "P" not in block.value:
-        raise WordFault(block.at["one-shot"], f"G10 L{kind} needs its tool as a P word")
+        raise block.fault(f"G10 L{kind} needs its tool as a P word", "one-shot")
     number = integer(block, "P", 1)
     tool = state.tools.get(number) or Tool(np.zeros(3))
     for letter in "IJQ":

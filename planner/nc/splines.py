@@ -20,10 +20,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.bezier import cubic_pieces, homogeneous, raised
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.codes import CUBIC, NURBS, NURBS_END, NURBS_WITH_KNOTS, QUADRATIC
 from planner.nc.lexer import Words
-from planner.nc.moves import WordFault, target
+from planner.nc.moves import target
 from planner.nc.state import State
 
 ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces
@@ -121,17 +121,16 @@ class SplineReader:
     def _cubic(self, state: State, block: Block, blocks: int) -> Pieces:
         end = _end_in_plane(state, block, "G5")
         if not ("P" in block.value and "Q" in block.value):
-            raise WordFault(block.motion_word(), "G5 needs P and Q: its second control point, from its end")
+            raise block.fault("G5 needs P and Q: its second control point, from its end")
         near, far = _offset(state, block, "IJ"), _offset(state, block, "PQ")
         if "I" not in block.value and "J" not in block.value:
             if self._reflected is None or self._reflected[0] != blocks:
-                raise WordFault(
-                    block.motion_word(),
-                    "G5 needs I and J, its first control point from its start, unless a G5 is just before it",
+                raise block.fault(
+                    "G5 needs I and J, its first control point from its start, unless a G5 is just before it"
                 )
             near = self._reflected[1]
         elif not ("I" in block.value and "J" in block.value):
-            raise WordFault(block.motion_word(), "G5 needs both I and J, or neither")
+            raise block.fault("G5 needs both I and J, or neither")
         self._reflected = blocks + 1, -far
         start = state.position.copy()
         return np.stack([start, start + near, end + far, end])[None], np.ones((1, 4))
@@ -141,9 +140,8 @@ class SplineReader:
         opened, now = self.open, block.g.get("motion")
         if now == NURBS_END:
             if opened is None:
-                raise WordFault(
-                    block.at["motion"],
-                    "G5.3 ends a spline, and none is open; write G5.2 and control points before it",
+                raise block.fault(
+                    "G5.3 ends a spline, and none is open; write G5.2 and control points before it", "motion"
                 )
             self.open = None
             return _even_knots(opened, block), opened.line
@@ -160,7 +158,7 @@ class SplineReader:
             if "P" in block.value and not block.has("XY"):
                 opened.weights[0] = _weight(block, "P")
         elif "P" in block.value and not block.has("XY"):
-            raise WordFault(block.at["P"], "a weight without a control point; write X and Y beside it")
+            raise block.fault("a weight without a control point; write X and Y beside it", "P")
         if "L" in block.value:
             opened.order = _order(block, "L")
         if block.has("XYZ"):
@@ -182,7 +180,7 @@ class SplineReader:
             order = _order(block, "P") if "P" in block.value else 4
             opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
         elif "P" in block.value:
-            raise WordFault(block.at["P"], "the order P of a spline stands in its first line")
+            raise block.fault("the order P of a spline stands in its first line", "P")
         first = not opened.points
         if first or block.has("XYZ"):
             if len(opened.knots) > len(opened.points):
@@ -192,12 +190,12 @@ class SplineReader:
             opened.points.append(_control_point(state, block, opened))
             opened.weights.append(_weight(block, "R"))
         elif "R" in block.value:
-            raise WordFault(block.at["R"], "a weight without a control point; write X, Y or Z beside it")
+            raise block.fault("a weight without a control point; write X, Y or Z beside it", "R")
         if "K" not in block.value:
             raise WordFault(_any_word(block), "a line of G6.2 needs its knot K")
         if opened.knots and block.value["K"] < opened.knots[-1]:
-            raise WordFault(
-                block.at["K"], f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}"
+            raise block.fault(
+                f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}", "K"
             )
         opened.knots.append(block.value["K"])
         if not opened.ended:
@@ -230,9 +228,7 @@ def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
     end = _end_in_plane(state, block, "G5.1")
     near = _offset(state, block, "IJ")
     if not ("I" in block.value and "J" in block.value) or not near.any():
-        raise WordFault(
-            block.motion_word(), "G5.1 needs I and J, its control point from its start, not both 0"
-        )
+        raise block.fault("G5.1 needs I and J, its control point from its start, not both 0")
     start = state.position.copy()
     return _split(raised(homogeneous(np.stack([start, start + near, end])[None], np.ones((1, 3)))))
 
@@ -245,11 +241,11 @@ def _split(pieces: FloatArray) -> Pieces:
 def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
     """(3,) where X and Y lead [mm]."""
     if state.normal != 2:
-        raise WordFault(block.motion_word(), f"{name} is a curve in the X Y plane; write G17 before it")
+        raise block.fault(f"{name} is a curve in the X Y plane; write G17 before it")
     if "Z" in block.value:
-        raise WordFault(block.at["Z"], f"{name} is a curve in the X Y plane; Z does not move along it")
+        raise block.fault(f"{name} is a curve in the X Y plane; Z does not move along it", "Z")
     if not block.has("XY"):
-        raise WordFault(block.motion_word(), f"{name} needs an end point; write X and Y")
+        raise block.fault(f"{name} needs an end point; write X and Y")
     if not state.absolute and name == "G5.2":
         raise WordFault(
             block.first_of("XY"), "control points of G5.2 with G91 are relative to what? write G90 before it"
@@ -319,22 +315,21 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
     _check_count(opened, block.at["K"])
     knots, order = np.array(opened.knots), opened.order
     if knots[order - 1] != knots[0] or knots[-order] != knots[-1] or knots[0] == knots[-1]:
-        raise WordFault(
-            block.at["K"],
-            f"the first {order} knots of a spline of order {order} must be equal, and the last {order}",
+        raise block.fault(
+            f"the first {order} knots of a spline of order {order} must be equal, and the last {order}", "K"
         )
     inner = knots[order:-order]
     if (
         np.unique(inner, return_counts=True)[1].max(initial=0) >= order
         or inner.min(initial=np.inf) == knots[0]
     ):
-        raise WordFault(
-            block.at["K"],
+        raise block.fault(
             f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve",
+            "K",
         )
     if inner.max(initial=-np.inf) == knots[-1]:
-        raise WordFault(
-            block.at["K"], f"the last {order} knots must be larger than those before: more break the curve"
+        raise block.fault(
+            f"the last {order} knots must be larger than those before: more break the curve", "K"
         )
     return _split(
         cubic_pieces(homogeneous(np.array(opened.points), np.array(opened.weights)), knots, order - 1)

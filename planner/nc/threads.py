@@ -31,10 +31,10 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import WordFault, integer
+from planner.nc.moves import integer
 from planner.nc.program import Kind
 from planner.nc.state import State
 
@@ -122,14 +122,11 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
         letter = "P" if value["P"] == 0 else "I"
         raise WordFault(block.at[letter], f"{letter} of G76 must not be 0: {_NEEDED[letter]}")
     if not 0 < value["J"] < value["K"]:
-        raise WordFault(
-            block.at["J"],
-            "J of G76, the depth of the first pass, must be above 0 and below K, the full depth",
+        raise block.fault(
+            "J of G76, the depth of the first pass, must be above 0 and below K, the full depth", "J"
         )
     if not 0 <= value.get("Q", 0.0) <= ANGLE_MAX:
-        raise WordFault(
-            block.at["Q"], f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees"
-        )
+        raise block.fault(f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees", "Q")
     here = state.programmed() / state.unit
     part = 0.5 if state.diameters else 1.0
     thread = Thread(
@@ -146,7 +143,7 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
         springs=integer(block, "H", 0) if "H" in value else 0,
     )
     if thread.tapered > _ENTRY + _END:
-        raise WordFault(block.at["L"], "L of G76 must be 0 (no taper), 1 (entry), 2 (end) or 3 (both)")
+        raise block.fault("L of G76 must be 0 (no taper), 1 (entry), 2 (end) or 3 (both)", "L")
     if (thread.depth / thread.first) ** thread.degression + thread.springs > PASSES_MAX:
         raise WordFault(word, f"G76 makes more than {PASSES_MAX} passes; correct J, R or H")
     return thread
@@ -167,10 +164,10 @@ def thread(state: State, table: BlockTable, block: Block, findings: Findings) ->
     """G33, or G33.1 with its way back. Raises WordFault for words that are missing or impossible."""
     name = f"G{codes.number(state.motion)}"
     if block.value.get("K", 0.0) == 0.0:
-        raise WordFault(block.motion_word(), f"{name} needs its pitch as a K word, on each line")
+        raise block.fault(f"{name} needs its pitch as a K word, on each line")
     faster = block.value.get("I", 1.0)
     if not faster > 0:
-        raise WordFault(block.at["I"], "I of G33.1, how much faster the way back is, must be above 0")
+        raise block.fault("I of G33.1, how much faster the way back is, must be above 0", "I")
     feed = _feed(state, block, abs(block.value["K"]))
     target, start = moves.target(state, block), state.position.copy()
     _cut(state, table, block.line, target, feed)
@@ -239,12 +236,9 @@ def _feed(state: State, block: Block, pitch: float) -> float:
     """The feed [mm/s] of so many programmed units in a turn. Raises WordFault if the spindle has no speed that is known."""
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
     if spindle.surface_speed:
-        raise WordFault(
-            block.motion_word(),
-            f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S",
+        raise block.fault(
+            f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
         )
     if not spindle.turning or not spindle.speed > 0:
-        raise WordFault(
-            block.motion_word(), f"{name} needs the spindle turning; write S and M3 or M4 before it"
-        )
+        raise block.fault(f"{name} needs the spindle turning; write S and M3 or M4 before it")
     return pitch * state.unit * spindle.speed / SECONDS_PER_MINUTE

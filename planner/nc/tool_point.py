@@ -25,11 +25,10 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.machine import Machine
-from planner.nc.block import Block
+from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.events import EventTable
 from planner.nc.extra_axes import LETTERS, ROTARY
-from planner.nc.moves import WordFault
 from planner.nc.program import FEED_MOVES, MOVES, Kind, PathControl, Program, SplineTable, ToolPoint
 from planner.nc.settings import TOOL_POINT_ON
 from planner.nc.state import State
@@ -69,9 +68,10 @@ class ToolPointSwitch:
         """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
-            raise WordFault(
-                block.at["tool length"],
-                "the tool centre point (G43.4) needs a machine with a table [kinematics]; add it to the machine file",
+            raise block.fault(
+                "the tool centre point (G43.4) needs a machine with a table [kinematics]; "
+                "add it to the machine file",
+                "tool length",
             )
         now = self._word(block, tool)
         if self.chain is None or (now == self._on and tool is None):
@@ -97,10 +97,11 @@ class ToolPointSwitch:
             and code in _JOINT_PLACES
             and (before[:ROTARY].any() or state.further.position[:ROTARY].any())
         ):
-            raise WordFault(
-                block.at["one-shot"],
-                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
+            raise block.fault(
+                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, "
+                f"and {_JOINT_PLACES[code]} goes to a "
                 "place of the joints; switch the tool centre point off before it (G49, M429, M129)",
+                "one-shot",
             )
 
     @property

@@ -74,10 +74,7 @@ def _circle(n: Expression) -> tuple[Steps, tuple[Expression, Expression]]:
     step, angle = own("step"), own("angle")
     opening, half = q(246) - q(245), q(244) / TWO
     parts = op("MAX", q(241) - ONE + op("GE", op("ABS", opening), _TURN), ONE)
-    steps: Steps = [
-        (step, q(247) + op("EQ", q(247), ZERO) * (opening / parts)),
-        (angle, q(245) + n * step),
-    ]
+    steps: Steps = [(step, q(247) + op("EQ", q(247), ZERO) * (opening / parts)), (angle, q(245) + n * step)]
     return steps, (q(216) + half * op("COS", angle), q(217) + half * op("SIN", angle))
 
 

@@ -156,13 +156,7 @@ class SiemensControl:
     def _until(self, reader: LineTokens) -> None:
         closed = self._close("REPEAT", reader)
         self.body.append(
-            Loop(
-                closed.place,
-                "do",
-                f"REPEAT {closed.place.at}",
-                op("NOT", reader.expression()),
-                closed.body,
-            )
+            Loop(closed.place, "do", f"REPEAT {closed.place.at}", op("NOT", reader.expression()), closed.body)
         )
 
     def _goto(self, reader: LineTokens) -> None:

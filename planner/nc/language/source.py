@@ -38,6 +38,10 @@ class SourceLine:
     text: str
     scale: float = 1.0
 
+    def fault(self, message: str, at: int | None = None) -> ProgramFault:
+        """A fault of the line, or of what begins at a byte of it."""
+        return ProgramFault(self.place if at is None else self.place._replace(at=at), message)
+
 
 class Source:
     """One file: its words, and the lines among them that may belong to the language.

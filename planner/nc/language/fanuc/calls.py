@@ -11,7 +11,6 @@ from planner.nc.language.tree import (
     Message,
     Number,
     Procedure,
-    ProgramFault,
     Return,
     Statement,
     Word,
@@ -30,7 +29,7 @@ def subprogram(words: tuple[Word, ...], line: SourceLine, known: frozenset[str])
     """M98. known : the numbers of the file's programs. Raises ProgramFault."""
     rest, given = _split(words, "M98", "PL")
     if "P" not in given:
-        raise ProgramFault(line.place, "M98 needs P with the number of a subprogram")
+        raise line.fault("M98 needs P with the number of a subprogram")
     program, times = given["P"], given.get("L", Number(1.0))
     if isinstance(program, Number):
         number = f"{program.value:.0f}"
@@ -48,7 +47,7 @@ def of_block(words: tuple[Word, ...], line: SourceLine, program: Procedure) -> t
     rest, given = _split(words, "M97", "PL")
     called = given.get("P")
     if not isinstance(called, Number):
-        raise ProgramFault(line.place, "M97 needs P with the number of a block")
+        raise line.fault("M97 needs P with the number of a block")
     number = int(called.value)
     times = given.get("L", Number(1.0))
     call = Call(line.place, block_name(number, program), None, f"M97 P{number}", times)
@@ -85,11 +84,9 @@ def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
                 seen[letter] += 1
             arguments[_NUMBERS[letter] + 3 * turn] = word.value
         else:
-            raise ProgramFault(line.place._replace(at=word.at), f"{code} has no parameter for {letter}")
+            raise line.fault(f"{code} has no parameter for {letter}", word.at)
     if program == "" or max(arguments, default=0) > LOCALS:
-        raise ProgramFault(
-            line.place, f"{code} needs P with the number of a macro, and at most ten of I, J and K"
-        )
+        raise line.fault(f"{code} needs P with the number of a macro, and at most ten of I, J and K")
     return Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from planner.nc.language.source import SourceLine
 from planner.nc.language.spelling import LineReader
-from planner.nc.language.tree import Expression, Loop, Number, ProgramFault, SourcePlace, Statement
+from planner.nc.language.tree import Expression, Loop, Number, SourcePlace, Statement
 
 _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _ALWAYS = Number(1.0)  # the condition of DO without WHILE
@@ -31,9 +31,8 @@ class FanucControl:
     def _do(self, reader: LineReader, line: SourceLine, condition: Expression = _ALWAYS) -> None:
         number = _loop_number(reader)
         if any(number == known for known, _, _, _ in self.open) or len(self.open) >= _NESTED_MAX:
-            raise ProgramFault(
-                line.place,
-                f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other",
+            raise line.fault(
+                f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
             )
         self.open.append((number, line.place, condition, self.body))
         self.body = []
@@ -41,7 +40,7 @@ class FanucControl:
     def _end(self, reader: LineReader, line: SourceLine) -> None:
         number = _loop_number(reader)
         if not self.open or self.open[-1][0] != number:
-            raise ProgramFault(line.place, f"END {number} has no DO {number} before it")
+            raise line.fault(f"END {number} has no DO {number} before it")
         _, place, condition, around = self.open.pop()
         around.append(Loop(place, "while", f"DO {number}", condition, self.body))
         self.body = around

@@ -124,7 +124,7 @@ class LatheParser(LatheSingles):
         )
         profile = (int(pair[0]), int(pair[1]))
         if profile not in self.pairs:
-            raise ProgramFault(line.place, _no_profile(profile))
+            raise line.fault(_no_profile(profile))
         self.cycles.append((profile, line.place))
         self.called.add(profile)
         name = _profile_name(profile)
@@ -151,9 +151,8 @@ class LatheParser(LatheSingles):
         values = {letter: given[letter] for letter in "UWIK" if letter in given}
         found = given.get("D", before.get(depth))
         if found is None:
-            raise ProgramFault(
-                line.place,
-                f"the depth of a pass is not given: D, or {depth} in a block before this one ({depth}2. R0.5)",
+            raise line.fault(
+                f"the depth of a pass is not given: D, or {depth} in a block before this one ({depth}2. R0.5)"
             )
         values["D"] = found
         if "R" in before:
@@ -169,27 +168,23 @@ class LatheParser(LatheSingles):
             if found is not None:
                 values[letter] = found
         if "D" not in values:
-            raise ProgramFault(
-                line.place, "G73 needs the number of its passes: D, or R in a block before this one"
-            )
+            raise line.fault("G73 needs the number of its passes: D, or R in a block before this one")
         return values
 
     def _thread(self, given: dict[str, Word], line: SourceLine) -> None:
         values = {letter: self._length(word, "G76", line) for letter, word in given.items()}
         if self.feed is None:
-            raise ProgramFault(line.place, "G76 needs the lead of the thread as an F word")
+            raise line.fault("G76 needs the lead of the thread as an F word")
         two = "K" not in given
         if two:
             first = self.waiting.get("G76")
             if first is None or "P" not in given or "Q" not in given:
-                raise ProgramFault(
-                    line.place, "G76 needs K and D, or P and Q with a block G76 P Q R before it"
-                )
+                raise line.fault("G76 needs K and D, or P and Q with a block G76 P Q R before it")
             values = {**values, "K": values["P"], "D": values["Q"], **_finishing(first, line)}
             values["I"] = self._length(given["R"], "G76", line) if "R" in given else Number(0.0)
         else:
             if "D" not in given:
-                raise ProgramFault(line.place, "G76 needs D, the depth of the first pass")
+                raise line.fault("G76 needs D, the depth of the first pass")
             values.pop("Q", None)  # the angle of the spindle where the thread begins
             values.pop("R", None)
             self._message_once(line)
@@ -235,9 +230,7 @@ def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expr
     """P, Q and R of the first block of G76: mmrraa is how often the full depth is cut, ten chamfers in leads, and the tool's angle."""
     digits = first.get("P", Number(10_000.0))
     if not isinstance(digits, Number) or digits.value != int(digits.value) or not 0 <= digits.value < 1e6:
-        raise ProgramFault(
-            line.place, "P of the first block of G76 has six digits: how often, chamfer, angle (P010060)"
-        )
+        raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")
     often, rest = divmod(int(digits.value), 10_000)
     chamfer, angle = divmod(rest, 100)
     values: dict[str, Expression] = {

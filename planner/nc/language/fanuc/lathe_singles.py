@@ -13,7 +13,7 @@ from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.lathe_cycles import name_of
 from planner.nc.language.fanuc.lathe_words import X_HERE, Z_HERE, LatheWords
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import Expression, Line, Message, Named, ProgramFault, Turning, Word, assign
+from planner.nc.language.tree import Expression, Line, Message, Named, Turning, Word, assign
 
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")
@@ -47,18 +47,15 @@ class LatheSingles(LatheWords):
         named = next((code for code in CUTS if code in codes and letters & set(_PLACE)), "")
         if named and codes & _MOTIONS:
             other = sorted(codes & _MOTIONS)[0]
-            raise ProgramFault(
-                line.place,
-                f"{named} beside {other}: in G code system A it is the {CUTS[named]} cycle; systems B and C are not read",
+            raise line.fault(
+                f"{named} beside {other}: in G code system A it is the {CUTS[named]} cycle; systems B and C are not read"
             )
         if codes & _MOTIONS:
             self.cut = ""
             return False
         if named == "G92" and "F" not in letters:  # in G code system B it sets a position
             self.cut = ""
-            raise ProgramFault(
-                line.place, "G92 with X and Z needs the lead of its thread as an F word on its line"
-            )
+            raise line.fault("G92 with X and Z needs the lead of its thread as an F word on its line")
         if named:
             self.cut, self.cut_given = named, set()
         elif not self.cut or not letters & set(_PLACE) or codes & _OWN_COORDINATES:
@@ -74,13 +71,11 @@ class LatheSingles(LatheWords):
             given["R"] = given.pop(taper)
         extra = given.keys() & set("IK")
         if extra:
-            raise ProgramFault(
-                line.place, f"{self.cut} does not use {sorted(extra)[0]}; its taper is R or {taper}"
-            )
+            raise line.fault(f"{self.cut} does not use {sorted(extra)[0]}; its taper is R or {taper}")
         values = absolute(given)
         self.cut_given |= values.keys()
         if not self.cut_given >= set("XZ"):
-            raise ProgramFault(line.place, f"the {CUTS[self.cut]} cycle {self.cut} needs X or U, and Z or W")
+            raise line.fault(f"the {CUTS[self.cut]} cycle {self.cut} needs X or U, and Z or W")
         if self.cut == "G92":
             assert self.feed is not None
             values["F"] = self.feed
@@ -101,16 +96,14 @@ class LatheSingles(LatheWords):
         values = absolute({letter: word.value for letter, word in own.items() if letter in _PLACE})
         along, across = "ZX" if cycle == "G74" else "XZ"
         if along not in values:
-            raise ProgramFault(
-                line.place, f"{cycle} needs the bottom as {along} or {'W' if along == 'Z' else 'U'}"
-            )
+            raise line.fault(f"{cycle} needs the bottom as {along} or {'W' if along == 'Z' else 'U'}")
         for letters, peck in (("QK", cycle == "G74"), ("PI", cycle == "G75")):
             for letter in letters:
                 if letter in own:
                     values["K" if peck else "I"] = self._length(own[letter], cycle, line)
         if across in values and "I" not in values:
             shift = "P or I" if cycle == "G74" else "Q or K"
-            raise ProgramFault(line.place, f"{cycle} with {across} needs {shift}, from one cut to the next")
+            raise line.fault(f"{cycle} with {across} needs {shift}, from one cut to the next")
         for letter in "RD":
             if letter in own:
                 values["D"] = own[letter].value

@@ -16,17 +16,7 @@ from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
-from planner.nc.language.tree import (
-    Expression,
-    Line,
-    Number,
-    Numbered,
-    Parameter,
-    ProgramFault,
-    Word,
-    row,
-    word,
-)
+from planner.nc.language.tree import Expression, Line, Number, Numbered, Parameter, Word, row, word
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
 X_HERE, Z_HERE = (
@@ -71,7 +61,7 @@ class LatheWords(FanucParser):
     ) -> None:
         codes = {code_of(word) for word in words}
         for code in sorted(codes & set(_REFUSED)):
-            raise ProgramFault(line.place, f"{_REFUSED[code]} not read; write the moves out")
+            raise line.fault(f"{_REFUSED[code]} not read; write the moves out")
         given = {chr(word.letter): word.value for word in words if chr(word.letter) not in "GM"}
         self.feed = given.get("F", self.feed)
         if self._single(words, codes, line):
@@ -100,9 +90,7 @@ class LatheWords(FanucParser):
             return word._replace(letter=ord(axis), value=here + word.value)
         if letter == "H":
             if word.value != Number(0.0):
-                raise ProgramFault(
-                    line.place._replace(at=word.at), "H moves the axis C, which is not planned; X and Z are"
-                )
+                raise line.fault("H moves the axis C, which is not planned; X and Z are", word.at)
             return None
         if code in ("G98", "G99"):
             return word._replace(value=Number(94.0 if code == "G98" else 95.0))
@@ -125,7 +113,7 @@ class LatheWords(FanucParser):
     def _tool(self, words: tuple[Word, ...], number: Expression, line: SourceLine) -> tuple[Word, ...]:
         """T0203 as rows of its own; the other words are left."""
         if not isinstance(number, Number) or number.value < 0 or number.value != int(number.value):
-            raise ProgramFault(line.place, "T takes a number, such as T0203 (tool 2, offset 3)")
+            raise line.fault("T takes a number, such as T0203 (tool 2, offset 3)")
         tool, offset = (
             divmod(int(number.value), _TOOL_DIGITS)
             if number.value >= _TOOL_DIGITS
@@ -144,9 +132,7 @@ class LatheWords(FanucParser):
         """G50 S is kept and becomes D of G96."""
         if "G50" in codes or "G92" in codes:
             if "S" not in given or given.keys() & set("XZUW"):
-                raise ProgramFault(
-                    line.place, "G50 that sets a position is not read; write a work system (G54)"
-                )
+                raise line.fault("G50 that sets a position is not read; write a work system (G54)")
             self.speed_max = given["S"]
             words = tuple(
                 word for word in words if chr(word.letter) != "S" and code_of(word) not in ("G50", "G92")

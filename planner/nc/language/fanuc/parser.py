@@ -172,7 +172,7 @@ class FanucParser(FanucControl):
                 self.procedures[0] = Procedure(number, line.place, only.body)
             return  # the first program of the file
         if any(known.name == number for known in self.procedures):
-            raise ProgramFault(line.place, f"a second program O{number}")
+            raise line.fault(f"a second program O{number}")
         self._begin(number, line.place)
 
     def _messages(self, reader: LineReader, line: SourceLine) -> None:
@@ -233,7 +233,7 @@ class FanucParser(FanucControl):
             if target == Numbered(Number(_STOP)):
                 words = (*words, Word(ord("M"), line.place.at, Number(0.0)))
             if target == Numbered(Number(0.0)):
-                raise ProgramFault(line.place, "#0 has no value and cannot be given one")
+                raise line.fault("#0 has no value and cannot be given one")
         assignments = tuple(pair for pair in assignments if pair[0] != Numbered(Number(_STOP)))
         if words or assignments:
             self.body.append(Line(line.place, words, assignments))

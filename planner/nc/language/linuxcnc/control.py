@@ -57,20 +57,18 @@ class LinuxcncControl:
             self._end(keyword, label, condition, line)
         elif keyword == "return":
             if not any(o.kind == "sub" for o in self.open):
-                raise ProgramFault(line.place, "return stands in a subprogram only")
+                raise line.fault("return stands in a subprogram only")
             self.body.append(Return(line.place, condition))
         else:
             if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
-                raise ProgramFault(line.place, f"there is no loop o{label} around this {keyword}")
+                raise line.fault(f"there is no loop o{label} around this {keyword}")
             self.body.append((Break if keyword == "break" else Continue)(line.place, label))
 
     def _begin(self, keyword: str, label: str, condition: Expression | None, line: SourceLine) -> None:
         if keyword == "sub" and self.open:
-            raise ProgramFault(
-                line.place, f"a subprogram begins inside {self.open[-1].kind}; write its end before it"
-            )
+            raise line.fault(f"a subprogram begins inside {self.open[-1].kind}; write its end before it")
         if len(self.open) >= _NESTED_MAX:
-            raise ProgramFault(line.place, f"more than {_NESTED_MAX} loops and branches in each other")
+            raise line.fault(f"more than {_NESTED_MAX} loops and branches in each other")
         if keyword not in ("sub", "do"):
             _needed(condition, keyword, line)
         opened = OpenStatement(keyword, line.place, condition, label)
@@ -84,7 +82,7 @@ class LinuxcncControl:
     ) -> None:
         top = self._innermost("if", keyword, label, line)
         if top.condition is None:
-            raise ProgramFault(line.place, f"{keyword} after else; else comes last")
+            raise line.fault(f"{keyword} after else; else comes last")
         top.another_branch(_needed(condition, keyword, line) if keyword == "elseif" else None)
         self.body = top.body
 
@@ -108,7 +106,7 @@ class LinuxcncControl:
                 if self.open
                 else "nothing is open"
             )
-            raise ProgramFault(line.place, f"o{label} {keyword} has no o{label} {kind} before it: {last}")
+            raise line.fault(f"o{label} {keyword} has no o{label} {kind} before it: {last}")
         return self.open[-1]
 
     def _close(self, top: OpenStatement) -> None:
@@ -118,7 +116,7 @@ class LinuxcncControl:
 
 def _needed(condition: Expression | None, keyword: str, line: SourceLine) -> Expression:
     if condition is None:
-        raise ProgramFault(line.place, f"{keyword} needs an [expression] after it")
+        raise line.fault(f"{keyword} needs an [expression] after it")
     return condition
 
 

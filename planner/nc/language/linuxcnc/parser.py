@@ -89,7 +89,7 @@ class LinuxcncParser(LinuxcncControl):
             words, assignments = reader.words_and_assignments(line.scale)
             for word in words:
                 if word.letter == ord("N") and not isinstance(word.value, Number):
-                    raise ProgramFault(line.place._replace(at=word.at), "a line number is written in digits")
+                    raise line.fault("a line number is written in digits", word.at)
             if words or assignments:
                 self.body.append(Line(line.place, words, assignments))
         self._messages(reader, line)
@@ -117,15 +117,13 @@ class LinuxcncParser(LinuxcncControl):
             words, _ = reader.words_and_assignments()
             given = {chr(word.letter): word.value for word in words}
             if "P" not in given or set(given) - {"P", "L"}:
-                raise ProgramFault(
-                    line.place, "M98 takes P with the number of a subprogram, and L with its repetitions"
-                )
+                raise line.fault("M98 takes P with the number of a subprogram, and L with its repetitions")
             name = _constant_name(given["P"])
             self.body.append(Call(line.place, name, None, "M98", given.get("L", Number(1.0))))
         else:
             self._nothing_left(reader, "M99")
             if not self.plain_sub:
-                raise ProgramFault(line.place, "M99 ends a subprogram; the main program ends with M2 or M30")
+                raise line.fault("M99 ends a subprogram; the main program ends with M2 or M30")
             self.body.append(Return(line.place))
             if not self.open:
                 self.base = self.body = self.main
@@ -147,7 +145,7 @@ class LinuxcncParser(LinuxcncControl):
         if keyword == "call":
             self._call(reader, line, label)
         elif not isinstance(label, str):
-            raise ProgramFault(line.place, "only a call may compute its O word; write a number or a <name>")
+            raise line.fault("only a call may compute its O word; write a number or a <name>")
         else:
             condition = reader.bracket() if reader.peek() == "[" else None
             self._control(keyword, label, condition, line)
@@ -162,9 +160,7 @@ class LinuxcncParser(LinuxcncControl):
     def _plain_program(self, label: str, line: SourceLine) -> None:
         """O100 alone: a program number, or a subprogram if an M99 follows before the next one."""
         if self.open:
-            raise ProgramFault(
-                line.place, f"O{label} stands inside {self.open[-1].kind}; write its end before it"
-            )
+            raise line.fault(f"O{label} stands inside {self.open[-1].kind}; write its end before it")
         if self._returns(line):
             self.plain_sub, self.base = label, []
             self._add(label, line.place, self.base)
@@ -181,7 +177,7 @@ class LinuxcncParser(LinuxcncControl):
         while reader.peek() == "[":
             arguments.append(reader.bracket())
         if len(arguments) > ARGUMENTS_MAX:
-            raise ProgramFault(line.place, f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
+            raise line.fault(f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
         word = f"o<{label}> call" if isinstance(label, str) and not label.isdigit() else "o call"
         if isinstance(label, str) and label.isdigit():
             word = f"o{label} call"

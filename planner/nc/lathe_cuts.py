@@ -31,7 +31,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from planner.nc.turning import PASSES_MAX, SAME, ContourFault, Leg, TurningStep
+from planner.nc.turning import PASSES_MAX, SAME, ContourFault, Leg, TurningStep, exchanged
 
 
 class ThreadFault(ValueError):
@@ -147,14 +147,14 @@ class Pecking:
 
     def exchanged(self) -> Pecking:
         """The words with x and z exchanged."""
-        return replace(self, start=_exchanged(self.start), end=_exchanged(self.end))
+        return replace(self, start=exchanged(self.start), end=exchanged(self.end))
 
 
 def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[TurningStep]:
     """The moves of G90, or with `facing` of G94 [mm]."""
     if facing:
-        for step in single_cut(_exchanged(start), _exchanged(end), taper, facing=False):
-            yield TurningStep(step.leg.exchanged(), step.fast)
+        for step in single_cut(exchanged(start), exchanged(end), taper, facing=False):
+            yield step.exchanged()
         return
     yield TurningStep(Leg(complex(start.real, end.imag + taper)), fast=True)
     yield TurningStep(Leg(end))
@@ -178,7 +178,7 @@ def pecked(given: Pecking, *, grooving: bool) -> Iterator[TurningStep]:
     """The moves of G74, or with `grooving` of G75 [mm]. Raises ContourFault."""
     if grooving:
         for step in pecked(given.exchanged(), grooving=False):
-            yield TurningStep(step.leg.exchanged(), step.fast)
+            yield step.exchanged()
         return
     deep, wide = given.end.real - given.start.real, given.end.imag - given.start.imag
     if abs(deep) < SAME:
@@ -216,7 +216,3 @@ def _stations(begin: float, end: float, step: float, *, from_start: bool) -> Ite
         yield begin + way * n * step
         n += 1
     yield end
-
-
-def _exchanged(point: complex) -> complex:
-    return complex(point.imag, point.real)

@@ -43,7 +43,7 @@ class Leg:
 
     def exchanged(self) -> Leg:
         """The leg with x and z exchanged."""
-        return Leg(_exchanged(self.end), -self.turning, _exchanged(self.centre))
+        return Leg(exchanged(self.end), -self.turning, exchanged(self.centre))
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Contour:
 
     def exchanged(self) -> Contour:
         """The profile with x and z exchanged."""
-        return Contour(_exchanged(self.start), self.fast, tuple(leg.exchanged() for leg in self.legs))
+        return Contour(exchanged(self.start), self.fast, tuple(leg.exchanged() for leg in self.legs))
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,10 @@ class TurningStep:
 
     leg: Leg
     fast: bool = False
+
+    def exchanged(self) -> TurningStep:
+        """The move with x and z exchanged."""
+        return TurningStep(self.leg.exchanged(), self.fast)
 
 
 @dataclass(frozen=True)
@@ -88,9 +92,9 @@ def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterato
     if not facing:
         yield from _removal(contour, given)
         return
-    turned = replace(given, allowance=_exchanged(given.allowance), more=_exchanged(given.more))
+    turned = replace(given, allowance=exchanged(given.allowance), more=exchanged(given.more))
     for step in _removal(contour.exchanged(), turned):
-        yield TurningStep(step.leg.exchanged(), step.fast)
+        yield step.exchanged()
 
 
 def pattern_repeat(
@@ -203,5 +207,6 @@ def _directions(start: complex, leg: Leg) -> list[complex]:
     return [1j * leg.turning * from_centre * cmath.exp(1j * leg.turning * m) for m in middles]
 
 
-def _exchanged(point: complex) -> complex:
+def exchanged(point: complex) -> complex:
+    """A point with x and z exchanged."""
     return complex(point.imag, point.real)

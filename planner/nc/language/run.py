@@ -68,8 +68,6 @@ class ProgramRun:
     ):
         self.interpreter, self.rows, self.language, self.system = interpreter, rows, language, system
         self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
-        if language.vacant is None:
-            self.numbered[0] = None
         self.shared: dict[str, float] = {}
         self.turns = 0
         self.resume: float | None = None

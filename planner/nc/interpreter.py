@@ -20,16 +20,16 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
-from planner.nc import auxiliary, codes, compensation, feeds, homing, moves, offsets
+from planner.nc import auxiliary, codes, compensation, feeds, moves, offsets
 from planner.nc.block import Block, WordFault
 from planner.nc.block_reader import read_block
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
-from planner.nc.dwell_times import DwellWords
 from planner.nc.faults import FaultList, Findings, Notes
 from planner.nc.ignored_words import IgnoredWords
+from planner.nc.integers import DwellWords
 from planner.nc.lexer import Words
-from planner.nc.mover import COVET_AXES, Mover
+from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
 from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
@@ -251,7 +251,7 @@ class Interpreter:
         turned = self.state.further.position.copy()
         if not block.foreign:
             self._check_parked(block)
-            homing.go_to_switches(self.state, self.table, block, self.findings)
+            go_to_switches(self.state, self.table, block, self.findings)
             self._one_shot(block)
             self.table.keep_origin(self.state)
             self.mover.execute(block)
@@ -323,7 +323,7 @@ class Interpreter:
                 "one-shot",
             )
         if code in (280, 300):
-            homing.go_home(self.state, self.table, block, self.findings)
+            go_home(self.state, self.table, block, self.findings)
         elif code in (281, 301):
             offsets.store_position(self.state, code)
         elif code == 100:

@@ -3,7 +3,7 @@
 In reading order:
 
     tree        what a program says: expressions and statements, in no language's spelling
-    compiled    statements to Python source, compiled once: `expressions` in `basic_blocks`
+    compiled    statements to Python source, compiled once: `expressions` in basic blocks
     rows        what the running program appends: row after row, given to the interpreter in chunks
     run         the running program: its parameters, calls and limits
     system_variables  parameters that hold the state of the control

@@ -22,9 +22,8 @@ from dataclasses import dataclass, field
 
 from planner.base.sizes import SIZES
 from planner.nc.language.arithmetic import FUNCTIONS
-from planner.nc.language.basic_blocks import BasicBlocks
 from planner.nc.language.endless import never_ends
-from planner.nc.language.expressions import Expressions
+from planner.nc.language.expressions import BasicBlocks, Expressions
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.tree import (
     Break,

@@ -32,18 +32,11 @@ class BlockColumns(NamedTuple):
     frame: Array  # int32
 
     @classmethod
-    def of_size(cls, rows: int, further: int) -> BlockColumns:
-        """Room for so many blocks with so many further axes."""
-        return cls(
-            kind=np.empty(rows, dtype=np.uint8),
-            end=np.empty((rows, 3)),
-            further=np.empty((rows, further)),
-            feed=np.empty(rows),
-            line=np.empty(rows, dtype=np.int32),
-            path_control=np.empty(rows, dtype=np.uint8),
-            tolerance=np.empty(rows),
-            frame=np.empty(rows, dtype=np.int32),
-        )
+    def empty(cls, further: int) -> BlockColumns:
+        """No blocks yet, with so many further axes."""
+        places = np.empty((0, 3)), np.empty((0, further))
+        kind, feed, line = (np.empty(0, dtype=dtype) for dtype in (np.uint8, np.float64, np.int32))
+        return cls(kind, *places, feed, line, kind.copy(), feed.copy(), line.copy())
 
 
 class EventColumns(NamedTuple):
@@ -55,14 +48,9 @@ class EventColumns(NamedTuple):
     value: FloatArray
 
     @classmethod
-    def of_size(cls, rows: int) -> EventColumns:
-        """Room for so many events."""
-        return cls(
-            block=np.empty(rows, dtype=np.int64),
-            line=np.empty(rows, dtype=np.int32),
-            letter=np.empty(rows, dtype=np.uint8),
-            value=np.empty(rows),
-        )
+    def empty(cls) -> EventColumns:
+        """No events yet."""
+        return cls(*(np.empty(0, dtype=dtype) for dtype in (np.int64, np.int32, np.uint8, np.float64)))
 
 
 class BlockTable:
@@ -77,8 +65,8 @@ class BlockTable:
         self.events = 0
         self.refusals = 0
         self.frame = 0
-        self.block = BlockColumns.of_size(0, further)
-        self.event = EventColumns.of_size(0)
+        self.block = BlockColumns.empty(further)
+        self.event = EventColumns.empty()
         self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
         self.splines: list[tuple[int, FloatArray, FloatArray]] = []
@@ -187,13 +175,9 @@ class BlockTable:
             source=source,
             axes=LINEAR_AXES + tuple(letter.lower() for letter in names),
             start=np.zeros(3 + len(names)),
-            kind=self.block.kind[used].copy(),
             end=np.hstack([self.block.end[used], moved]) if names else self.block.end[used].copy(),
-            feed=self.block.feed[used].copy(),
             dwell=dwell,
-            line=self.block.line[used].copy(),
-            path_control=self.block.path_control[used].copy(),
-            tolerance=self.block.tolerance[used].copy(),
+            **{name: getattr(self.block, name)[used].copy() for name in _COPIED},
             synchronised=np.array(self.synchronised, dtype=np.int64),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
             arc_center=_padded(np.array([arc[1] for arc in self.arcs]).reshape(-1, 3), len(names)),
@@ -204,12 +188,7 @@ class BlockTable:
                 points=self._spline_points(moved),
                 weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
             ),
-            events=EventTable(
-                block=self.event.block[seen].copy(),
-                line=self.event.line[seen].copy(),
-                letter=self.event.letter[seen].copy(),
-                value=self.event.value[seen].copy(),
-            ),
+            events=EventTable(**{name: column[seen].copy() for name, column in self.event._asdict().items()}),
             origins=Origins(
                 block=np.array([origin[0] for origin in self.origins]),
                 offset=np.array([origin[1] for origin in self.origins]).reshape(-1, 3),
@@ -221,6 +200,9 @@ class BlockTable:
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),
         )
+
+
+_COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
 
 
 def _padded(points: FloatArray, further: int) -> FloatArray:

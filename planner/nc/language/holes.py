@@ -20,7 +20,10 @@ BREAK = 0.2  # mm by which the tool goes back to break a chip, where the program
 
 @dataclass(frozen=True)
 class HolePlan:
-    """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell at the bottom [s]."""
+    """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell at the bottom [s].
+
+    Raises ValueError if the bottom is not below the surface.
+    """
 
     clear: float
     top: float
@@ -29,8 +32,7 @@ class HolePlan:
     feed: float = 0.0
     dwell: float = 0.0
 
-    def check(self) -> None:
-        """Raises ValueError if the bottom is not below the surface, or there is no feed."""
+    def __post_init__(self) -> None:
         if self.bottom >= self.top:
             raise ValueError("the bottom of the hole lies at or above its surface")
 
@@ -69,7 +71,6 @@ def tapped(
     up    : where the way out ends, else at the clearance
     start : the tool goes to the clearance first
     """
-    hole.check()
     if not (speed > 0.0 and lead != 0.0):
         raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
     size = abs(lead)
@@ -124,7 +125,6 @@ class Pecks:
 
 def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
     """By infeeds down to the bottom; the tool stays there. Raises ValueError."""
-    hole.check()
     depths = pecks.depths(hole.top - hole.bottom)
     yield go(hole.clear)
     broken, done = 0, 0.0
@@ -150,7 +150,6 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
 
 def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
     """A bore milled on a helix: infeed per turn, once round on the ground, back to the middle. Raises ValueError."""
-    hole.check()
     radius = making.tool_radius()
     size = diameter / 2.0 - radius
     if size <= 0.0:

@@ -58,16 +58,8 @@ _CORNERS = {
 
 def _hole(given: Mapping[str, float], feed: float = 0.0) -> HolePlan:
     top = given["Q203"]
-    found = HolePlan(
-        top + given["Q200"],
-        top,
-        top - abs(given["Q201"]),
-        top + max(given["Q200"], given["Q204"]),
-        feed,
-        given["Q211"],
-    )
-    found.check()
-    return found
+    clear, second = top + given["Q200"], top + max(given["Q200"], given["Q204"])
+    return HolePlan(clear, top, top - abs(given["Q201"]), second, feed, given["Q211"])
 
 
 def _end(hole: HolePlan) -> Iterator[Row]:

@@ -54,9 +54,7 @@ def _hole(name: str, given: Mapping[str, float]) -> HolePlan:
         raise ValueError(f"{name} needs DP or DPR")
     top = given["RFP"]
     bottom = given["DP"] if "DP" in given else top - abs(given["DPR"])
-    found = HolePlan(top + abs(given["SDIS"]), top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
-    found.check()
-    return found
+    return HolePlan(top + abs(given["SDIS"]), top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
 
 
 def _lead(given: Mapping[str, float], unit: float) -> float:

@@ -34,9 +34,8 @@ class BlockColumns(NamedTuple):
     @classmethod
     def empty(cls, further: int) -> BlockColumns:
         """No blocks yet, with so many further axes."""
-        places = np.empty((0, 3)), np.empty((0, further))
-        kind, feed, line = (np.empty(0, dtype=dtype) for dtype in (np.uint8, np.float64, np.int32))
-        return cls(kind, *places, feed, line, kind.copy(), feed.copy(), line.copy())
+        kind, feed, line = np.empty(0, dtype=np.uint8), np.empty(0), np.empty(0, dtype=np.int32)
+        return cls(kind, np.empty((0, 3)), np.empty((0, further)), feed, line, kind, feed, line)
 
 
 class EventColumns(NamedTuple):
@@ -50,7 +49,8 @@ class EventColumns(NamedTuple):
     @classmethod
     def empty(cls) -> EventColumns:
         """No events yet."""
-        return cls(*(np.empty(0, dtype=dtype) for dtype in (np.int64, np.int32, np.uint8, np.float64)))
+        int64, int32, uint8 = (np.empty(0, dtype=dtype) for dtype in (np.int64, np.int32, np.uint8))
+        return cls(int64, int32, uint8, np.empty(0))
 
 
 class BlockTable:

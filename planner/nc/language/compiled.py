@@ -48,6 +48,7 @@ from planner.nc.language.tree import (
     SourcePlace,
     Statement,
     Turning,
+    statements_in,
 )
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
@@ -116,7 +117,8 @@ class _Function:
     def source(self, name: str) -> list[tuple[str, SourcePlace]]:
         """Lines of Python with their places."""
         place = self.procedure.place
-        self._number_labels(self.procedure.body)
+        labels = (s for s in statements_in(self.procedure.body) if isinstance(s, Label))
+        self.blocks.numbers += [(label.number, self.blocks.label()) for label in labels]
         self._body(self.procedure.body)
         self.blocks.put("run.turns+=n;return None", place)
         return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *self.blocks.source()]
@@ -189,7 +191,7 @@ class _Function:
         self.loops.append((loop.name, again, after))
         self._body(loop.body)
         self.loops.pop()
-        if self._is_continued(loop.body, loop.name):
+        if any(isinstance(s, Continue) and s.loop == loop.name for s in statements_in(loop.body)):
             self.blocks.here(again)
         self.blocks.put("n+=1", loop.place)
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", loop.place)
@@ -200,17 +202,6 @@ class _Function:
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 
-    def _is_continued(self, body: Sequence[Statement], name: str) -> bool:
-        return any(
-            (isinstance(s, Continue) and s.loop == name)
-            or (isinstance(s, Loop) and self._is_continued(s.body, name))
-            or (
-                isinstance(s, If)
-                and any(self._is_continued(b, name) for b in (*(b for _, b in s.branches), s.otherwise))
-            )
-            for s in body
-        )
-
     def _break(self, statement: Break | Continue) -> None:
         for name, again, after in reversed(self.loops):
             if name == statement.loop:
@@ -218,16 +209,6 @@ class _Function:
                 return
         what = "break" if isinstance(statement, Break) else "continue"
         raise ProgramFault(statement.place, f"{what} outside of the loop {statement.loop}")
-
-    def _number_labels(self, body: Sequence[Statement]) -> None:
-        for s in body:
-            if isinstance(s, Label):
-                self.blocks.numbers.append((s.number, self.blocks.label()))
-            elif isinstance(s, Loop):
-                self._number_labels(s.body)
-            elif isinstance(s, If):
-                for inner in (*(b for _, b in s.branches), s.otherwise):
-                    self._number_labels(inner)
 
     def _label_here(self, _: Label) -> None:
         self.blocks.here(self.blocks.numbers[self._seen][1])

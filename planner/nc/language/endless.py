@@ -5,7 +5,7 @@ A loop that may end, as far as this tells, is bounded while it runs (run.py). Wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from planner.nc.language.tree import (
     Break,
@@ -13,7 +13,6 @@ from planner.nc.language.tree import (
     Exists,
     Expression,
     Goto,
-    If,
     Language,
     Line,
     Loop,
@@ -25,6 +24,7 @@ from planner.nc.language.tree import (
     PlainRows,
     Return,
     Statement,
+    statements_in,
 )
 
 _LEAVES = (Break, Call, Goto, Return)  # a called subprogram may change anything
@@ -38,7 +38,7 @@ def never_ends(loop: Loop, language: Language) -> bool:
     read = list(_parameters(loop.condition))
     if any(not _is_kept(parameter, language) for parameter in read):
         return False
-    return all(_stays(statement, set(read)) for statement in _all(loop.body))
+    return all(_stays(statement, set(read)) for statement in statements_in(loop.body))
 
 
 def _parameters(expression: Expression) -> Iterator[Parameter]:
@@ -60,17 +60,6 @@ def _is_kept(parameter: Parameter, language: Language) -> bool:
             and (parameter.name in language.system_names or parameter.name.startswith("_value"))
         )
     return isinstance(parameter.index, Number) and parameter.index.value not in language.system_numbers
-
-
-def _all(body: Sequence[Statement]) -> Iterator[Statement]:
-    """The statements of a body and of those in it."""
-    for statement in body:
-        yield statement
-        if isinstance(statement, Loop):
-            yield from _all(statement.body)
-        elif isinstance(statement, If):
-            for inner in (*(inner for _, inner in statement.branches), statement.otherwise):
-                yield from _all(inner)
 
 
 def _stays(statement: Statement, read: set[Parameter]) -> bool:

@@ -6,7 +6,7 @@ split them and are named by their numbers (`PlainRows`): a program of 100,000 li
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -273,6 +273,17 @@ class OpenStatement:
 Statement = (
     PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | MadeRows
 )  # fmt: skip
+
+
+def statements_in(body: Sequence[Statement]) -> Iterator[Statement]:
+    """The statements of a body and of those in it."""
+    for statement in body:
+        yield statement
+        if isinstance(statement, Loop):
+            yield from statements_in(statement.body)
+        elif isinstance(statement, If):
+            for inner in (*(inner for _, inner in statement.branches), statement.otherwise):
+                yield from statements_in(inner)
 
 
 @dataclass(frozen=True)

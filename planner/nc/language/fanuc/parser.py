@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 
 from planner.nc.language.fanuc import calls
-from planner.nc.language.fanuc.control import FanucControl
+from planner.nc.language.fanuc.calls import FanucControl
 from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader

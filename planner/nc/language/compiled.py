@@ -21,35 +21,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from planner.base.sizes import SIZES
+from planner.nc.language import tree
 from planner.nc.language.arithmetic import FUNCTIONS
 from planner.nc.language.endless import never_ends
 from planner.nc.language.expressions import BasicBlocks, Expressions
 from planner.nc.language.rows import AppendedRows
-from planner.nc.language.tree import (
-    Break,
-    Call,
-    Continue,
-    Goto,
-    If,
-    Label,
-    Language,
-    Line,
-    Loop,
-    MadeRows,
-    Message,
-    Modes,
-    Named,
-    Number,
-    Parameter,
-    PlainRows,
-    Procedure,
-    ProgramFault,
-    Return,
-    SourcePlace,
-    Statement,
-    Turning,
-    statements_in,
-)
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
 TURNS_AT_ONCE = SIZES.turns_at_once
@@ -78,11 +54,11 @@ class Compiled:
     """Python functions of procedures, by name, and the place of each line of their source."""
 
     functions: dict[str, Callable[..., float | None]] = field(default_factory=dict)
-    places: list[SourcePlace] = field(default_factory=list)
+    places: list[tree.SourcePlace] = field(default_factory=list)
 
 
 def compile_procedures(
-    procedures: Sequence[Procedure], language: Language, rows: AppendedRows, marker: str
+    procedures: Sequence[tree.Procedure], language: tree.Language, rows: AppendedRows, marker: str
 ) -> Compiled:
     """Compile procedures; the rows that they append are added to `rows`.
 
@@ -106,7 +82,7 @@ def compile_procedures(
 class _Function:
     """The Python source of one procedure."""
 
-    def __init__(self, procedure: Procedure, language: Language, rows: AppendedRows):
+    def __init__(self, procedure: tree.Procedure, language: tree.Language, rows: AppendedRows):
         self.procedure, self.language, self.rows = procedure, language, rows
         self.say = Expressions(language)
         self.blocks = BasicBlocks(procedure.place)
@@ -114,10 +90,10 @@ class _Function:
         self.counters = 0
         self._seen = 0  # of `numbers`
 
-    def source(self, name: str) -> list[tuple[str, SourcePlace]]:
+    def source(self, name: str) -> list[tuple[str, tree.SourcePlace]]:
         """Lines of Python with their places."""
         place = self.procedure.place
-        labels = (s for s in statements_in(self.procedure.body) if isinstance(s, Label))
+        labels = (s for s in tree.statements_in(self.procedure.body) if isinstance(s, tree.Label))
         self.blocks.numbers += [(label.number, self.blocks.label()) for label in labels]
         self._body(self.procedure.body)
         self.blocks.put("run.turns+=n;return None", place)
@@ -125,19 +101,19 @@ class _Function:
 
     # --- statements -------------------------------------------------------------------------------------------------------
 
-    def _body(self, body: Sequence[Statement]) -> None:
+    def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:
             _WRITE[type(statement)](self, statement)
 
-    def _plain_rows(self, plain: PlainRows) -> None:
+    def _plain_rows(self, plain: tree.PlainRows) -> None:
         self.blocks.put(f"S({self.rows.add_entry(plain.first, plain.last)})", plain.place)
         if plain.may_end:
             self.blocks.put("run.turns+=n;n=0;run.flush()", plain.place)
 
-    def _line(self, line: Line) -> None:
+    def _line(self, line: tree.Line) -> None:
         words, given = [], []
         for word in line.words:
-            constant = word.value.value if isinstance(word.value, Number) else None
+            constant = word.value.value if isinstance(word.value, tree.Number) else None
             words.append((word.letter, word.at, constant))
             if constant is None:
                 given.append(self.say.assigned(word.value))
@@ -155,16 +131,18 @@ class _Function:
         if any(letter == ord("M") and number in (None, *ENDS) for letter, _, number in words):
             self.blocks.put("run.turns+=n;n=0;run.flush()", line.place)
 
-    def _assign(self, target: Parameter, value: str, place: SourcePlace) -> str:
-        if isinstance(target, Named):
+    def _assign(self, target: tree.Parameter, value: str, place: tree.SourcePlace) -> str:
+        if isinstance(target, tree.Named):
             if target.shared and target.name in self.language.system_names:
-                raise ProgramFault(place, f"the control sets #<{target.name}> itself; it can only be read")
+                raise tree.ProgramFault(
+                    place, f"the control sets #<{target.name}> itself; it can only be read"
+                )
             return f"{'G' if target.shared else 'L'}[{target.name!r}]={value}"
-        if isinstance(target.index, Number) and self.say.stored(target.index.value):
+        if isinstance(target.index, tree.Number) and self.say.stored(target.index.value):
             return f"P[{int(target.index.value)}]={value}"
         return f"run.put({self.say.value(target.index)},{value})"
 
-    def _if(self, statement: If) -> None:
+    def _if(self, statement: tree.If) -> None:
         after = self.blocks.label()
         for condition, body in statement.branches:
             then, otherwise = self.blocks.label(), self.blocks.label()
@@ -176,7 +154,7 @@ class _Function:
         self._body(statement.otherwise)
         self.blocks.here(after)
 
-    def _loop(self, loop: Loop) -> None:
+    def _loop(self, loop: tree.Loop) -> None:
         turn, again, after = self.blocks.label(), self.blocks.label(), self.blocks.label()
         if loop.kind == "repeat":
             self.counters += 1
@@ -191,7 +169,7 @@ class _Function:
         self.loops.append((loop.name, again, after))
         self._body(loop.body)
         self.loops.pop()
-        if any(isinstance(s, Continue) and s.loop == loop.name for s in statements_in(loop.body)):
+        if any(isinstance(s, tree.Continue) and s.loop == loop.name for s in tree.statements_in(loop.body)):
             self.blocks.here(again)
         self.blocks.put("n+=1", loop.place)
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", loop.place)
@@ -202,38 +180,40 @@ class _Function:
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 
-    def _break(self, statement: Break | Continue) -> None:
+    def _break(self, statement: tree.Break | tree.Continue) -> None:
         for name, again, after in reversed(self.loops):
             if name == statement.loop:
-                self.blocks.go(statement.place, after if isinstance(statement, Break) else again)
+                self.blocks.go(statement.place, after if isinstance(statement, tree.Break) else again)
                 return
-        what = "break" if isinstance(statement, Break) else "continue"
-        raise ProgramFault(statement.place, f"{what} outside of the loop {statement.loop}")
+        what = "break" if isinstance(statement, tree.Break) else "continue"
+        raise tree.ProgramFault(statement.place, f"{what} outside of the loop {statement.loop}")
 
-    def _label_here(self, _: Label) -> None:
+    def _label_here(self, _: tree.Label) -> None:
         self.blocks.here(self.blocks.numbers[self._seen][1])
         self._seen += 1
 
-    def _goto(self, goto: Goto) -> None:
-        if isinstance(goto.target, Number):
+    def _goto(self, goto: tree.Goto) -> None:
+        if isinstance(goto.target, tree.Number):
             self._tick(goto.place)
             self.blocks.go(goto.place, self._target(goto.place, int(goto.target.value)))
             return
         self._tick(goto.place)
         self.blocks.jump(self.say.value(goto.target), goto.place)
 
-    def _tick(self, place: SourcePlace) -> None:
+    def _tick(self, place: tree.SourcePlace) -> None:
         self.blocks.put("n+=1", place)
         self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", place)
 
-    def _target(self, place: SourcePlace, number: int) -> int:
+    def _target(self, place: tree.SourcePlace, number: int) -> int:
         """The label of that number: the next one, or else the first of the procedure."""
         found = [(k, label) for k, (known, label) in enumerate(self.blocks.numbers) if known == number]
         if not found:
-            raise ProgramFault(place, f"there is no block N{number} to go to; write its number at its start")
+            raise tree.ProgramFault(
+                place, f"there is no block N{number} to go to; write its number at its start"
+            )
         return next((label for k, label in found if k >= self._seen), found[0][1])
 
-    def _call(self, call: Call) -> None:
+    def _call(self, call: tree.Call) -> None:
         name = (
             repr(call.procedure)
             if isinstance(call.procedure, str)
@@ -251,49 +231,51 @@ class _Function:
             self.blocks.jump("run.resumed()", call.place)
             self.blocks.here(on)
 
-    def _return(self, statement: Return) -> None:
+    def _return(self, statement: tree.Return) -> None:
         if statement.label is not None:
             self.blocks.put(f"run.resume={self.say.value(statement.label)}", statement.place)
         value = "None" if statement.value is None else self.say.value(statement.value)
         self.blocks.put(f"run.turns+=n;return {value}", statement.place)
         self.blocks.leave(statement.place)
 
-    def _message(self, message: Message) -> None:
+    def _message(self, message: tree.Message) -> None:
         pieces = []
         for piece in message.pieces:
             if isinstance(piece, str):
                 pieces.append(repr(piece))
-            elif isinstance(piece, Named) and not (piece.shared and piece.name in self.language.system_names):
+            elif isinstance(piece, tree.Named) and not (
+                piece.shared and piece.name in self.language.system_names
+            ):
                 pieces.append(f"{'G' if piece.shared else 'L'}.get({piece.name!r})")
             else:
                 pieces.append(self.say.value(piece))
         self.blocks.put(f"run.message({message.place.line},({','.join(pieces)},))", message.place)
 
-    def _modes(self, modes: Modes) -> None:
+    def _modes(self, modes: tree.Modes) -> None:
         self.blocks.put(f"run.modes({modes.action!r},{tuple(modes.place)!r})", modes.place)
 
-    def _turning(self, turning: Turning) -> None:
+    def _turning(self, turning: tree.Turning) -> None:
         place = tuple(turning.place)
         self.blocks.put(f"run.turning({turning.action!r},{turning.letters!r},{place!r})", turning.place)
 
-    def _made(self, made: MadeRows) -> None:
+    def _made(self, made: tree.MadeRows) -> None:
         given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
         self.blocks.put(f"run.made({made.maker!r},({given}),{tuple(made.place)!r})", made.place)
 
 
 _WRITE: dict[type, Callable[..., None]] = {
-    PlainRows: _Function._plain_rows,
-    Line: _Function._line,
-    If: _Function._if,
-    Loop: _Function._loop,
-    Break: _Function._break,
-    Continue: _Function._break,
-    Label: _Function._label_here,
-    Goto: _Function._goto,
-    Call: _Function._call,
-    Return: _Function._return,
-    Message: _Function._message,
-    Modes: _Function._modes,
-    Turning: _Function._turning,
-    MadeRows: _Function._made,
+    tree.PlainRows: _Function._plain_rows,
+    tree.Line: _Function._line,
+    tree.If: _Function._if,
+    tree.Loop: _Function._loop,
+    tree.Break: _Function._break,
+    tree.Continue: _Function._break,
+    tree.Label: _Function._label_here,
+    tree.Goto: _Function._goto,
+    tree.Call: _Function._call,
+    tree.Return: _Function._return,
+    tree.Message: _Function._message,
+    tree.Modes: _Function._modes,
+    tree.Turning: _Function._turning,
+    tree.MadeRows: _Function._made,
 }

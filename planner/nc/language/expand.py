@@ -12,7 +12,7 @@ from pathlib import Path
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.compiled import ProgramFault, compile_procedures
+from planner.nc.language.compiled import compile_procedures
 from planner.nc.language.fanuc import text as fanuc_text
 from planner.nc.language.fanuc.calls import fanuc_files
 from planner.nc.language.fanuc.lathe import LatheParser
@@ -36,7 +36,7 @@ from planner.nc.language.system_variables import (
     PositionVariables,
     SystemVariables,
 )
-from planner.nc.language.tree import Language, Parser
+from planner.nc.language.tree import Language, Parser, ProgramFault
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
 from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS

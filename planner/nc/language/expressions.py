@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from planner.nc.language.tree import (
-    Exists,
-    Expression,
-    Language,
-    Named,
-    Number,
-    Numbered,
-    Parameter,
-    SourcePlace,
-)
+from planner.nc.language import tree
 
 
 @dataclass
@@ -22,7 +13,7 @@ class _End:
     With `computed` it goes to the label of the program whose number that text gives.
     """
 
-    place: SourcePlace
+    place: tree.SourcePlace
     label: int | None
     condition: str = ""
     otherwise: int = 0
@@ -31,7 +22,7 @@ class _End:
 
 @dataclass
 class _Block:
-    lines: list[tuple[str, SourcePlace]] = field(default_factory=list)
+    lines: list[tuple[str, tree.SourcePlace]] = field(default_factory=list)
     end: _End | None = None
 
 
@@ -43,14 +34,14 @@ class BasicBlocks:
     numbers  : labels of the program in their order: number, label
     """
 
-    def __init__(self, place: SourcePlace) -> None:
+    def __init__(self, place: tree.SourcePlace) -> None:
         self.place = place
         self.blocks = [_Block()]
         self.block_of: dict[int, int] = {}
         self.labels = 0
         self.numbers: list[tuple[int, int]] = []
 
-    def put(self, text: str, place: SourcePlace) -> None:
+    def put(self, text: str, place: tree.SourcePlace) -> None:
         """Add a line to the block that is being written."""
         self.blocks[-1].lines.append((text, place))
 
@@ -65,15 +56,15 @@ class BasicBlocks:
             self.blocks.append(_Block())
         self.block_of[label] = len(self.blocks) - 1
 
-    def go(self, place: SourcePlace, label: int, condition: str = "", otherwise: int = 0) -> None:
+    def go(self, place: tree.SourcePlace, label: int, condition: str = "", otherwise: int = 0) -> None:
         """End the block: go on at the label, or at `otherwise` if the condition does not hold."""
         self._leave(_End(place, label, condition, otherwise))
 
-    def jump(self, number: str, place: SourcePlace) -> None:
+    def jump(self, number: str, place: tree.SourcePlace) -> None:
         """Go to the label of the program whose number that text gives."""
         self._leave(_End(place, None, computed=number))
 
-    def leave(self, place: SourcePlace) -> None:
+    def leave(self, place: tree.SourcePlace) -> None:
         """Leave the function."""
         self._leave(_End(place, None))
 
@@ -81,7 +72,7 @@ class BasicBlocks:
         self.blocks[-1].end = end
         self.blocks.append(_Block())
 
-    def source(self) -> list[tuple[str, SourcePlace]]:
+    def source(self) -> list[tuple[str, tree.SourcePlace]]:
         """Lines of Python with their places; the last block leaves the function."""
         self.blocks[-1].end = _End(self.place, None)
         if len(self.blocks) == 1:
@@ -90,7 +81,7 @@ class BasicBlocks:
         self._choose(0, len(self.blocks), "  ", lines)
         return lines
 
-    def _choose(self, low: int, high: int, indent: str, lines: list[tuple[str, SourcePlace]]) -> None:
+    def _choose(self, low: int, high: int, indent: str, lines: list[tuple[str, tree.SourcePlace]]) -> None:
         """Add the source that finds block `pc` among the blocks `low` to `high` - 1 by halving."""
         if high - low > 1:
             middle = (low + high) // 2
@@ -122,22 +113,22 @@ class BasicBlocks:
 class Expressions:
     """Writes expressions of a language as Python text; P, L, G, R and A are bound by `compiled`."""
 
-    def __init__(self, language: Language):
+    def __init__(self, language: tree.Language):
         self.language = language
 
-    def value(self, expression: Expression) -> str:
+    def value(self, expression: tree.Expression) -> str:
         """Python text of a number."""
         text, logical = self._expression(expression, raw=False)
         return f"(1.0 if {text} else 0.0)" if logical else text
 
-    def condition(self, expression: Expression) -> str:
+    def condition(self, expression: tree.Expression) -> str:
         """Python text of what is true or false."""
         text, logical = self._expression(expression, raw=False)
         return text if logical else f"{text}!=0"
 
-    def assigned(self, expression: Expression) -> str:
+    def assigned(self, expression: tree.Expression) -> str:
         """Python text of a value to be stored: a vacant parameter alone stays vacant."""
-        if isinstance(expression, Numbered | Named):
+        if isinstance(expression, tree.Numbered | tree.Named):
             return self._expression(expression, raw=True)[0]
         return self.value(expression)
 
@@ -150,37 +141,37 @@ class Expressions:
             and index not in self.language.system_numbers
         )
 
-    def _expression(self, expression: Expression, *, raw: bool) -> tuple[str, bool]:
+    def _expression(self, expression: tree.Expression, *, raw: bool) -> tuple[str, bool]:
         """Python text, and whether it is true or false rather than a number."""
         language = self.language
-        if isinstance(expression, Number):
+        if isinstance(expression, tree.Number):
             return (repr(expression.value) if expression.value >= 0 else f"({expression.value!r})"), False
-        if isinstance(expression, Named):
+        if isinstance(expression, tree.Named):
             name = expression.name
             if expression.shared and name in language.system_names:
                 return f"A({name!r})", False
             return f"{'G' if expression.shared else 'L'}[{name!r}]", False
-        if isinstance(expression, Numbered):
+        if isinstance(expression, tree.Numbered):
             index = expression.index
-            if isinstance(index, Number) and self.stored(index.value):
+            if isinstance(index, tree.Number) and self.stored(index.value):
                 text = f"P[{int(index.value)}]"
-            elif isinstance(index, Number) and index.value in language.system_numbers:
+            elif isinstance(index, tree.Number) and index.value in language.system_numbers:
                 return f"A({int(index.value)})", False
             else:
                 text = f"R({self.value(index)})"
             return (text if raw else language.read.format(text)), False
-        if isinstance(expression, Exists):
+        if isinstance(expression, tree.Exists):
             return self._exists(expression.parameter), True
         raw = expression.name in language.raw
         operands = []
         for operand in expression.operands:
-            text, logical = self._expression(operand, raw=raw and isinstance(operand, Numbered))
+            text, logical = self._expression(operand, raw=raw and isinstance(operand, tree.Numbered))
             operands.append(f"(1.0 if {text} else 0.0)" if logical else text)
         template = language.operations[expression.name, len(operands)]
         return template.format(*operands), expression.name in language.conditions
 
-    def _exists(self, parameter: Parameter) -> str:
-        if isinstance(parameter, Numbered):
+    def _exists(self, parameter: tree.Parameter) -> str:
+        if isinstance(parameter, tree.Numbered):
             return f"run.exists({self.value(parameter.index)})"
         if not parameter.shared:
             return f"({parameter.name!r} in L)"

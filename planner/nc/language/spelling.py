@@ -15,27 +15,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planner.nc.integers import LENGTHS
+from planner.nc.language import tree
 from planner.nc.language.expression_reader import ExpressionReader
 from planner.nc.language.source import SourceLine
-from planner.nc.language.tree import (
-    Assignments,
-    Exists,
-    Expression,
-    Named,
-    Number,
-    Numbered,
-    Parameter,
-    ProgramFault,
-    Word,
-    op,
-)
 
 _NUMBER = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?")
 _NAME = re.compile(r"<([^<>#()\n]+)>")
 _LETTERS = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 _BLANK = re.compile(r"[ \t\r\x1a]")
-LINE = Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
+LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
 
 
 _IN_LINES = "; write the expression in several lines"
@@ -96,11 +85,11 @@ class LineReader(ExpressionReader):
             return at
         return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
-    def refused(self, message: str, at: int | None = None) -> ProgramFault:
+    def refused(self, message: str, at: int | None = None) -> tree.ProgramFault:
         return self._fault(self.column(self.at if at is None else at), message)
 
-    def _fault(self, column: int, message: str) -> ProgramFault:
-        return ProgramFault(self.line.place._replace(at=self.line.start + column), message)
+    def _fault(self, column: int, message: str) -> tree.ProgramFault:
+        return tree.ProgramFault(self.line.place._replace(at=self.line.start + column), message)
 
     @property
     def ended(self) -> bool:
@@ -153,7 +142,7 @@ class LineReader(ExpressionReader):
         self.at = match.end()
         return float(match.group())
 
-    def value(self) -> Expression:
+    def value(self) -> tree.Expression:
         c = self.peek()
         if c == "-" or c == "+":
             self.at += 1
@@ -163,18 +152,18 @@ class LineReader(ExpressionReader):
             return operand if c == "+" else -operand
         if c == "#":
             parameter = self.parameter()
-            return Number(float(self.line.place.line)) if parameter == LINE else parameter
+            return tree.Number(float(self.line.place.line)) if parameter == LINE else parameter
         if c == "[":
             return self.bracket()
         number = self.number()
         if number is not None:
-            return Number(number)
+            return tree.Number(number)
         if c.isalpha():
             return self._function()
         found = f"{c!r}" if c else "the end of the line"
         raise self.refused(f"a number, parameter, function or [expression] was expected; {found} comes")
 
-    def bracket(self) -> Expression:
+    def bracket(self) -> tree.Expression:
         """[expression]"""
         self.expect("[", "this")
         self.deeper(_IN_LINES)
@@ -183,21 +172,21 @@ class LineReader(ExpressionReader):
         self.expect("]", "the expression")
         return found
 
-    def parameter(self) -> Parameter:
+    def parameter(self) -> tree.Parameter:
         """#number, #[expression], ##number or #<name>."""
         at = self.at
         self.expect("#", "this")
         if self.peek() == "<":
             name = self.name()
-            return Named(name, name.startswith("_"))
+            return tree.Named(name, name.startswith("_"))
         self.deeper(_IN_LINES)
         index = self.value()
         self.nested -= 1
-        if isinstance(index, Number) and index.value != int(index.value):
+        if isinstance(index, tree.Number) and index.value != int(index.value):
             raise self.refused("the number of a parameter is a whole number", at)
-        return Numbered(index)
+        return tree.Numbered(index)
 
-    def _function(self) -> Expression:
+    def _function(self) -> tree.Expression:
         at = self.at
         name = self.keyword().upper()
         if name not in self.spelling.functions:
@@ -207,9 +196,13 @@ class LineReader(ExpressionReader):
             self.expect("[", name)
             parameter = self.parameter()
             self.expect("]", "the parameter")
-            return Exists(parameter)
+            return tree.Exists(parameter)
         operand = self.bracket()
-        return op(name, operand, self.bracket()) if name == "ATAN" and self.take("/") else op(name, operand)
+        return (
+            tree.op(name, operand, self.bracket())
+            if name == "ATAN" and self.take("/")
+            else tree.op(name, operand)
+        )
 
     def operator(self) -> str:
         match = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
@@ -220,10 +213,10 @@ class LineReader(ExpressionReader):
 
     # --- words --------------------------------------------------------------------------------------------------------------
 
-    def words_and_assignments(self, scale: float = 1.0) -> tuple[tuple[Word, ...], Assignments]:
+    def words_and_assignments(self, scale: float = 1.0) -> tuple[tuple[tree.Word, ...], tree.Assignments]:
         """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
-        words: list[Word] = []
-        assignments: list[tuple[Parameter, Expression]] = []
+        words: list[tree.Word] = []
+        assignments: list[tuple[tree.Parameter, tree.Expression]] = []
         while not self.ended:
             at, c = self.at, self.peek()
             if c == "#":
@@ -235,12 +228,12 @@ class LineReader(ExpressionReader):
                 letter, value = ord(c.upper()), self.value()
                 if (
                     scale != 1.0
-                    and isinstance(value, Number)
+                    and isinstance(value, tree.Number)
                     and letter in LENGTHS
                     and "." not in self.text[at : self.at]
                 ):
-                    value = Number(value.value * scale)
-                words.append(Word(letter, self.line.start + self.column(at), value))
+                    value = tree.Number(value.value * scale)
+                words.append(tree.Word(letter, self.line.start + self.column(at), value))
             else:
                 raise self.refused(f"{c!r} starts neither a word nor an assignment", at)
         return tuple(words), tuple(assignments)

@@ -5,25 +5,13 @@ Loops of Fanuc's and Haas' macros: WHILE [c] DO 1 ... END 1.
 
 from __future__ import annotations
 
+from planner.nc.language import tree
 from planner.nc.language.fanuc.text import LOCALS
 from planner.nc.language.source import SourceLine
 from planner.nc.language.spelling import LineReader
-from planner.nc.language.tree import (
-    Call,
-    Expression,
-    Line,
-    Loop,
-    Message,
-    Number,
-    Procedure,
-    Return,
-    SourcePlace,
-    Statement,
-    Word,
-)
 
 _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
-_ALWAYS = Number(1.0)  # the condition of DO without WHILE
+_ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE
 
 
 class FanucControl:
@@ -34,8 +22,8 @@ class FanucControl:
     """
 
     def __init__(self) -> None:
-        self.body: list[Statement] = []
-        self.open: list[tuple[int, SourcePlace, Expression, list[Statement]]] = []
+        self.body: list[tree.Statement] = []
+        self.open: list[tuple[int, tree.SourcePlace, tree.Expression, list[tree.Statement]]] = []
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
@@ -44,7 +32,7 @@ class FanucControl:
             raise reader.refused("WHILE [condition] is followed by DO and a number", at)
         self._do(reader, line, condition)
 
-    def _do(self, reader: LineReader, line: SourceLine, condition: Expression = _ALWAYS) -> None:
+    def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = _ALWAYS) -> None:
         number = _loop_number(reader)
         if any(number == known for known, _, _, _ in self.open) or len(self.open) >= _NESTED_MAX:
             raise line.fault(
@@ -58,7 +46,7 @@ class FanucControl:
         if not self.open or self.open[-1][0] != number:
             raise line.fault(f"END {number} has no DO {number} before it")
         _, place, condition, around = self.open.pop()
-        around.append(Loop(place, "while", f"DO {number}", condition, self.body))
+        around.append(tree.Loop(place, "while", f"DO {number}", condition, self.body))
         self.body = around
 
 
@@ -79,56 +67,58 @@ _TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
 _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
-def subprogram(words: tuple[Word, ...], line: SourceLine, known: frozenset[str]) -> list[Statement]:
+def subprogram(words: tuple[tree.Word, ...], line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:
     """M98. known : the numbers of the file's programs. Raises ProgramFault."""
     rest, given = _split(words, "M98", "PL")
     if "P" not in given:
         raise line.fault("M98 needs P with the number of a subprogram")
-    program, times = given["P"], given.get("L", Number(1.0))
-    if isinstance(program, Number):
+    program, times = given["P"], given.get("L", tree.Number(1.0))
+    if isinstance(program, tree.Number):
         number = f"{program.value:.0f}"
         if number not in known and len(number) > _LONGEST_NUMBER and "L" not in given:
-            times = Number(float(number[:-_LONGEST_NUMBER]))
+            times = tree.Number(float(number[:-_LONGEST_NUMBER]))
             number = number[-_LONGEST_NUMBER:]
-        name: str | Expression = str(int(number))
+        name: str | tree.Expression = str(int(number))
     else:
         name = program
-    return [*_row(rest, line), Call(line.place, name, None, _called("M98", name), times)]
+    return [*_row(rest, line), tree.Call(line.place, name, None, _called("M98", name), times)]
 
 
-def of_block(words: tuple[Word, ...], line: SourceLine, program: Procedure) -> tuple[int, list[Statement]]:
+def of_block(
+    words: tuple[tree.Word, ...], line: SourceLine, program: tree.Procedure
+) -> tuple[int, list[tree.Statement]]:
     """M97: the block that is called, and the statements. Raises ProgramFault."""
     rest, given = _split(words, "M97", "PL")
     called = given.get("P")
-    if not isinstance(called, Number):
+    if not isinstance(called, tree.Number):
         raise line.fault("M97 needs P with the number of a block")
     number = int(called.value)
-    times = given.get("L", Number(1.0))
-    call = Call(line.place, block_name(number, program), None, f"M97 P{number}", times)
+    times = given.get("L", tree.Number(1.0))
+    call = tree.Call(line.place, block_name(number, program), None, f"M97 P{number}", times)
     return number, [*_row(rest, line), call]
 
 
-def returned(words: tuple[Word, ...], line: SourceLine, *, restarts: bool) -> list[Statement]:
+def returned(words: tuple[tree.Word, ...], line: SourceLine, *, restarts: bool) -> list[tree.Statement]:
     """M99. restarts : it stands in the main program, which a control then starts again."""
     rest, given = _split(words, "M99", "P")
-    said: list[Statement] = [
-        Message(line.place, ("M99 starts the main program again; it is read once",))
+    said: list[tree.Statement] = [
+        tree.Message(line.place, ("M99 starts the main program again; it is read once",))
     ] * restarts
-    return [*_row(rest, line), *said, Return(line.place, None, given.get("P"))]
+    return [*_row(rest, line), *said, tree.Return(line.place, None, given.get("P"))]
 
 
-def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
+def macro(words: tuple[tree.Word, ...], code: str, line: SourceLine) -> tree.Call:
     """G65, or the call that G66 makes after every move. Raises ProgramFault."""
-    arguments: dict[int, Expression] = {}
+    arguments: dict[int, tree.Expression] = {}
     seen = dict.fromkeys(_TRIPLES, 0)
-    program: str | Expression = ""
-    times: Expression = Number(1.0)
+    program: str | tree.Expression = ""
+    times: tree.Expression = tree.Number(1.0)
     for word in words:
         letter = chr(word.letter)
         if code_of(word) == code or letter == "N":
             continue
         if letter == "P":
-            program = f"{word.value.value:.0f}" if isinstance(word.value, Number) else word.value
+            program = f"{word.value.value:.0f}" if isinstance(word.value, tree.Number) else word.value
         elif letter == "L":
             times = word.value
         elif letter in _NUMBERS:
@@ -141,7 +131,7 @@ def macro(words: tuple[Word, ...], code: str, line: SourceLine) -> Call:
             raise line.fault(f"{code} has no parameter for {letter}", word.at)
     if program == "" or max(arguments, default=0) > LOCALS:
         raise line.fault(f"{code} needs P with the number of a macro, and at most ten of I, J and K")
-    return Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
+    return tree.Call(line.place, program, tuple(arguments.items()), _called(code, program), times)
 
 
 def fanuc_files(name: str) -> frozenset[str]:
@@ -151,19 +141,21 @@ def fanuc_files(name: str) -> frozenset[str]:
     return frozenset(stem + ending for stem in stems for ending in ("", ".nc", ".ngc", ".cnc", ".tap"))
 
 
-def code_of(word: Word) -> str:
+def code_of(word: tree.Word) -> str:
     """G and M codes by name; empty for other words and computed codes."""
-    if chr(word.letter) not in "GM" or not isinstance(word.value, Number):
+    if chr(word.letter) not in "GM" or not isinstance(word.value, tree.Number):
         return ""
     return f"{chr(word.letter)}{word.value.value:g}"
 
 
-def block_name(number: int, program: Procedure) -> str:
+def block_name(number: int, program: tree.Procedure) -> str:
     """The name of what M97 calls: the program from its block of that number on."""
     return f"N{number} of O{program.name}" if program.name else f"N{number}"
 
 
-def _split(words: tuple[Word, ...], code: str, own: str) -> tuple[list[Word], dict[str, Expression]]:
+def _split(
+    words: tuple[tree.Word, ...], code: str, own: str
+) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
     """The words that a call does not use, and those that it does."""
     rest, given = [], {}
     for word in words:
@@ -175,9 +167,9 @@ def _split(words: tuple[Word, ...], code: str, own: str) -> tuple[list[Word], di
     return rest, given
 
 
-def _row(rest: list[Word], line: SourceLine) -> list[Statement]:
-    return [Line(line.place, tuple(rest))] if rest else []
+def _row(rest: list[tree.Word], line: SourceLine) -> list[tree.Statement]:
+    return [tree.Line(line.place, tuple(rest))] if rest else []
 
 
-def _called(code: str, name: str | Expression) -> str:
+def _called(code: str, name: str | tree.Expression) -> str:
     return f"{code} P{name}" if isinstance(name, str) else f"{code} P"

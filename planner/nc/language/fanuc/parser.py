@@ -16,31 +16,12 @@ from __future__ import annotations
 
 import re
 
+from planner.nc.language import tree
 from planner.nc.language.fanuc import calls
 from planner.nc.language.fanuc.calls import FanucControl
 from planner.nc.language.fanuc.text import SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
-from planner.nc.language.tree import (
-    Call,
-    Expression,
-    Goto,
-    If,
-    Label,
-    Line,
-    Message,
-    Named,
-    Number,
-    Numbered,
-    Parameter,
-    PlainRows,
-    Procedure,
-    ProgramFault,
-    SourcePlace,
-    Statement,
-    Word,
-    assign,
-)
 
 _LINE_NUMBER = re.compile(r"N(\d+)", re.IGNORECASE)
 _PROGRAM = re.compile(r"[O:](\d+)", re.IGNORECASE)
@@ -56,64 +37,65 @@ class FanucParser(FanucControl):
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
-        self.faults: list[ProgramFault] = []
-        self.procedures: list[Procedure] = []
-        self.modal: Call | None = None  # G66
-        self.local: list[tuple[int, SourcePlace, Procedure]] = []  # M97
+        self.faults: list[tree.ProgramFault] = []
+        self.procedures: list[tree.Procedure] = []
+        self.modal: tree.Call | None = None  # G66
+        self.local: list[tuple[int, tree.SourcePlace, tree.Procedure]] = []  # M97
         self.numbers: frozenset[str] = frozenset()
         self.targets: frozenset[int] | None = frozenset()  # labels that are used; None for all
         self.calls_blocks = False  # M97 is used: an M99 may return from it
         self.hidden = 0
 
-    def parse(self) -> list[Procedure]:
+    def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
         items = list(self.source.in_order())
-        texts = [item.text.upper().replace(" ", "") for item in items if not isinstance(item, PlainRows)]
+        texts = [item.text.upper().replace(" ", "") for item in items if not isinstance(item, tree.PlainRows)]
         self.numbers = frozenset(
             str(int(match.group(1))) for text in texts if (match := _PROGRAM.match(text))
         )
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
-        self._begin("" if self.source.file == 0 else "file", SourcePlace(self.source.file, 1, 0))
+        self._begin("" if self.source.file == 0 else "file", tree.SourcePlace(self.source.file, 1, 0))
         for item in items:
             try:
-                if isinstance(item, PlainRows):
+                if isinstance(item, tree.PlainRows):
                     self._plain(item)
                 else:
                     self._line(item)
-            except ProgramFault as fault:
+            except tree.ProgramFault as fault:
                 self.faults.append(fault)
         self._end_of_program()
         for number, place, procedure in self.local:
             self._local_call(number, place, procedure)
         return self.procedures
 
-    def _begin(self, name: str, place: SourcePlace) -> None:
+    def _begin(self, name: str, place: tree.SourcePlace) -> None:
         self.body = []
-        self.procedures.append(Procedure(name, place, self.body))
+        self.procedures.append(tree.Procedure(name, place, self.body))
 
     def _end_of_program(self) -> None:
         if self.open:
             number, place, _, _ = self.open[0]
-            self.faults.append(ProgramFault(place, f"DO {number} has no END {number}"))
+            self.faults.append(tree.ProgramFault(place, f"DO {number} has no END {number}"))
             self.open.clear()
         self.modal = None
 
-    def _local_call(self, number: int, place: SourcePlace, procedure: Procedure) -> None:
+    def _local_call(self, number: int, place: tree.SourcePlace, procedure: tree.Procedure) -> None:
         at = next(
-            (k for k, s in enumerate(procedure.body) if isinstance(s, Label) and s.number == number), None
+            (k for k, s in enumerate(procedure.body) if isinstance(s, tree.Label) and s.number == number),
+            None,
         )
         name = calls.block_name(number, procedure)
         if at is None:
             self.faults.append(
-                ProgramFault(place, f"M97 P{number}: there is no block N{number} in this program")
+                tree.ProgramFault(place, f"M97 P{number}: there is no block N{number} in this program")
             )
         elif all(known.name != name for known in self.procedures):
-            self.procedures.append(Procedure(name, procedure.body[at].place, procedure.body[at:]))
+            self.procedures.append(tree.Procedure(name, procedure.body[at].place, procedure.body[at:]))
 
     # --- lines ----------------------------------------------------------------------------------------------------------------
 
-    def _plain(self, rows: PlainRows) -> None:
+    def _plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement: labels that are used stand between them, and G66 calls after those that move."""
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
@@ -130,7 +112,7 @@ class FanucParser(FanucControl):
                 self.body.append(self.source.part(rows, begin, row))
                 begin = row
             if used and number is not None:
-                self.body.append(Label(rows.place, number))
+                self.body.append(tree.Label(rows.place, number))
             if self.modal is not None and any(chr(c) in "XYZ" for c in letters):
                 self.body += [self.source.part(rows, begin, row + 1), self.modal]
                 begin = row + 1
@@ -149,7 +131,7 @@ class FanucParser(FanucControl):
         if label is not None:
             reader.at = label.end()
             if self.targets is None or int(label.group(1)) in self.targets:
-                self.body.append(Label(line.place, int(label.group(1))))
+                self.body.append(tree.Label(line.place, int(label.group(1))))
         if reader.ended:
             self._messages(reader, line)
             return
@@ -166,10 +148,10 @@ class FanucParser(FanucControl):
         self._end_of_program()
         only = self.procedures[-1]
         if len(self.procedures) == 1 and all(
-            isinstance(s, PlainRows) and _is_percent(self.source, s) for s in only.body
+            isinstance(s, tree.PlainRows) and _is_percent(self.source, s) for s in only.body
         ):
             if self.source.file:
-                self.procedures[0] = Procedure(number, line.place, only.body)
+                self.procedures[0] = tree.Procedure(number, line.place, only.body)
             return  # the first program of the file
         if any(known.name == number for known in self.procedures):
             raise line.fault(f"a second program O{number}")
@@ -179,13 +161,13 @@ class FanucParser(FanucControl):
         for comment in reader.comments:
             kind, comma, text = comment.partition(",")
             if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
-                self.body.append(Message(line.place, (text,)))
+                self.body.append(tree.Message(line.place, (text,)))
 
     # --- IF, WHILE, GOTO ------------------------------------------------------------------------------------------------------
 
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         if keyword == "GOTO":
-            self.body.append(Goto(line.place, reader.value()))
+            self.body.append(tree.Goto(line.place, reader.value()))
         elif keyword == "IF":
             self._if(reader, line)
         elif keyword == "WHILE":
@@ -195,7 +177,7 @@ class FanucParser(FanucControl):
         elif keyword == "END":
             self._end(reader, line)
         else:  # output to a file
-            self.body.append(Message(line.place, (reader.text,)))
+            self.body.append(tree.Message(line.place, (reader.text,)))
             return
         if not reader.ended:
             raise reader.refused(f"nothing may follow {keyword} on its line")
@@ -206,7 +188,7 @@ class FanucParser(FanucControl):
         match = _KEYWORD.match(reader.text, reader.at)
         if match is not None and match.group(1).upper() == "GOTO":
             reader.at = match.end()
-            body: list[Statement] = [Goto(line.place, reader.value())]
+            body: list[tree.Statement] = [tree.Goto(line.place, reader.value())]
         elif reader.text[at : at + 4].upper() == "THEN":
             reader.at += 4
             outside, self.body = self.body, []
@@ -214,12 +196,15 @@ class FanucParser(FanucControl):
             body, self.body = self.body, outside
         else:
             raise reader.refused("IF [condition] is followed by GOTO or THEN", at)
-        self.body.append(If(line.place, ((condition, body),), []))
+        self.body.append(tree.If(line.place, ((condition, body),), []))
 
     # --- words and calls ------------------------------------------------------------------------------------------------------
 
     def _words(
-        self, words: tuple[Word, ...], assignments: tuple[tuple[Parameter, Expression], ...], line: SourceLine
+        self,
+        words: tuple[tree.Word, ...],
+        assignments: tuple[tuple[tree.Parameter, tree.Expression], ...],
+        line: SourceLine,
     ) -> None:
         codes = [calls.code_of(word) for word in words]
         called = next((code for code in _CALLS if code in codes), None)
@@ -230,17 +215,17 @@ class FanucParser(FanucControl):
             self.modal = None
             words = tuple(word for word in words if calls.code_of(word) != "G67")
         for target, _ in assignments:
-            if target == Numbered(Number(_STOP)):
-                words = (*words, Word(ord("M"), line.place.at, Number(0.0)))
-            if target == Numbered(Number(0.0)):
+            if target == tree.Numbered(tree.Number(_STOP)):
+                words = (*words, tree.Word(ord("M"), line.place.at, tree.Number(0.0)))
+            if target == tree.Numbered(tree.Number(0.0)):
                 raise line.fault("#0 has no value and cannot be given one")
-        assignments = tuple(pair for pair in assignments if pair[0] != Numbered(Number(_STOP)))
+        assignments = tuple(pair for pair in assignments if pair[0] != tree.Numbered(tree.Number(_STOP)))
         if words or assignments:
-            self.body.append(Line(line.place, words, assignments))
+            self.body.append(tree.Line(line.place, words, assignments))
         if self.modal is not None and any(chr(word.letter) in "XYZ" for word in words):
             self.body.append(self.modal)
 
-    def _call(self, code: str, words: tuple[Word, ...], line: SourceLine) -> None:
+    def _call(self, code: str, words: tuple[tree.Word, ...], line: SourceLine) -> None:
         program = self.procedures[-1]
         if code == "M98":
             self.body += calls.subprogram(words, line, self.numbers)
@@ -255,14 +240,14 @@ class FanucParser(FanucControl):
         else:
             self._modal_call(calls.macro(words, "G66", line), line)
 
-    def _modal_call(self, call: Call, line: SourceLine) -> None:
+    def _modal_call(self, call: tree.Call, line: SourceLine) -> None:
         """The call that follows every move: its arguments are computed now and kept in names of their own."""
         assert call.arguments is not None
-        kept: list[tuple[int, Expression]] = []
+        kept: list[tuple[int, tree.Expression]] = []
         for number, value in call.arguments:
             self.hidden += 1
-            name = Named(f"g66 {self.hidden}", False)
-            self.body.append(assign(line.place, (name, value)))
+            name = tree.Named(f"g66 {self.hidden}", False)
+            self.body.append(tree.assign(line.place, (name, value)))
             kept.append((number, name))
         self.modal = call._replace(arguments=tuple(kept))
 
@@ -280,7 +265,7 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
     return frozenset(used)
 
 
-def _is_percent(source: Source, rows: PlainRows) -> bool:
+def _is_percent(source: Source, rows: tree.PlainRows) -> bool:
     words = source.words
     span = slice(
         int(words.first[rows.first - source.first_row]), int(words.first[rows.last - source.first_row])

@@ -5,26 +5,12 @@ from __future__ import annotations
 import re
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.language import tree
 from planner.nc.language.heidenhain import contour, cycles, drilling
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.items import looked_up
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import ConversationalBlock, own, parameter, value
-from planner.nc.language.tree import (
-    ONE,
-    ZERO,
-    Expression,
-    If,
-    Message,
-    Number,
-    Parameter,
-    Return,
-    Statement,
-    assign,
-    made,
-    op,
-    row,
-)
 
 _PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
 _VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q\d+))"
@@ -37,9 +23,9 @@ _TOOL_CALL = re.compile(
 )
 
 
-def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict[str, Expression]:
+def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict[str, tree.Expression]:
     """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
-    found: dict[str, Expression] = {}
+    found: dict[str, tree.Expression] = {}
     while block.text[start:end].strip():
         name = re.compile(names, re.IGNORECASE).match(block.text, start)
         assert name is not None
@@ -67,19 +53,19 @@ class Definitions(Flow):
         self.oversizes = False
         self.tool_names: dict[str, int] = {}
 
-    def _begin(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _begin(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        rows: list[Statement] = [row(block.place, *(("G", code) for code in codes))]
+        rows: list[tree.Statement] = [tree.row(block.place, *(("G", code) for code in codes))]
         return [*rows, looked_up(block)] if self.file else rows
 
-    def _end(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _end(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         if self.file:
-            return [Return(block.place)]
-        return [row(block.place, ("M", 30.0))]
+            return [tree.Return(block.place)]
+        return [tree.row(block.place, ("M", 30.0))]
 
-    def _tool(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _tool(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         match = _TOOL_CALL.match(block.text, column)
         if match is None:
             raise block.fault('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR', column)
@@ -88,26 +74,26 @@ class Definitions(Flow):
         if axis and axis.upper() != "Z":
             raise block.fault(f"tool axis {axis.upper()}; Z is planned", match.start(3))
         more_of = _named(block, _OVERSIZE, *match.span(6))
-        if more_of.pop("DR2", ZERO) != ZERO:
+        if more_of.pop("DR2", tree.ZERO) != tree.ZERO:
             raise block.fault("DR2, of a tool's corner radius, is not read; write 0", match.start(6))
         if more_of and tool is None:
             raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
-        rows: list[Statement] = []
+        rows: list[tree.Statement] = []
         if tool is not None:
-            number = Number(float(tool))
-            rows.append(row(block.place, ("T", number), ("M", 6.0)))
-            rows.append(row(block.place, ("G", 43.0), ("H", number)))
-            if more_of.get("DL", ZERO) != ZERO:
-                rows.append(row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
+            number = tree.Number(float(tool))
+            rows.append(tree.row(block.place, ("T", number), ("M", 6.0)))
+            rows.append(tree.row(block.place, ("G", 43.0), ("H", number)))
+            if more_of.get("DL", tree.ZERO) != tree.ZERO:
+                rows.append(tree.row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
             if self.oversizes:
-                rows.append(made(block.place, "oversize", DR=more_of.get("DR", ZERO)))
+                rows.append(tree.made(block.place, "oversize", DR=more_of.get("DR", tree.ZERO)))
         if match.group(4):
             speed, _ = value(block, match.start(4))
-            rows.append(row(block.place, ("S", speed)))
+            rows.append(tree.row(block.place, ("S", speed)))
         self.moves.automatic = None
         if feed and feed.upper() != "MAX":
             self.moves.automatic, _ = value(block, match.start(5))
-            rows.append(row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
+            rows.append(tree.row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
         if tool is not None:
             rows.append(looked_up(block))
         return rows
@@ -118,7 +104,7 @@ class Definitions(Flow):
             return int(number)
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
-    def _tool_data(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _tool_data(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool to have ready."""
         match = _TOOL_DEF.match(block.text, column)
         if match is None:
@@ -130,9 +116,9 @@ class Definitions(Flow):
         if tool is None:
             raise block.fault("TOOL DEF with L or R needs the number of the tool", column)
         words = (({"L": "Z", "R": "R"}[name], given) for name, given in data.items())
-        return [row(block.place, ("G", 10.0), ("L", ONE), ("P", float(tool)), *words)]
+        return [tree.row(block.place, ("G", 10.0), ("L", tree.ONE), ("P", float(tool)), *words)]
 
-    def _define(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _define(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         match = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
         if match is None:
             raise block.fault("CYCL DEF needs the number of a cycle", column)
@@ -141,18 +127,20 @@ class Definitions(Flow):
             return self._old_cycle(block, cycle, int(part), column)
         if cycle not in READ:
             raise block.fault(_not_read(cycle), column)
-        given: list[tuple[Parameter, Expression]] = []
+        given: list[tuple[tree.Parameter, tree.Expression]] = []
         for entry in re.finditer(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE):
             number, _ = value(block, column + entry.end())
-            if int(entry.group(1)) in _REFUSED and number != ZERO:
+            if int(entry.group(1)) in _REFUSED and number != tree.ZERO:
                 raise block.fault(_REFUSED[int(entry.group(1))], column + entry.start())
             given.append((self._q(block, int(entry.group(1))), number))
         if cycle in drilling.PATTERNS:
             called = [*self._call_cycle(block), looked_up(block)]
-            return [assign(block.place, *given), *drilling.pattern(block, cycle, called)]
-        return [assign(block.place, *given, (own("cycle"), Number(float(cycle))))]
+            return [tree.assign(block.place, *given), *drilling.pattern(block, cycle, called)]
+        return [tree.assign(block.place, *given, (own("cycle"), tree.Number(float(cycle))))]
 
-    def _old_cycle(self, block: ConversationalBlock, cycle: int, part: int, column: int) -> list[Statement]:
+    def _old_cycle(
+        self, block: ConversationalBlock, cycle: int, part: int, column: int
+    ) -> list[tree.Statement]:
         if cycle in (9, 32, *contour.TITLES) and part == 0:
             return []
         if cycle in contour.TITLES:
@@ -162,47 +150,48 @@ class Definitions(Flow):
             if match is None and part != 1:
                 return []  # 32.2: filter and rotary axes
             if match is None:  # the machine's tolerance again
-                return [row(block.place, ("G", 64.0))]
+                return [tree.row(block.place, ("G", 64.0))]
             tolerance, _ = value(block, column + match.end())
-            return [row(block.place, ("G", 64.0), ("P", tolerance))]
+            return [tree.row(block.place, ("G", 64.0), ("P", tolerance))]
         if cycle == 9:
             match = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
             seconds, _ = value(block, column + (match.end() if match else 0))
-            return [row(block.place, ("G", 4.0), ("P", seconds))]
+            return [tree.row(block.place, ("G", 4.0), ("P", seconds))]
         if cycle == 1:
             return self._pecking(block, part, column)
         raise block.fault(_not_read(cycle), column)
 
-    def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[Statement]:
+    def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[tree.Statement]:
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
-            return [assign(block.place, (own("cycle"), ONE))]
+            return [tree.assign(block.place, (own("cycle"), tree.ONE))]
         match = _PECKING.match(block.text, column)
         if match is None or not 1 <= part <= len(drilling.PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
         number, _ = value(block, match.end())
-        return [assign(block.place, (parameter(drilling.PECKING[part - 1]), number))]
+        return [tree.assign(block.place, (parameter(drilling.PECKING[part - 1]), number))]
 
-    def _call_cycle(self, block: ConversationalBlock) -> list[Statement]:
+    def _call_cycle(self, block: ConversationalBlock) -> list[tree.Statement]:
         known = sorted(self.cycles & {*drilling.CYCLES, *cycles.PARAMETERS})
         if not known:
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
         branches = tuple(
-            (op("EQ", own("cycle"), Number(float(cycle))), self._one_cycle(block, cycle)) for cycle in known
+            (tree.op("EQ", own("cycle"), tree.Number(float(cycle))), self._one_cycle(block, cycle))
+            for cycle in known
         )
-        nothing = Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
-        return [If(block.place, branches, [nothing])]
+        nothing = tree.Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
+        return [tree.If(block.place, branches, [nothing])]
 
-    def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[Statement]:
+    def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[tree.Statement]:
         """A cycle at the present place, and the feed as it was before."""
-        keep, back = made(block.place, "keep"), made(block.place, "bring back", feed=ONE)
+        keep, back = tree.made(block.place, "keep"), tree.made(block.place, "bring back", feed=tree.ONE)
         if cycle in drilling.CYCLES:
             return [keep, *drilling.drilled(block, cycle, self.moves, self.unit), back]
         given = {
             f"Q{q}": self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q)
             for q in cycles.PARAMETERS[cycle]
         }
-        return [keep, made(block.place, f"cycle {cycle}", **given), back, looked_up(block)]
+        return [keep, tree.made(block.place, f"cycle {cycle}", **given), back, looked_up(block)]
 
 
 READ = (*drilling.CYCLES, *cycles.PARAMETERS, *drilling.PATTERNS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from planner.nc.language import tree
 from planner.nc.language.heidenhain.text import (
     PARAMETERS,
     ConversationalBlock,
@@ -12,20 +13,6 @@ from planner.nc.language.heidenhain.text import (
     own,
     parameter,
     value,
-)
-from planner.nc.language.tree import (
-    ONE,
-    ZERO,
-    Call,
-    Expression,
-    Goto,
-    If,
-    Label,
-    Number,
-    Parameter,
-    Statement,
-    assign,
-    op,
 )
 
 _LABEL = re.compile(r'\s*(?:(\d+)|"([^"]*)")')
@@ -67,44 +54,44 @@ class Flow:
             return int(match.group(1)), match.end()
         return self.names.setdefault(match.group(2), NAMED + len(self.names)), match.end()
 
-    def _label_here(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _label_here(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         label, _ = self._label(block, column)
         if label == 0:
             return []
         if self.blocks[self.known[label]] is not block:
             raise block.fault(f"label {block.text[column:].strip()} is set twice")
-        return [Label(block.place, label)]
+        return [tree.Label(block.place, label)]
 
-    def _call(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _call(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         label, column = self._label(block, column)
         if label not in self.known:
             raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
         repeat = _REPEAT.match(block.text, column)
         if repeat is None:
             self.called.add(label)
-            return [Call(block.place, procedure_name(label, self.file), None, block.text)]
+            return [tree.Call(block.place, procedure_name(label, self.file), None, block.text)]
         counter = own(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
-        again: list[Statement] = [
-            assign(block.place, (counter, counter + ONE)),
-            Goto(block.place, Number(float(label))),
+        again: list[tree.Statement] = [
+            tree.assign(block.place, (counter, counter + tree.ONE)),
+            tree.Goto(block.place, tree.Number(float(label))),
         ]
-        more = op("LT", counter, Number(float(repeat.group(1))))
-        return [If(block.place, ((more, again),), [assign(block.place, (counter, ZERO))])]
+        more = tree.op("LT", counter, tree.Number(float(repeat.group(1))))
+        return [tree.If(block.place, ((more, again),), [tree.assign(block.place, (counter, tree.ZERO))])]
 
-    def _parameter(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _parameter(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         match = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
         if match is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
         formula = Formula(block, match.end())
-        return [assign(block.place, (self._q(block, int(match.group(1))), formula.read()))]
+        return [tree.assign(block.place, (self._q(block, int(match.group(1))), formula.read()))]
 
-    def _q(self, block: ConversationalBlock, number: int) -> Parameter:
+    def _q(self, block: ConversationalBlock, number: int) -> tree.Parameter:
         if number >= PARAMETERS:
             raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}")
         return parameter(number)
 
-    def _fn(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _fn(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         match = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
         number = int(match.group(1)) if match else -1
         column += match.end() if match else 0
@@ -117,19 +104,19 @@ class Flow:
         if number in _FN_ONE:
             word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)
             given, column = value(block, column + (word_of.end() if word_of else 0))
-            operation: Expression = op(_FN_ONE[number], given) if _FN_ONE[number] else given
+            operation: tree.Expression = tree.op(_FN_ONE[number], given) if _FN_ONE[number] else given
         else:
             left, column = value(block, column)
             sign = re.match(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
             if sign is None:
                 raise block.fault("+, -, *, DIV, LEN or ANG and a second value are expected", column)
             right, column = value(block, column + sign.end())
-            operation = op(_FN_TWO[number], left, right)
+            operation = tree.op(_FN_TWO[number], left, right)
         if block.text[column:].strip():
             raise block.fault("nothing may follow here", column)
-        return [assign(block.place, (q, operation))]
+        return [tree.assign(block.place, (q, operation))]
 
-    def _jump(self, block: ConversationalBlock, column: int, number: int) -> list[Statement]:
+    def _jump(self, block: ConversationalBlock, column: int, number: int) -> list[tree.Statement]:
         start = _IF.match(block.text, column)
         left, column = value(block, start.end() if start else column)
         compare = re.match(r"\s*(EQU|NE|GT|LT)\b", block.text[column:], re.IGNORECASE)
@@ -140,8 +127,8 @@ class Flow:
         if then is None:
             raise block.fault("GOTO LBL is expected here", column)
         label, _ = self._label(block, then.end())
-        then_go: list[Statement] = [Goto(block.place, Number(float(label)))]
-        return [If(block.place, ((op(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
+        then_go: list[tree.Statement] = [tree.Goto(block.place, tree.Number(float(label)))]
+        return [tree.If(block.place, ((tree.op(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
 
 
 def procedure_name(label: int, file: int = 0) -> str:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain.codes import REMEDY, Codes
 from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
@@ -37,22 +38,6 @@ from planner.nc.language.heidenhain.items import (
 )
 from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
-from planner.nc.language.tree import (
-    TWO,
-    ZERO,
-    Call,
-    Expression,
-    Number,
-    Parameter,
-    Procedure,
-    ProgramFault,
-    Return,
-    SourcePlace,
-    Statement,
-    assign,
-    made,
-    row,
-)
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
@@ -69,12 +54,12 @@ class HeidenhainParser(Codes):
     def __init__(self, source: Source):
         super().__init__()
         self.source, self.file = source, source.file
-        self.faults: list[ProgramFault] = []
+        self.faults: list[tree.ProgramFault] = []
         self.skip = False  # the block was read with the one before
         self.compensates = False  # a block of the program has RL, RR, APPR or DEP
         self.poles = False  # a block of it, or of a program beside it, may set a pole
 
-    def parse(self) -> list[Procedure]:
+    def parse(self) -> list[tree.Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
@@ -85,7 +70,7 @@ class HeidenhainParser(Codes):
         self.poles = bool(poles) or shared
         self.moves.tilted = shared or any("Z" in pole for pole in poles)
         source = self.source
-        start = SourcePlace(source.file, 1, source.begin)
+        start = tree.SourcePlace(source.file, 1, source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
         done: set[int] = set()
@@ -95,21 +80,21 @@ class HeidenhainParser(Codes):
                 if label in self.known:
                     first = self.known[label]
                     procedures.append(
-                        Procedure(
+                        tree.Procedure(
                             procedure_name(label, source.file),
                             self.blocks[first].place,
                             self._body(first, self._end_of(first), True),
                         )
                     )
-        set_up: list[tuple[Parameter, Expression]] = [
-            (own(f"rep{source.file}_{k}"), ZERO) for k in range(self.repeats)
+        set_up: list[tuple[tree.Parameter, tree.Expression]] = [
+            (own(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
         ]
         if not source.file:
-            set_up += [(one, ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
-            set_up += [(own(name), ZERO) for name in ("dx", "dy", "cycle")]
-            set_up.append((PLANE, TWO))
+            set_up += [(one, tree.ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
+            set_up += [(own(name), tree.ZERO) for name in ("dx", "dy", "cycle")]
+            set_up.append((PLANE, tree.TWO))
         name = "file" if source.file else ""
-        return [Procedure(name, start, [assign(start, *set_up), *main]), *procedures]
+        return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
     # --- labels -----------------------------------------------------------------------------------------------------------------
 
@@ -121,7 +106,7 @@ class HeidenhainParser(Codes):
                 continue
             try:
                 label, _ = self._label(block, 3)
-            except ProgramFault:
+            except tree.ProgramFault:
                 continue
             if label:
                 self.known.setdefault(label, k)
@@ -135,9 +120,9 @@ class HeidenhainParser(Codes):
 
     # --- blocks -----------------------------------------------------------------------------------------------------------------
 
-    def _body(self, first: int, last: int, called: bool = False) -> list[Statement]:
+    def _body(self, first: int, last: int, called: bool = False) -> list[tree.Statement]:
         """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known already."""
-        body: list[Statement] = []
+        body: list[tree.Statement] = []
         faults = len(self.faults)
         self.skip = False
         for k in range(first, last):
@@ -146,14 +131,14 @@ class HeidenhainParser(Codes):
                 continue
             try:
                 body += self._block(k, last)
-            except ProgramFault as fault:
+            except tree.ProgramFault as fault:
                 self.faults.append(fault)
         if called:
             del self.faults[faults:]
-            body.append(Return(self.blocks[last - 1].place))
+            body.append(tree.Return(self.blocks[last - 1].place))
         return body
 
-    def _block(self, k: int, last: int) -> list[Statement]:
+    def _block(self, k: int, last: int) -> list[tree.Statement]:
         block = self.blocks[k]
         match = _FUNCTION.match(block.text)
         name = " ".join(match.group().upper().split()) if match else ""
@@ -169,31 +154,31 @@ class HeidenhainParser(Codes):
         self.skip = bool(corner)
         return [*corner, *read(self, block, match.end())]
 
-    def _call_program(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _call_program(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         """CALL PGM name: a file of the program's folder; its units end with it."""
         name = called_file(block.text[column:])
         if not name:
             raise block.fault("CALL PGM is followed by the name of a program", column)
-        units = row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
-        called = Call(block.place, name, None, block.text[column:].strip())
+        units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
+        called = tree.Call(block.place, name, None, block.text[column:].strip())
         return [called, units, looked_up(block)]
 
-    def _nothing(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _nothing(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         return []
 
     # --- moves ------------------------------------------------------------------------------------------------------------------
 
-    def _ends(self, block: ConversationalBlock, given: Items) -> dict[str, Expression]:
+    def _ends(self, block: ConversationalBlock, given: Items) -> dict[str, tree.Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
-    def _straight(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _straight(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         given, name = items(block, column, turning=self.source.at_tip), block.text[:column].upper()
         before, after, machine = self._codes(block, given, straight=name == "L")
         if machine and any(relative for _, relative in given.axes.values()):
             raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
-        lines: list[Statement] = [*before, *self._side(block, given)]
+        lines: list[tree.Statement] = [*before, *self._side(block, given)]
         if name == "LP":
             self._need_pole(block)
             lines += self.moves.polar_line(block, given)
@@ -201,7 +186,7 @@ class HeidenhainParser(Codes):
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> list[Statement]:
+    def _corner(self, k: int, last: int) -> list[tree.Statement]:
         """RND or CHF in block k, which the move before it ends with."""
         match = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
         if match is None:
@@ -215,12 +200,14 @@ class HeidenhainParser(Codes):
             raise block.fault(
                 "nothing may follow the number of RND and CHF; write the feed into the next block", column
             )
-        return [made(block.place, "corner", kind=CORNERS.index("RND" if rounded else "CHR"), size=number)]
+        return [
+            tree.made(block.place, "corner", kind=CORNERS.index("RND" if rounded else "CHR"), size=number)
+        ]
 
-    def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
 
-    def _arc(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _arc(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         name = block.text[:column].upper()
         given = items(block, column)
         before, after, _ = self._codes(block, given)
@@ -244,18 +231,18 @@ class HeidenhainParser(Codes):
         if not self.poles:
             raise block.fault("there is no pole: write CC before")
 
-    def _side(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+    def _side(self, block: ConversationalBlock, given: Items) -> list[tree.Statement]:
         return side_rows(block, given) if self.compensates else []
 
-    def _approach(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _approach(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         rows, given = approach_rows(block, column, self.moves.automatic)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
 
-    def _datum(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _datum(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         return datum_rows(block, column)
 
-    def _pole(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _pole(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         given = items(block, column)
         ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
         if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
@@ -264,11 +251,11 @@ class HeidenhainParser(Codes):
             )
         named = [(POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
-        return [assign(block.place, *named, (PLANE, Number(float(normal))))]
+        return [tree.assign(block.place, *named, (PLANE, tree.Number(float(normal))))]
 
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 
-    def _cycle_call(self, block: ConversationalBlock, column: int) -> list[Statement]:
+    def _cycle_call(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
         if rest is None:
             before, after = self._codes_alone(block, column)
@@ -286,7 +273,7 @@ _WHY = {
     ),
     **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
 }
-_READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[Statement]]] = {
+_READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[tree.Statement]]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
     **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing),

@@ -14,22 +14,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from planner.nc.language import tree
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
-from planner.nc.language.tree import (
-    Expression,
-    Language,
-    Named,
-    Number,
-    Numbered,
-    ProgramFault,
-    SourcePlace,
-    op,
-)
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
-LANGUAGE = Language(
+LANGUAGE = tree.Language(
     operations=ARITHMETIC,
     conditions=COMPARISONS,
     locals=0,
@@ -45,14 +36,14 @@ _FUNCTIONS = frozenset(
 )
 
 
-def own(name: str) -> Named:
+def own(name: str) -> tree.Named:
     """A variable of the reader's own: the position, the pole, what a cycle needs."""
-    return Named(f"_{name}", True)
+    return tree.Named(f"_{name}", True)
 
 
-def parameter(number: int) -> Numbered:
+def parameter(number: int) -> tree.Numbered:
     """Q of that number."""
-    return Numbered(Number(float(number + 1)))
+    return tree.Numbered(tree.Number(float(number + 1)))
 
 
 @dataclass(frozen=True)
@@ -62,14 +53,14 @@ class ConversationalBlock:
     at : byte offset of the first character of each part, and where the part begins in `text`
     """
 
-    place: SourcePlace
+    place: tree.SourcePlace
     text: str
     at: tuple[tuple[int, int], ...]
 
-    def fault(self, message: str, column: int = 0) -> ProgramFault:
+    def fault(self, message: str, column: int = 0) -> tree.ProgramFault:
         """A fault of the character at `column` of the text."""
         start, begin = [pair for pair in self.at if pair[1] <= column][-1]
-        return ProgramFault(self.place._replace(at=start + column - begin), message)
+        return tree.ProgramFault(self.place._replace(at=start + column - begin), message)
 
     def byte(self, column: int) -> int:
         """Byte offset of a character of the text."""
@@ -86,7 +77,7 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
 
     file, begin : its number among the files, and where its bytes begin in the words' data
     """
-    waiting: tuple[SourcePlace, str, list[tuple[int, int]]] | None = None
+    waiting: tuple[tree.SourcePlace, str, list[tuple[int, int]]] | None = None
     open_end = False
     at = 0
     for number, raw in enumerate(data.split(b"\n"), start=1):
@@ -109,13 +100,13 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
         elif content:
             if waiting is not None:
                 yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
-            waiting = (SourcePlace(file, number, start + first), content, [(start + first, 0)])
+            waiting = (tree.SourcePlace(file, number, start + first), content, [(start + first, 0)])
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
         yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
 
 
-def value(block: ConversationalBlock, column: int) -> tuple[Expression, int]:
+def value(block: ConversationalBlock, column: int) -> tuple[tree.Expression, int]:
     """The number or parameter at a column of the block's text, and the column after it. Raises ProgramFault."""
     while block.text[column : column + 1] == " ":
         column += 1
@@ -129,7 +120,7 @@ def value(block: ConversationalBlock, column: int) -> tuple[Expression, int]:
     match = _NUMBER.match(block.text, column)
     if match is None:
         raise block.fault("a number or a Q parameter is expected here, such as +12.5 or Q3", column)
-    return Number(float(match.group())), match.end()
+    return tree.Number(float(match.group())), match.end()
 
 
 class Formula(TokenReader):
@@ -148,31 +139,31 @@ class Formula(TokenReader):
         self.block = block
         super().__init__(block.text, column)
 
-    def read(self) -> Expression:
+    def read(self) -> tree.Expression:
         """The formula. Raises ProgramFault."""
         found = self.expression()
         if not self.ended:
             raise self.fault("an operator is expected here: + - * / ^")
         return found
 
-    def fault(self, message: str, at: int | None = None) -> ProgramFault:
+    def fault(self, message: str, at: int | None = None) -> tree.ProgramFault:
         return self.block.fault(message, self.column() if at is None else at)
 
     def expect(self, text: str) -> None:
         if not self.take(text):
             raise self.fault(f"{text} is missing")
 
-    def operand(self, token: Token) -> Expression | None:
+    def operand(self, token: Token) -> tree.Expression | None:
         text = token.text
         if token.kind == "number":
-            return Number(float(text))
+            return tree.Number(float(text))
         if re.fullmatch(r"Q\d+", text) and int(text[1:]) < PARAMETERS:
             return parameter(int(text[1:]))
         if text == "PI":
-            return Number(math.pi)
+            return tree.Number(math.pi)
         if text == "SQ":
             operand = self.value()
             return operand * operand
         if text == "NEG":
             return -self.value()
-        return op(text, self.value()) if text in _FUNCTIONS else None
+        return tree.op(text, self.value()) if text in _FUNCTIONS else None

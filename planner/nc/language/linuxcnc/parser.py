@@ -16,25 +16,11 @@ from __future__ import annotations
 
 import re
 
+from planner.nc.language import tree
 from planner.nc.language.linuxcnc.control import KEYWORDS, LinuxcncControl, end_of
 from planner.nc.language.linuxcnc.text import ARGUMENTS_MAX, LANGUAGE, SPELLING
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
-from planner.nc.language.tree import (
-    Call,
-    Expression,
-    Line,
-    Message,
-    Modes,
-    Named,
-    Number,
-    Numbered,
-    PlainRows,
-    Procedure,
-    ProgramFault,
-    Return,
-    SourcePlace,
-)
 
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
@@ -47,32 +33,32 @@ class LinuxcncParser(LinuxcncControl):
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
-        self.faults: list[ProgramFault] = []
+        self.faults: list[tree.ProgramFault] = []
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
 
-    def parse(self) -> list[Procedure]:
+    def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
         for item in self.source.in_order():
-            if isinstance(item, PlainRows):
+            if isinstance(item, tree.PlainRows):
                 self._plain(item)
                 continue
             try:
                 self._line(item)
-            except ProgramFault as fault:
+            except tree.ProgramFault as fault:
                 self.faults.append(fault)
         for left in self.open[:1] if not self.faults else ():
             self.faults.append(
-                ProgramFault(
+                tree.ProgramFault(
                     left.place, f"this {left.kind} has no end; write o{left.label} {end_of(left.kind)}"
                 )
             )
         return [
-            Procedure(_PROGRAM, SourcePlace(self.source.file, 1, 0), self.main),
+            tree.Procedure(_PROGRAM, tree.SourcePlace(self.source.file, 1, 0), self.main),
             *self.procedures.values(),
         ]
 
-    def _plain(self, rows: PlainRows) -> None:
+    def _plain(self, rows: tree.PlainRows) -> None:
         in_main = self.body is self.main
         if not (in_main and self.ended):
             self.body.append(rows)
@@ -88,10 +74,10 @@ class LinuxcncParser(LinuxcncControl):
         elif line.row >= 0 and not self._code(reader, line):
             words, assignments = reader.words_and_assignments(line.scale)
             for word in words:
-                if word.letter == ord("N") and not isinstance(word.value, Number):
+                if word.letter == ord("N") and not isinstance(word.value, tree.Number):
                     raise line.fault("a line number is written in digits", word.at)
             if words or assignments:
-                self.body.append(Line(line.place, words, assignments))
+                self.body.append(tree.Line(line.place, words, assignments))
         self._messages(reader, line)
 
     def _messages(self, reader: LineReader, line: SourceLine) -> None:
@@ -99,7 +85,7 @@ class LinuxcncParser(LinuxcncControl):
             kind, comma, text = comment.partition(",")
             if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
                 expanded = kind.strip().upper() != "MSG"
-                self.body.append(Message(line.place, _pieces(text) if expanded else (text,)))
+                self.body.append(tree.Message(line.place, _pieces(text) if expanded else (text,)))
 
     # --- codes that are control flow ------------------------------------------------------------------------------------------
 
@@ -112,19 +98,19 @@ class LinuxcncParser(LinuxcncControl):
         reader.at = match.end()
         if code in _MODES:
             self._nothing_left(reader, f"M{code}")
-            self.body.append(Modes(line.place, _MODES[code]))
+            self.body.append(tree.Modes(line.place, _MODES[code]))
         elif code == 98:
             words, _ = reader.words_and_assignments()
             given = {chr(word.letter): word.value for word in words}
             if "P" not in given or set(given) - {"P", "L"}:
                 raise line.fault("M98 takes P with the number of a subprogram, and L with its repetitions")
             name = _constant_name(given["P"])
-            self.body.append(Call(line.place, name, None, "M98", given.get("L", Number(1.0))))
+            self.body.append(tree.Call(line.place, name, None, "M98", given.get("L", tree.Number(1.0))))
         else:
             self._nothing_left(reader, "M99")
             if not self.plain_sub:
                 raise line.fault("M99 ends a subprogram; the main program ends with M2 or M30")
-            self.body.append(Return(line.place))
+            self.body.append(tree.Return(line.place))
             if not self.open:
                 self.base = self.body = self.main
                 self.plain_sub = ""
@@ -151,11 +137,11 @@ class LinuxcncParser(LinuxcncControl):
             self._control(keyword, label, condition, line)
         self._nothing_left(reader, f"o... {keyword}")
 
-    def _label(self, reader: LineReader) -> str | Expression:
+    def _label(self, reader: LineReader) -> str | tree.Expression:
         if reader.peek() == "<":
             return reader.name()
         value = reader.value()
-        return _constant_name(value) if isinstance(value, Number) else value
+        return _constant_name(value) if isinstance(value, tree.Number) else value
 
     def _plain_program(self, label: str, line: SourceLine) -> None:
         """O100 alone: a program number, or a subprogram if an M99 follows before the next one."""
@@ -172,8 +158,8 @@ class LinuxcncParser(LinuxcncControl):
         match = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
         return match is not None and match.group(1) is not None
 
-    def _call(self, reader: LineReader, line: SourceLine, label: str | Expression) -> None:
-        arguments: list[Expression] = []
+    def _call(self, reader: LineReader, line: SourceLine, label: str | tree.Expression) -> None:
+        arguments: list[tree.Expression] = []
         while reader.peek() == "[":
             arguments.append(reader.bracket())
         if len(arguments) > ARGUMENTS_MAX:
@@ -181,7 +167,7 @@ class LinuxcncParser(LinuxcncControl):
         word = f"o<{label}> call" if isinstance(label, str) and not label.isdigit() else "o call"
         if isinstance(label, str) and label.isdigit():
             word = f"o{label} call"
-        self.body.append(Call(line.place, label, tuple(enumerate(arguments, 1)), word))
+        self.body.append(tree.Call(line.place, label, tuple(enumerate(arguments, 1)), word))
 
     def _nothing_left(self, reader: LineReader, after: str) -> None:
         if not reader.ended:
@@ -194,8 +180,8 @@ _NEXT_PROGRAM = re.compile(
 )
 
 
-def _constant_name(value: Expression) -> str | Expression:
-    if isinstance(value, Number):
+def _constant_name(value: tree.Expression) -> str | tree.Expression:
+    if isinstance(value, tree.Number):
         return f"{value.value:.0f}" if value.value == round(value.value) else f"{value.value:g}"
     return value
 
@@ -203,17 +189,19 @@ def _constant_name(value: Expression) -> str | Expression:
 _PARAMETER = re.compile(r"#(?:<([^<>]*)>|(\d+))")
 
 
-def _pieces(text: str) -> tuple[str | Named | Numbered, ...]:
+def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:
     """The text of a message with its parameters."""
-    pieces: list[str | Named | Numbered] = []
+    pieces: list[str | tree.Named | tree.Numbered] = []
     done = 0
     for found in _PARAMETER.finditer(text):
         pieces.append(text[done : found.start()])
         done = found.end()
         if found.group(2):
             number = float(found.group(2))
-            pieces.append(Numbered(Number(number)) if 1 <= number <= LANGUAGE.largest else found.group())
+            pieces.append(
+                tree.Numbered(tree.Number(number)) if 1 <= number <= LANGUAGE.largest else found.group()
+            )
         else:
             name = re.sub(r"\s", "", found.group(1)).lower()
-            pieces.append(Named(name, name.startswith("_")))
+            pieces.append(tree.Named(name, name.startswith("_")))
     return (*pieces, text[done:])

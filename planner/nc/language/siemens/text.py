@@ -14,23 +14,13 @@ from __future__ import annotations
 import math
 import re
 
+from planner.nc.language import tree
 from planner.nc.language.arithmetic import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
-from planner.nc.language.tree import (
-    ONE,
-    Expression,
-    Language,
-    Named,
-    Number,
-    Numbered,
-    ProgramFault,
-    SourcePlace,
-    op,
-)
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
-LANGUAGE = Language(
+LANGUAGE = tree.Language(
     operations=ARITHMETIC | {("MOD", 2): "fmod({0},{1})"},
     conditions=COMPARISONS | LOGICAL,
     locals=0,
@@ -47,19 +37,19 @@ _CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
 
 
-def position(axis: str) -> Numbered:
+def position(axis: str) -> tree.Numbered:
     """Where the axis is, in the program's coordinates."""
-    return Numbered(Number(float(FIRST_POSITION + "XYZ".index(axis))))
+    return tree.Numbered(tree.Number(float(FIRST_POSITION + "XYZ".index(axis))))
 
 
-def variable(name: str) -> Named:
+def variable(name: str) -> tree.Named:
     """A variable of the program, or of the reader's own: each call has its own ones."""
-    return Named(name.lower(), False)
+    return tree.Named(name.lower(), False)
 
 
-def handed_over(number: int) -> Named:
+def handed_over(number: int) -> tree.Named:
     """The value of that number, from 0, that a call hands to a subprogram."""
-    return Named(f"_value {number}", True)
+    return tree.Named(f"_value {number}", True)
 
 
 class LineTokens(TokenReader):
@@ -77,12 +67,12 @@ class LineTokens(TokenReader):
     ranks = ranked("OR XOR", "AND", "== <> > >= < <=", "+ -", "* / DIV MOD")
     meant = {"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"}  # noqa: RUF012
 
-    def __init__(self, text: str, place: SourcePlace, start: int, names: set[str]):
+    def __init__(self, text: str, place: tree.SourcePlace, start: int, names: set[str]):
         self.place, self.start, self.names = place, start, names
         super().__init__(text)
 
-    def fault(self, message: str, at: int | None = None) -> ProgramFault:
-        return ProgramFault(
+    def fault(self, message: str, at: int | None = None) -> tree.ProgramFault:
+        return tree.ProgramFault(
             self.place._replace(at=self.start + (self.column() if at is None else at)), message
         )
 
@@ -90,7 +80,7 @@ class LineTokens(TokenReader):
         """Byte offset of the next token."""
         return self.start + self.column()
 
-    def value(self) -> Expression:
+    def value(self) -> tree.Expression:
         if not self.ended and self.tokens[self.next].kind == "word":
             self._take_apart()
         return super().value()
@@ -104,13 +94,13 @@ class LineTokens(TokenReader):
             parts += [Token("sign", word.text[1], word.at + 1), Token("number", word.text[2:], word.at + 2)]
         self.tokens[self.next : self.next + 1] = parts
 
-    def operand(self, token: Token) -> Expression | None:
+    def operand(self, token: Token) -> tree.Expression | None:
         name = token.text
         if name == "NOT":
-            return op(name, self.value())
+            return tree.op(name, self.value())
         if token.kind == "number":
             mantissa, _, exponent = name.partition("EX")
-            return Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
+            return tree.Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
         if token.kind != "name":
             return None
         if name in _FUNCTIONS or name in _TWO:
@@ -120,9 +110,9 @@ class LineTokens(TokenReader):
                 self.expect(",")
                 operands.append(self.expression())
             self.expect(")")
-            return op(_TWO.get(name, name), *operands)
+            return tree.op(_TWO.get(name, name), *operands)
         if name in _CONSTANTS:
-            return Number(_CONSTANTS[name])
+            return tree.Number(_CONSTANTS[name])
         if _SYSTEM.match(name) and self.take("["):
             axis = self.peek()
             self.next += 1
@@ -135,15 +125,15 @@ class LineTokens(TokenReader):
             raise self.fault(f"{name} is not declared; write DEF REAL {name} before", token.at)
         return parameter
 
-    def parameter(self, token: Token) -> Numbered | Named | None:
+    def parameter(self, token: Token) -> tree.Numbered | tree.Named | None:
         """R parameter or variable of that name, whose index may follow; None if there is none."""
         if token.text == "R" and self.take("["):
             index = self.expression()
             self.expect("]")
-            return Numbered(index + ONE)
+            return tree.Numbered(index + tree.ONE)
         if re.fullmatch(r"R\d+", token.text):
             number = int(token.text[1:])
             if number >= PARAMETERS:
                 raise self.fault(f"{token.text}: there are R0 to R{PARAMETERS - 1}", token.at)
-            return Numbered(Number(float(number + 1)))
+            return tree.Numbered(tree.Number(float(number + 1)))
         return variable(token.text) if token.text in self.names else None

@@ -82,8 +82,13 @@ class Kernel:
         """numba's dispatcher of it for Python."""
         from planner.base.compiling import KernelCache, whole
 
-        cache = KernelCache(self.py_func, self.content if self._cache else None, _begins, _ends, _warn)
-        return whole(self.py_func, self._settings, cache)
+        with _one_at_a_time:  # or threads that call it first would each compile it
+            if "whole" not in vars(self):
+                cache = KernelCache(
+                    self.py_func, self.content if self._cache else None, _begins, _ends, _warn
+                )
+                vars(self)["whole"] = whole(self.py_func, self._settings, cache)
+            return vars(self)["whole"]
 
     @cached_property
     def part(self) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numba
 import numpy as np
 import pytest
@@ -89,6 +91,17 @@ def test_a_part_is_no_machine_code() -> None:
     assert twice(np.ones(9), 3) == 2.0 / 3.0
     (made,) = share.part.overloads.values()
     assert made.library.get_pointer_to_function(made.fndesc.llvm_func_name) == 0
+
+
+def test_threads_that_call_a_kernel_first_compile_it_once() -> None:
+    @njit(cache=False, nogil=True)
+    def third(x):
+        return x / 3.0
+
+    with ThreadPoolExecutor(8) as pool:
+        assert set(pool.map(third, [6.0] * 16)) == {2.0}
+        assert len(set(pool.map(lambda _: id(third.whole), range(16)))) == 1
+    assert sum(third.whole.stats.cache_misses.values()) == 1
 
 
 def test_code_is_for_a_level_of_the_architecture_that_the_processor_has(

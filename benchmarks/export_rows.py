@@ -46,7 +46,7 @@ NEEDS_TOOL = "cutter compensation"
 ROUNDING = 0.01  # that rs274 prints lengths with, in inches at worst [mm]
 HAS_RS274 = shutil.which("rs274") is not None
 # Sizes of a folder's programs [bytes], above which less work and a coarser period of the setpoints [s] make them cheap enough.
-QUICK_ABOVE, CLOSED_ABOVE = 5_000, 45_000
+CLOSED_ABOVE = 5_000
 COARSE_ABOVE, COARSE_DT = 250_000, 0.004
 ONE_PLACE_ABOVE = 250_000  # bytes; smaller ones are read back from all starts
 TURN = Axis(
@@ -248,11 +248,7 @@ def _work(size: int) -> tuple[dict[str, Any], str, float]:
     """Settings of `plan` for a program of so many bytes, what the table says of them, and the least period of the setpoints [s]."""
     if size > COARSE_ABOVE:
         return {"method": CLOSED_FORM}, f"{CLOSED_FORM}, {COARSE_DT * 1e3:g} ms", COARSE_DT
-    if size > CLOSED_ABOVE:
-        return {"method": CLOSED_FORM}, CLOSED_FORM, 0.0
-    if size > QUICK_ABOVE:
-        return {"effort": "quick"}, "optimal, quick", 0.0
-    return {}, "optimal", 0.0
+    return ({"method": CLOSED_FORM}, CLOSED_FORM, 0.0) if size > CLOSED_ABOVE else ({}, "optimal", 0.0)
 
 
 def _stands_alone(program: Program) -> bool:

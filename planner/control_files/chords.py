@@ -204,11 +204,15 @@ def _rounded(points: FloatArray) -> FloatArray:
 
 
 def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
-    """(T,) setpoints that are vertices: ends, standstills, where rapid moves begin and end, and the last before each of the breaks."""
+    """(T,) setpoints that are vertices: ends, standstills, those beside turning back, where rapid moves begin and end, and the last
+    before each of the breaks."""
     fixed = np.zeros(len(trajectory), dtype=bool)
     fixed[[0, -1]] = True
     at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
     fixed |= at_rest
+    back = (trajectory.velocity[1:] * trajectory.velocity[:-1]).sum(axis=1) < 0.0
+    fixed[1:] |= back
+    fixed[:-1] |= back
     rapid = plan.program.kind[trajectory.block] == Kind.RAPID
     fixed[:-1] |= rapid[1:] != rapid[:-1]
     if len(breaks):
@@ -230,11 +234,14 @@ def _density(trajectory: Trajectory, within: float) -> FloatArray:
 
 
 def _misses(position: FloatArray, rows: Array, points: FloatArray) -> FloatArray:
-    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1, A) at `rows`."""
+    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1, A) at `rows`; or how far
+    they go back along it, if that is more: a way there and back lies on the chord, which would leave it out."""
     move = np.clip(np.searchsorted(rows, np.arange(len(position)), side="right") - 1, 0, len(rows) - 2)
     a, b = points[move], points[move + 1]
     chord = b - a
     size = (chord * chord).sum(axis=1)
     u = np.divide(((position - a) * chord).sum(axis=1), size, out=np.zeros(len(position)), where=size > 0)
     off: FloatArray = np.linalg.norm(position - a - np.clip(u, 0.0, 1.0)[:, None] * chord, axis=1)
-    return off
+    along = u * np.sqrt(size)
+    along += move * 2.0 * float(np.abs(along).max(initial=1.0))  # each move above all before it
+    return np.maximum(off, np.maximum.accumulate(along) - along)

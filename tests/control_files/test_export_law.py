@@ -64,6 +64,19 @@ def test_words_that_do_not_tell_where_an_axis_is(told: str) -> None:
             assert alike(there, back, TOLERANCE)
 
 
+@pytest.mark.parametrize("code", ["G0", "G1"])
+def test_the_way_there_and_back_is_not_left_out(code: str) -> None:
+    """It lies on a straight line, and the motion turns between two setpoints: no setpoint is off a chord that leaves it out."""
+    mill = machine()
+    for there, back in ((13.7, 9.31), (14.2, 10.07), (12.9, 3.3)):
+        text = f"G21 G90\nG0 X0 Y0\nG1 X6.1 F3000\n{code} X{there}\nX{back}\nX{there + 2.0}\nG1 Y5\nX1\n"
+        job = Candidates(_planned(text), CONTROLS["grbl"], TOLERANCE)
+        (one,) = job.chords(1e-3, "chords")
+        place = (STARTS[1], OFFSETS[1])
+        out = job.written(one)[0].decode()
+        assert alike(path(text, mill, *place), path(out, mill, *place), TOLERANCE)
+
+
 def test_after_a_tool_change_the_first_moves_are_the_programs_own() -> None:
     text = "G21 G90\nG0 X0 Y0 Z5\nG1 X9 F900\nT2 M6\nG1 Y4\nG0 X2 Y2\nZ1\nG1 X8 Y3\n"
     job = Candidates(_planned(text), CONTROLS["grbl"], TOLERANCE)

@@ -154,8 +154,8 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver | I
     for start in starts:
         first = not why
         least = start.lasting(k) if first else least
-        if run.exact:
-            why.append("G61 asks for the exact path")
+        if run.left:
+            why.append(run.left)
             break
         guess = start.guess(k, run)
         if isinstance(solver, InTwo):

@@ -69,7 +69,7 @@ def _share_kept(start: Start, found: list[FoundRun], kept: list[int]) -> float:
     """Share of the time on which the start's motion stays [-]."""
     stays = 0.0
     for k, one in enumerate(found):
-        if one.run.exact:  # there is nothing to be found
+        if one.run.left:  # there is nothing to be found
             continue
         if k in kept or one.steps is None:
             stays += start.lasting(k)

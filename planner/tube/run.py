@@ -30,6 +30,7 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.constraints import normal_limit
 from planner.corners.allocation import allocate, error_rate
+from planner.geometry.build import path_per_length
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
@@ -37,6 +38,7 @@ from planner.machine import Machine
 # Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
 # turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+ROUNDING = 1e-9  # of the length in all axes over that of F [-]
 
 
 class Budgets(NamedTuple):
@@ -62,7 +64,7 @@ class TubeRun:
                                    where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
-    exact                        : some of it is to be followed exactly, which the search cannot
+    left                         : why the search cannot look for a motion here, "" if it can
     """
 
     axis: Array
@@ -83,7 +85,7 @@ class TubeRun:
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
-    exact: bool = False
+    left: str = ""
 
     def __post_init__(self) -> None:
         legs, axes = len(self.length), len(self.axis)
@@ -165,11 +167,10 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
-        exact = bool(toolpath.exact[first[0] : first[-1]].any())
         held = budgets.across < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
         yield TubeRun(
             axis=np.flatnonzero(moves),
-            exact=exact,
+            left=_left(toolpath, slice(first[0], first[-1])),
             first=first,
             curvature=toolpath.curvature[row],
             budget=budgets.leg,
@@ -180,6 +181,17 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             **{name: limit[moves] for name, limit in limits.items()},
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
+
+
+def _left(toolpath: Toolpath, part: slice) -> str:
+    """Why segments are left as they are. On a leg the feed is that along all axes: inside the tolerance x, y and z might take what the
+    rotary axes need not, and F with them be exceeded."""
+    if toolpath.exact[part].any():
+        return "G61 asks for the exact path"
+    per = path_per_length(toolpath.axes, toolpath.radius, toolpath)[part]
+    if (np.isfinite(toolpath.feed[part]) & (per > 1.0 + ROUNDING)).any():
+        return "F goes by some of the axes that move"
+    return ""
 
 
 def budgets_of(toolpath: Toolpath, machine: Machine, first: Array) -> Budgets:

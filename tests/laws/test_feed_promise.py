@@ -12,6 +12,7 @@ from quick import slow_but
 import planner
 from benchmarks.feed_promise import KEPT, METHODS, case, outcome, row
 from benchmarks.passages import Motion, saved
+from planner.machine import Axis, load_machine
 
 
 @pytest.mark.parametrize("method", METHODS[1:])
@@ -81,3 +82,17 @@ def test_blocks_that_are_cut_off_take_no_time():
     motion, points = run_at(np.full(4, 100.0), [[0, 0], *spike, [4, 0]])
     found = saved(motion, points, np.array([0.2, 1e-5, 0.2]), feeds)
     assert found == pytest.approx(0.2 / 0.1 - 0.2 / 100.0, abs=0.05)
+
+
+@pytest.mark.parametrize("method", ["second-order", pytest.param("optimal", marks=pytest.mark.slow)])
+def test_x_y_and_z_keep_f_where_a_rotary_axis_moves_too(tmp_path, method):
+    """Round corners inside the tolerance they may not take what the rotary axis need not. 2e-4 is left for places between points."""
+    mill = load_machine("mill")
+    turning = {"a": Axis(velocity=120.0, acceleration=1000.0, jerk=20000.0)}
+    job = tmp_path / "turning.ngc"
+    moves = "G1 X3 A20 F600\nG1 X4 Y0.2 A26\nG1 X7 Y1 A26\nG1 X8 Y3 A60\nG1 X8.4 Y6 A62"
+    job.write_text(f"G21 G90 G94\nG64 P0.3\nG0 X0 Y0 A0\n{moves}\nM2\n")
+    plan = planner.plan(job, machine=mill.model_copy(update={"axes": mill.axes | turning}), method=method)
+    assert plan.verdict.passed, plan.verdict.faults
+    linear = [plan.trajectory.axes.index(axis) for axis in "xy"]
+    assert np.linalg.norm(plan.trajectory.velocity[:, linear], axis=1).max() <= 600 / 60 * (1 + 2e-4)

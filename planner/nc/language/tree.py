@@ -45,21 +45,21 @@ class Value:
         return Number(-self.value) if isinstance(self, Number) else op(NEGATIVE, self)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(unsafe_hash=True, slots=True)
 class Number(Value):
     """A number as it is written."""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(unsafe_hash=True, slots=True)
 class Numbered(Value):
     """A parameter by its number, which may be computed."""
 
     index: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(unsafe_hash=True, slots=True)
 class Named(Value):
     """A parameter by its name; `shared` ones are the same in all calls."""
 
@@ -67,7 +67,7 @@ class Named(Value):
     shared: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(unsafe_hash=True, slots=True)
 class Operation(Value):
     """An operator or function of the language, by its name there, on its operands."""
 
@@ -75,7 +75,7 @@ class Operation(Value):
     operands: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(unsafe_hash=True, slots=True)
 class Exists(Value):
     """1 if the parameter has a value, else 0."""
 

@@ -23,9 +23,7 @@ from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.nc.reader import parse_program
 from planner.optimal.effort import EFFORTS, Search
 from planner.tube.own import WINDOW
-from planner.verify import Fault, Kind
 
-MADE_UP = Fault(kind=Kind.LIMIT, name="limit", found="made up")
 JOBS = problems.all_jobs()
 MACHINE = problems.machine()
 # Cycle time on single corners, over the bound without jerk limits [-]: where corners follow closely, jerk is what holds them.

@@ -8,6 +8,9 @@ So a slow block is not hidden in a period in which others are run through too: w
 tolerance lets a motion cut a block off, nothing is run of it. Where speeds were delivered they are compared with the F at their places
 too.
 
+F is the speed in x, y and z alone where these move, in u, v and w where only those do, else in the rotary axes. Beside a corner the
+parts of a motion in these axes differ from those of its block, so the chord in them alone is compared with F, too.
+
 So far as sampling does not tell where a block begins and ends (`reach` in switches.py) a place belongs to both, and the larger F
 counts.
 """
@@ -20,7 +23,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.verify.excess import NAMES, Spans
 from planner.verify.kernel import kernel
 from planner.verify.limits import COLUMN, DIFFERENCE
-from planner.verify.pieces import RATIO_ROUNDING, ProgramPieces
+from planner.verify.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
 from planner.verify.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
 
 
@@ -34,7 +37,9 @@ class Feeds:
     over : takes where the feed is exceeded
     """
 
-    def __init__(self, pieces: ProgramPieces, bounds: Bounds, over: Spans):
+    def __init__(self, pieces: ProgramPieces, bounds: Bounds, over: Spans, axes: tuple[str, ...] = ()):
+        groups = axis_groups(axes)
+        self._groups = groups if (groups > 0).any() else groups[:0]
         self.row, self.time, self.at, self.piece = np.zeros(4), 0.0, np.zeros(pieces.vertex.shape[1]), 0
         self._pieces, self._bounds, self._switches, self._over = (
             pieces,
@@ -69,8 +74,9 @@ class Feeds:
             return
         worst, sample, over = self.row.copy(), np.full(1, -1, dtype=np.int64), np.zeros(len(chords.t))
         known = int(self._switches.state[OPEN])
+        switch = self._switches.switch
         done = _judged(
-            self._pieces, self._switches.switch, known, self._block, chords, until, worst, sample, over
+            self._pieces, self._groups, switch, known, self._block, chords, until, worst, sample, over
         )
         if over.any():
             self._over.add(NAMES.index("feed"), chords.t, over)
@@ -89,6 +95,7 @@ class Feeds:
 @kernel()
 def _judged(
     pieces: ProgramPieces,
+    groups: Array,
     switch: Array,
     known: int,
     block: Array,
@@ -99,7 +106,10 @@ def _judged(
     over: FloatArray,
 ) -> int:
     """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and `over` (n,); vertices before
-    `known` are settled. -> the first one that is left"""
+    `known` are settled. -> the first one that is left
+
+    groups : (A,) of the axes (`axis_groups`), (0,) where F counts all of them
+    """
     n = len(chords.t)
     for k in range(1, n):
         begin, end = chords.place[k - 1], chords.place[k]
@@ -123,10 +133,27 @@ def _judged(
             lasts += (next_at - at) / feed
             at = next_at
         step, h = end - begin, chords.t[k] - chords.t[k - 1]
+        if len(groups) and h > 0.0:
+            least, value, word = np.inf, 0.0, np.inf
+            for i in range(block[0], known):
+                if switch[i]["begin"] > end:
+                    break
+                square = 0.0
+                for a in range(len(groups)):
+                    if groups[a] == pieces.piece[i]["by"]:
+                        square += (chords.position[k, a] - chords.position[k - 1, a]) ** 2
+                part = max(np.sqrt(square) - chords.error[k] - chords.error[k - 1], 0.0) / h
+                if part < least * pieces.piece[i]["word"]:
+                    least, value, word = part / pieces.piece[i]["word"], part, pieces.piece[i]["word"]
+            if least > 1.0 + RATIO_ROUNDING and least < np.inf:
+                over[k] = least
+            if least > worst[0] and least < np.inf:
+                worst[0], worst[1], worst[2], worst[3] = least, value, word, DIFFERENCE
+                sample[0] = k
         if step > 0.0 and lasts > 0.0:
             value = max(step - chords.error[k] - chords.error[k - 1], 0.0) / h
             if value * lasts > (1.0 + RATIO_ROUNDING) * step:
-                over[k] = value * lasts / step
+                over[k] = max(over[k], value * lasts / step)
             if value * lasts > worst[0] * step:
                 worst[0], worst[1], worst[2], worst[3] = value * lasts / step, value, step / lasts, DIFFERENCE
                 sample[0] = k

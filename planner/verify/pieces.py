@@ -43,7 +43,16 @@ NEWTON_STEPS = 8  # quadratic from the polar angle; four suffice for a helix who
 
 
 PIECE = np.dtype(
-    [("budget", "f8"), ("feed", "f8"), ("x0", "f8"), ("x1", "f8"), ("arc", "i8"), ("segment", "i8")]
+    [
+        ("budget", "f8"),
+        ("feed", "f8"),
+        ("word", "f8"),
+        ("by", "i8"),
+        ("x0", "f8"),
+        ("x1", "f8"),
+        ("arc", "i8"),
+        ("segment", "i8"),
+    ]
 )
 JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
@@ -53,8 +62,8 @@ class ProgramPieces(NamedTuple):
 
     vertex : (N+1, A) [mm]
     joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the program
-    piece  : (N,) `PIECE`: budget [mm]; feed [mm/s]; x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of
-             an arc, -1 for a line, -2 - row of a curve; segment
+    piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone; x0, x1 range of the
+             arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a line, -2 - row of a curve; segment
     frame  : (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
     turn   : (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
     """
@@ -108,6 +117,8 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
     piece = np.zeros(len(segment), dtype=PIECE)
     piece["budget"] = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])[segment]
     piece["feed"] = toolpath.feed[segment]
+    by, part = counted_axes(toolpath)
+    piece["by"], piece["word"] = by[segment], (part * toolpath.feed)[segment]
     piece["x0"], piece["x1"] = x0, x1
     piece["arc"], piece["segment"] = arc, segment
     joint = np.zeros(len(vertex), dtype=JOINT)
@@ -116,6 +127,24 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
     joint["real"][at] = True
     joint["stop"][at] = toolpath.joint == Joint.STOP
     return ProgramPieces(vertex=vertex, joint=joint, piece=piece, frame=frame, turn=turn)
+
+
+def axis_groups(axes: tuple[str, ...]) -> Array:
+    """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the axes of the first group that moves."""
+    return np.array(
+        [("xyz", "uvw", "abc").index(next(g for g in ("xyz", "uvw", "abc") if a in g)) for a in axes]
+    )
+
+
+def counted_axes(toolpath: Toolpath) -> tuple[Array, FloatArray]:
+    """(M,) the group that F counts on each segment, and (M,) its share of the length in all axes [-]."""
+    groups, change = axis_groups(toolpath.axes), toolpath.end - toolpath.start
+    turned = (toolpath.arc >= 0) | (toolpath.curve >= 0)
+    squares = np.stack([(change[:, groups == k] ** 2).sum(axis=1) for k in range(3)])
+    squares[0, turned] = toolpath.length[turned] ** 2 - squares[1:, turned].sum(axis=0)
+    by: Array = np.argmax(squares > PLACE_ROUNDING**2, axis=0)
+    share: FloatArray = np.sqrt(np.maximum(squares[by, np.arange(len(by))], 0.0)) / toolpath.length
+    return by, share
 
 
 def widened(pieces: ProgramPieces, factor: float = 1.0, more: float = 0.0) -> ProgramPieces:

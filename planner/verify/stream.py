@@ -104,6 +104,7 @@ class Watch:
                 acceleration=float(np.linalg.norm(limits.acceleration_at_stop)),
             ),
             self.seen.over,
+            limits.axes,
         )
 
     def take(self, chunk: Trajectory) -> None:

@@ -1,9 +1,14 @@
 """F holds, block by block: the feed is that of the block on which the motion is, whatever the tolerance and the period."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from motions import Moves, along, chain, helix, machine, polyline, rest_to_rest, sample, stay
 
+import planner
+from planner.machine import Axis, load_machine
+from planner.nc.reader import parse_program
 from planner.verify import Given, verify
 
 A, J = 2000.0, 2e5
@@ -171,3 +176,26 @@ def test_room_for_chords_grows_with_a_motion_that_lingers(monkeypatch):
     monkeypatch.setattr("planner.verify.switches.ROOM", 4)
     narrow = judged(motion, toolpath, m)
     assert narrow.limits["feed"].ratio == wide.limits["feed"].ratio
+
+
+@pytest.mark.parametrize("swing", [0.0, 0.2])
+def test_f_counts_x_y_and_z_alone_where_they_move_with_a_rotary_axis(swing):
+    """Inside the tolerance x may not take what the rotary axis need not: of a motion at 0.8 of the feed in all axes, whose parts in x
+    and in A swing against each other, x reaches 1.8 F."""
+    mill, F = load_machine("mill"), 10.0
+    turning = {"a": Axis(velocity=3600.0, acceleration=1e5, jerk=1e7)}
+    mill = mill.model_copy(update={"axes": mill.axes | turning, "tolerance": 1.0})
+    program = parse_program(f"G21 G64 P1\nG1 X20 A{np.rad2deg(40.0 / mill.radius):.9f} F{60 * F}\n", mill)
+    plan = planner.plan(program, mill, method="stop")
+    made = plan.trajectory
+    t = made.t / 0.8
+    across = np.zeros(len(made.axes))
+    across[[made.axes.index("x"), made.axes.index("a")]] = np.array([2.0, -1.0]) / np.sqrt(5.0)
+    rate = F / (across.max() * 0.2)
+    inner = np.clip(np.minimum(t, t[-1] - t) / 0.3, 0.0, 1.0)
+    position = made.position + (swing * inner * np.sin(rate * t))[:, None] * across
+    moved = dataclasses.replace(made, t=t, position=position)
+    verdict = verify(
+        moved, plan.toolpath, mill, given=POSITIONS, not_limited=("acceleration", "jerk", "velocity")
+    )
+    assert verdict.limits["feed"].ratio == pytest.approx(1.8 if swing else 0.8, rel=0.02)

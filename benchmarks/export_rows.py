@@ -220,11 +220,11 @@ def of_file(file: Path, machine: Machine) -> list[Row]:
     reading = Reading(extruder="ignore")
     try:
         program, machine = _read(file, machine, reading)
+        settings, said, dt = _work(file.stat().st_size)
+        machine = machine.model_copy(update={"dt": max(machine.dt, dt)})
+        plan = planner.plan(program, machine, tolerance=0.9 * TOLERANCE, **settings)
     except InputError as fault:
         return _all(file, "not read", f"line {fault.line}: {fault.message}" if fault.line else fault.message)
-    settings, said, dt = _work(file.stat().st_size)
-    machine = machine.model_copy(update={"dt": max(machine.dt, dt)})
-    plan = planner.plan(program, machine, tolerance=0.9 * TOLERANCE, **settings)
     if _is_unplanned(plan):
         return _all(file, "not planned", plan.sentence)
     text = file.read_bytes().decode("utf-8", "replace")

@@ -229,14 +229,15 @@ def test_random_programs_hold_what_exports_may_lose() -> None:
 
 @pytest.mark.slow
 def test_real_programs(shared_dir: Path) -> None:
-    """The smaller ones: what is written reads back on the same places; what is not is refused by its line."""
+    """The smallest ones; `benchmarks.exports --programs` has all. What is written reads back on the same places; what is not is refused
+    by its line."""
     mill = load_machine("mill")
     files = [
         file
         for file in sorted((shared_dir / "nc").iterdir())
-        if file.suffix != ".csv" and file.stat().st_size < 40_000
+        if file.suffix != ".csv" and file.stat().st_size < 2_300
     ]
     rows = [row for file in files for row in of_file(file, mill)]
-    assert len(rows) > 4 * 10
+    assert len(rows) == 4 * 3
     assert not [row for row in rows if row.broken]
     assert all(row.why.startswith("line ") for row in rows if row.outcome == "refused")

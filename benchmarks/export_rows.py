@@ -204,14 +204,15 @@ def of_file_within(file: Path, machine: Machine, seconds: float) -> list[Row]:
     try:
         return of_file(file, machine)
     except TimeoutError:
-        return _all(file, "not tried", f"takes longer than {seconds:g} CPU s")
+        return unmade(file, "not tried", f"takes longer than {seconds:g} CPU s")
     except MemoryError:
-        return _all(file, "not tried", "takes more memory than there is")
+        return unmade(file, "not tried", "takes more memory than there is")
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
-def _all(file: Path, outcome: str, why: str) -> list[Row]:
+def unmade(file: Path, outcome: str, why: str) -> list[Row]:
+    """The rows of a program without exports."""
     return [Row(file.name, control, outcome, why) for control in CONTROLS]
 
 
@@ -224,9 +225,11 @@ def of_file(file: Path, machine: Machine) -> list[Row]:
         machine = machine.model_copy(update={"dt": max(machine.dt, dt)})
         plan = planner.plan(program, machine, tolerance=0.9 * TOLERANCE, **settings)
     except InputError as fault:
-        return _all(file, "not read", f"line {fault.line}: {fault.message}" if fault.line else fault.message)
+        return unmade(
+            file, "not read", f"line {fault.line}: {fault.message}" if fault.line else fault.message
+        )
     if _is_unplanned(plan):
-        return _all(file, "not planned", plan.sentence)
+        return unmade(file, "not planned", plan.sentence)
     text = file.read_bytes().decode("utf-8", "replace")
     original = Original(text, machine, reading, program if _stands_alone(program) else None)
     return [_exported(file, plan, original, control, said) for control in CONTROLS]

@@ -1,13 +1,13 @@
 """Exports judged: does an exported program pass the places that its program passes, wherever the machine stands and its zeros are?
 
-    python -m benchmarks.exports [--jobs N] [--first SEED] [--programs FOLDER] [--limit SECONDS] [--rows FILE] [--name RESULT]
+    python -m benchmarks.exports [--jobs N] [--first SEED] [--programs FOLDER] [--limit SECONDS] [--rows FILE [--kept]] [--name RESULT]
 
 Random programs (export_programs.py) are planned, a tenth of them with the default method, and exported to the four controls as each
 candidate that the exporter has: the program as it is, its own path in the control's words, the planned path as chords. Each is read
 back from three starts, in turn with two sets of work offsets, for LinuxCNC also by `rs274` where it is installed (export_judge.py).
 With `--programs`, the programs of a folder are exported as they would be; large ones are planned with less work and read back from one
 start (export_rows.py), as results/RESULT.md says of each. `--rows` keeps the rows of every job in a file, so that a run that is cut off
-goes on where it ended; rows of another state of the planner are made anew.
+goes on where it ended; rows of another state of the planner are made anew. `--kept` writes the result of those rows alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.export_judge import OFFSETS, STARTS
-from benchmarks.export_rows import HAS_RS274, Row, judged, of_file_within
+from benchmarks.export_rows import HAS_RS274, Row, judged, of_file_within, unmade
 from benchmarks.record import markdown, planner_state, write_results
 from planner.control_files.controls import CONTROLS
 from planner.machine import load_machine
@@ -34,18 +34,19 @@ REASONS = 12  # of refusals that the table names
 class Kept:
     """Rows by job, in a file of which each line is one job; without a file they are only remembered."""
 
-    def __init__(self, file: Path | None):
+    def __init__(self, file: Path | None, *, all_states: bool):
         self.file, self.state, self.rows = file, planner_state(), {}  # type: Path | None, str, dict[str, list[Row]]
-        self.seconds = 0.0
+        self.seconds, self.states = 0.0, Counter[str]()
         if file is not None and file.is_file():
             for line in file.read_text(encoding="utf-8").splitlines():
                 job = json.loads(line)
-                if job["planner"] == self.state:
+                if all_states or job["planner"] == self.state:
                     self._keep(job)
 
     def _keep(self, job: dict) -> None:  # type: ignore[type-arg]
         self.rows[job["job"]] = [Row(**row) for row in job["rows"]]
         self.seconds += job["cpu"]
+        self.states[job["planner"]] += 1
 
     def made(self, name: str, make: Callable[[], list[Row]]) -> list[Row]:
         """The rows of a job, as they were kept or are made now."""
@@ -76,17 +77,22 @@ def main() -> None:
     parser.add_argument("--programs", type=Path)
     parser.add_argument("--limit", type=float, default=600.0, help="CPU seconds of a program of the folder")
     parser.add_argument("--rows", type=Path, help="file in which the rows of the jobs are kept")
+    parser.add_argument("--kept", action="store_true", help="the rows that are kept there alone; make none")
     parser.add_argument("--name", default="exports")
     options = parser.parse_args()
-    kept = Kept(options.rows)
+    kept = Kept(options.rows, all_states=options.kept)
     random: list[Row] = []
-    for seed in range(options.first, options.first + options.jobs):
+    seeds = range(options.first, options.first + options.jobs)
+    for seed in sorted(int(name) for name in kept.rows if name.isdigit()) if options.kept else seeds:
         random += kept.made(f"{seed}", lambda seed=seed: judged(seed))  # type: ignore[misc]
     files: list[Row] = []
     if options.programs is not None:
         machine = load_machine("mill")
         given = [file for file in options.programs.iterdir() if file.suffix not in KEEP_OUT]
         for file in sorted(given, key=lambda file: (file.stat().st_size, file.name)):
+            if options.kept and file.name not in kept.rows:
+                files += unmade(file, "not tried", "not reached yet")
+                continue
             files += kept.made(
                 file.name,
                 lambda file=file: of_file_within(file, machine, options.limit),  # type: ignore[misc]
@@ -100,8 +106,12 @@ def main() -> None:
         "random": [asdict(row) for row in random if row.broken],
         "programs": [asdict(row) for row in files],
     }
-    said = [*(_of_random(random) if options.jobs else []), *(_of_files(files) if files else [])]
-    write_results(options.name, data, "\n".join([*said, f"\n{kept.seconds:,.0f} CPU s in all.\n"]))
+    said = [*(_of_random(random) if random else []), *(_of_files(files) if files else [])]
+    write_results(
+        options.name,
+        data,
+        "\n".join([*said, f"\n{kept.seconds:,.0f} CPU s in all; {_made_at(kept.states)}.\n"]),
+    )
 
 
 def _of_random(rows: list[Row]) -> list[str]:
@@ -115,6 +125,10 @@ def _of_random(rows: list[Row]) -> list[str]:
         "Refused, by the first reason:\n",
         _reasons(rows),
     ]
+
+
+def _made_at(states: Counter[str]) -> str:
+    return ", ".join(f"{count:,} programs at planner {state}" for state, count in states.most_common())
 
 
 def _by_rs274() -> str:

@@ -101,7 +101,7 @@ def main() -> None:
                 file.name, *(f"{row.control}: {row.outcome}" for row in files[-len(CONTROLS) :]), flush=True
             )
     data = {
-        "jobs": options.jobs,
+        "jobs": len({row.program for row in random}),
         "cpu": round(kept.seconds, 1),
         "random": [asdict(row) for row in random if row.broken],
         "programs": [asdict(row) for row in files],

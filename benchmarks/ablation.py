@@ -29,9 +29,7 @@ from planner.delivery import mending
 from planner.feedrate.jerk import window
 from planner.job import method
 from planner.methods import at_once, optimal
-from planner.methods.kinematic import KinematicMethod
 from planner.methods.optimal import OptimalMethod
-from planner.methods.stop import StopMethod
 from planner.optimal import behind_filters, geometry, loop, shaped, tighten
 from planner.optimal.effort import EFFORTS
 from planner.smoothing import initial, relax
@@ -69,22 +67,6 @@ def _starts(count: int) -> Switch:
         window.ScaledWindow._starts = lambda self, *way: islice(inner(self, *way), count)  # type: ignore[method-assign]
 
     return switch
-
-
-def _instead(*rivals: str) -> Switch:
-    """Only these of the rivals where chords between samples leave the tolerance."""
-
-    def those(self: OptimalMethod) -> tuple[method.Method, ...]:
-        if self.corner != "auto" or self.shaped:
-            return ()
-        made: dict[str, method.Method] = {"stop": StopMethod(join_lines=True), "kinematic": KinematicMethod()}
-        if self.effort != "quick":
-            made["quick"] = dataclasses.replace(self, effort="quick")
-        made |= {corner: dataclasses.replace(self, corner=corner) for corner in ("bezier", "fir")}
-        made["kinematic corners"] = dataclasses.replace(self, corner="kinematic")
-        return tuple(made[name] for name in rivals if name in made)
-
-    return lambda: setattr(OptimalMethod, "instead", property(those))
 
 
 def _fallback(kind: str) -> Switch:
@@ -137,12 +119,6 @@ SWITCHES: dict[str, tuple[Fires, Switch]] = {
     "fir corners as a whole plan": (
         _step("bound on corners fir", "compare optimal fir"),
         _set(loop, "fir_corners_may_be_faster", lambda *_: False),
-    ),
-    "rivals: all": (_step("another method"), _instead()),
-    "rivals: single corners": (_step("another method optimal"), _instead("stop", "kinematic", "quick")),
-    "rivals: less effort": (
-        _step("another method optimal auto"),
-        _instead("stop", "kinematic", "bezier", "fir", "kinematic corners"),
     ),
     "runs alone where the verdict finds something": (
         _step("runs alone"),

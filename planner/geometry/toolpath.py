@@ -207,10 +207,8 @@ class Toolpath:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and field.name != "zero_length":
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
-        for row, table in (
-            ("arc", "arcs"),
-            ("curve", "curves"),
-        ):  # of which each segment has a row of its own, in order
+        # each segment has a row of its own in these, in order
+        for row, table in (("arc", "arcs"), ("curve", "curves")):
             of_kept = columns[row] >= 0
             columns[table] = _rows(getattr(self, table), columns[row][of_kept])
             columns[row] = np.where(of_kept, np.cumsum(of_kept) - 1, -1)

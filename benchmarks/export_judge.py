@@ -185,6 +185,7 @@ def _walk(one, other, within):  # pragma: no cover - compiled
     return high == len(other) - 1 and reached[len(other) - 1]
 
 
+TOOLS = 99  # in the tool table that `rs274` is given
 _CANON = re.compile(r"\d+ N\S* +(\w+)\((.*)\)")
 
 
@@ -197,8 +198,10 @@ def interpreted(text: str, start: tuple[float, ...], offset: tuple[float, ...]) 
         file = Path(folder) / "program.ngc"
         file.write_text(head + body)
         (Path(folder) / "p.var").write_text("")
+        tools = Path(folder) / "tool.tbl"  # of no length and no radius: a job's own table is not the question here
+        tools.write_text("".join(f"T{n} P{n} D0\n" for n in range(1, TOOLS + 1)))
         ran = subprocess.run(
-            ["rs274", "-g", "-v", str(Path(folder) / "p.var"), str(file)],
+            ["rs274", "-g", "-t", str(tools), "-v", str(Path(folder) / "p.var"), str(file)],
             capture_output=True,
             text=True,
             check=False,

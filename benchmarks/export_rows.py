@@ -42,7 +42,6 @@ DEFAULT_EVERY = (
     10  # of the random programs is planned with the default method; the others by one of closed form
 )
 CLOSED_FORM = "kinematic"
-NEEDS_TOOL = "cutter compensation"
 ROUNDING = 0.01  # that rs274 prints lengths with, in inches at worst [mm]
 HAS_RS274 = shutil.which("rs274") is not None
 # Sizes of a folder's programs [bytes], above which less work and a coarser period of the setpoints [s] make them cheap enough.
@@ -138,8 +137,8 @@ class Original:
 
 
 def _refused(said: FloatArray | str) -> str:
-    """What rs274 refuses, but for what it says of the radius of a tool: that is its own tool table's, which is not the job's."""
-    return f"rs274: {said}" if isinstance(said, str) and NEEDS_TOOL not in said else ""
+    """What rs274 refuses."""
+    return f"rs274: {said}" if isinstance(said, str) else ""
 
 
 def judged(seed: int, *, starts: int = len(STARTS)) -> list[Row]:

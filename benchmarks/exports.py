@@ -170,8 +170,8 @@ def _of_files(files: list[Row]) -> list[str]:
     return [
         f"{len(names)} programs of a folder, planned for `mill` and exported to four controls, read back{_by_rs274()}:\n",
         _counts(files),
-        "Each program, the smallest first; places: starts and offsets from which it was read back. `rs274` has its own tool table: "
-        "where it refuses the radius of a tool, our reader alone has read the program back.\n",
+        "Each program, the smallest first; places: starts and offsets from which it was read back. `rs274` has a tool table "
+        "of tools without length and radius.\n",
         markdown(["program", "method", "places", *CONTROLS], table),
     ]
 

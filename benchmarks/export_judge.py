@@ -198,7 +198,7 @@ def interpreted(text: str, start: tuple[float, ...], offset: tuple[float, ...]) 
         file = Path(folder) / "program.ngc"
         file.write_text(head + body)
         (Path(folder) / "p.var").write_text("")
-        tools = Path(folder) / "tool.tbl"  # of no length and no radius: a job's own table is not the question here
+        tools = Path(folder) / "tool.tbl"  # of no length and no radius
         tools.write_text("".join(f"T{n} P{n} D0\n" for n in range(1, TOOLS + 1)))
         ran = subprocess.run(
             ["rs274", "-g", "-t", str(tools), "-v", str(Path(folder) / "p.var"), str(file)],

@@ -27,13 +27,13 @@ from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.feedrate.jerk import window
-from planner.job import method
-from planner.methods import at_once, optimal
-from planner.methods.optimal import OptimalMethod
-from planner.optimal import behind_filters, geometry, loop, shaped, tighten
-from planner.optimal.effort import EFFORTS
+from planner.joint import own
+from planner.planning.job import method
+from planner.planning.methods import at_once, optimal
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.optimal import behind_filters, geometry, loop, shaped, tighten
+from planner.planning.optimal.effort import EFFORTS
 from planner.smoothing import initial, relax
-from planner.tube import own
 
 Switch = Callable[[], None]
 Fires = Callable[[Row], bool]
@@ -73,7 +73,7 @@ def _fallback(kind: str) -> Switch:
     """What is planned where the search from the first motion does not take all of a job."""
 
     def planned(job: Any, settings: Any, once: Any) -> Any:
-        from planner.methods.from_plan import freed
+        from planner.planning.methods.from_plan import freed
 
         again = job.afresh()
         if kind == "path":

@@ -16,11 +16,11 @@ from benchmarks.campaign_laws import broken, changed, holds
 from benchmarks.campaign_tally import CRASH, DOCUMENTED, FAILED, PASSED, REFUSED, UNSOLVED
 from planner.base.errors import InputError
 from planner.feedrate.solution import Status
-from planner.job.plan import Plan
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
-from planner.methods.registry import plan
 from planner.nc.program import Kind, Program
-from planner.verify import Kind as KindOfFault
+from planner.planning.job.plan import Plan
+from planner.planning.methods.registry import plan
+from planner.verifier import Kind as KindOfFault
 
 LAW_EVERY = 10  # jobs
 NO_JERK_LIMIT = ("second-order",)

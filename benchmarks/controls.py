@@ -28,8 +28,8 @@ import numpy as np
 
 import planner
 from benchmarks.record import markdown, write_results
-from planner.control_files.program import write_program
-from planner.control_files.stream import write_stream
+from planner.controls.export.program import write_program
+from planner.controls.export.stream import write_stream
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 

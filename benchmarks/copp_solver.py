@@ -20,7 +20,7 @@ from types import ModuleType
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.exact_motion import slowed_to_limits, with_exact_kinematics
 from planner.feedrate.solution import FeedrateSolution, Status

@@ -29,13 +29,13 @@ from benchmarks.export_judge import (
 from benchmarks.export_programs import TOLERANCE, random_program
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.control_files.candidates import AS_IT_IS, OWN_PATH, Candidate, Candidates
-from planner.control_files.controls import CONTROLS
-from planner.control_files.program import write_program
-from planner.job.plan import Plan
+from planner.controls.export.candidates import AS_IT_IS, OWN_PATH, Candidate, Candidates
+from planner.controls.export.controls import CONTROLS
+from planner.controls.export.program import write_program
 from planner.machine import Axis, Machine
 from planner.nc.program import Program
 from planner.nc.reading import AS_USUAL, Reading
+from planner.planning.job.plan import Plan
 
 SHARE = 0.25  # of the room, for the chords of the random programs
 DEFAULT_EVERY = (

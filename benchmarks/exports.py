@@ -23,7 +23,7 @@ from pathlib import Path
 from benchmarks.export_judge import OFFSETS, STARTS
 from benchmarks.export_rows import HAS_RS274, Row, judged, of_file_within, unmade
 from benchmarks.record import markdown, planner_state, write_results
-from planner.control_files.controls import CONTROLS
+from planner.controls.export.controls import CONTROLS
 from planner.machine import load_machine
 
 KEEP_OUT = (".csv", ".md", ".txt")

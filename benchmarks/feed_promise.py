@@ -21,10 +21,10 @@ import numpy as np
 from benchmarks.passages import Motion, saved
 from benchmarks.record import markdown, write_results
 from planner.base.errors import InputError
-from planner.job.plan import Plan
 from planner.machine import Machine, load_machine
-from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.registry import plan
 
 Array = np.ndarray
 STREAM = 61  # of random numbers

@@ -20,14 +20,18 @@ from benchmarks.fuzz_settings import (
 )
 from benchmarks.fuzz_trajectories import make_trajectory, try_trajectory
 
-_JUDGED = ("planner/report/trajectory_reader.py", "planner/report/digits.py", "planner/verify")
+_JUDGED = ("planner/report/trajectory_reader.py", "planner/report/digits.py", "planner/verifier")
 KINDS = {
     "nc": Kind(make_program, try_program, ("planner/nc",), guided=False),
     "hpgl": Kind(make_drawing, try_drawing, ("planner/nc/hpgl", "planner/nc/dialects.py"), guided=False),
-    "machine": Kind(make_machine, try_machine, ("planner/machine", "planner/verify"), guided=False),
-    "imports": Kind(make_settings, try_settings, ("planner/machine_import", "planner/machine"), guided=False),
-    "trajectory": Kind(
-        make_trajectory, try_trajectory, (*_JUDGED, "planner/job"), guided=False, joined=False
+    "machine": Kind(make_machine, try_machine, ("planner/machine", "planner/verifier"), guided=False),
+    "imports": Kind(
+        make_settings, try_settings, ("planner/controls/machine_import", "planner/machine"), guided=False
     ),
-    "report": Kind(make_page, try_page, ("planner/report", "planner/job"), guided=False, joined=False),
+    "trajectory": Kind(
+        make_trajectory, try_trajectory, (*_JUDGED, "planner/planning/job"), guided=False, joined=False
+    ),
+    "report": Kind(
+        make_page, try_page, ("planner/report", "planner/planning/job"), guided=False, joined=False
+    ),
 }

@@ -32,9 +32,9 @@ from benchmarks.record import planner_state
 from benchmarks.runner.suites import SUITES
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
-from planner.job.plan import Plan
-from planner.job.trace import Trace
-from planner.methods.registry import plan
+from planner.planning.job.plan import Plan
+from planner.planning.job.trace import Trace
+from planner.planning.methods.registry import plan
 
 FIRST = 2_000_000  # seed of the first campaign job
 SAME, WORST = 1e-4, 1e-3  # of the cycle time: what a removal may change, on the mean and at worst [-]

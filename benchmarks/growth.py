@@ -43,7 +43,7 @@ WAVES, HEIGHT, CUT_OFF = (
 )  # waves, their height [mm], and above which height the relief is flatter [mm]
 WARM_UP = 200  # blocks
 MOST = 300.0  # [s]
-FITTED = 10_000  # blocks: smaller jobs get rounds and a search that longer ones do not (optimal/effort.py)
+FITTED = 10_000  # blocks: smaller jobs get rounds and a search that longer ones do not (planning/optimal/effort.py)
 SETTINGS = ("method", "machine", "threads", "files", "commit")  # of a row, beside its number of blocks
 
 

@@ -19,7 +19,7 @@ from rich.progress import track
 from scipy.interpolate import make_interp_spline
 
 from benchmarks.record import write_results
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios

@@ -27,18 +27,18 @@ from benchmarks import problems
 from benchmarks.growth import relief
 from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program, read_program
-from planner.optimal.geometry import splined_with_stops
-from planner.path.samples import sample_path
+from planner.planning.optimal.geometry import splined_with_stops
 from planner.smoothing.spline_path import with_spline
 
 ROOT = Path(__file__).resolve().parents[1]

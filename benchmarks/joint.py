@@ -23,10 +23,10 @@ from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.names import NORMAL
 from planner.machine import Machine
-from planner.methods.optimal import OptimalMethod
-from planner.methods.tube import TubeMethod
 from planner.nc.program import Program
-from planner.optimal.effort import EFFORTS
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.tube import TubeMethod
+from planner.planning.optimal.effort import EFFORTS
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "nc"
 # File, first motion block, blocks, feed [mm/s].

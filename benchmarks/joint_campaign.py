@@ -25,15 +25,15 @@ from benchmarks import problems, random_lines
 from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
-from planner.job.plan import Plan
-from planner.job.trace import Trace
+from planner.joint.guess import Guess
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
+from planner.joint.run import TubeRun
 from planner.machine import Machine
 from planner.nc.program import Program
-from planner.optimal.effort import EFFORTS
-from planner.tube.guess import Guess
-from planner.tube.outcome import TubeSolution
-from planner.tube.own import TubeOwn
-from planner.tube.run import TubeRun
+from planner.planning.job.plan import Plan
+from planner.planning.job.trace import Trace
+from planner.planning.optimal.effort import EFFORTS
 
 ALLOWED = 1e-4  # share of the cycle time by which the search may end slower than `optimal` [-]
 NICE = 10  # of the processes

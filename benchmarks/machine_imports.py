@@ -36,7 +36,7 @@ def main() -> None:
 def imported(file: Path, folder: Path, control: str | None) -> dict[str, Any]:
     """What comes of a file: its axes and notes, or the reason of the refusal."""
     from planner.base.errors import InputError
-    from planner.machine_import.convert import import_machine
+    from planner.controls.machine_import.convert import import_machine
 
     row: dict[str, Any] = {"file": str(file.relative_to(folder)), "axes": "", "reason": "", "notes": []}
     try:

@@ -22,12 +22,12 @@ from typing import Literal
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.job.plan import Plan
 from planner.machine import Fir, Machine
-from planner.methods.stop import StopMethod
 from planner.motion.trajectory import COLUMNS, Trajectory
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.stop import StopMethod
 
 # What counts as proved: a limit or a tolerance exceeded by this factor [-], so that rounding is no proof.
 PROVED = 1.005

@@ -22,12 +22,12 @@ import numpy as np
 
 from benchmarks.record import markdown, write_results
 from benchmarks.setpoints import averaged, within
-from planner.job.plan import Plan
 from planner.machine import Axis, Fir, Machine
-from planner.methods.registry import plan
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
-from planner.verify import Verdict, verify
+from planner.planning.job.plan import Plan
+from planner.planning.methods.registry import plan
+from planner.verifier import Verdict, verify
 
 Array = np.ndarray
 STREAM = 53  # of random numbers

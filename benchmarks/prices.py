@@ -24,10 +24,10 @@ import numpy as np
 import planner
 from benchmarks import problems
 from benchmarks.record import RESULTS, markdown, write_results
-from planner.job.plan import Plan
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.planning.job.plan import Plan
 from planner.sensitivity.path_prices import WORTH
 from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE
 from planner.sensitivity.savings import more_of

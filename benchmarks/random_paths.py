@@ -21,8 +21,8 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import axis_velocity
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints import axis_velocity
+from planner.feedrate.constraints.problem import FeedrateProblem
 
 AXES = "xyzabcd"
 QUINTIC = 5

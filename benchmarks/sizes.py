@@ -29,7 +29,7 @@ from benchmarks.record import RESULTS, provenance
 from planner.base import kernels
 from planner.base.errors import InputError
 from planner.base.sizes import PARTS, ROUTES, SMALL, VARIABLE
-from planner.methods.registry import plan
+from planner.planning.methods.registry import plan
 
 ROWS, SUMMARY = RESULTS / "sizes.jsonl", RESULTS / "sizes.md"
 USUAL = "usual"

@@ -18,7 +18,7 @@ from typing import Any
 
 import planner
 from benchmarks.record import markdown, write_results
-from planner.verify import Verdict
+from planner.verifier import Verdict
 
 MACHINE = Path(__file__).parent / "programs" / "mill-xyzac-trt.toml"
 METHODS = ("second-order", "optimal")

@@ -25,16 +25,16 @@ from benchmarks import problems, random_lines
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
+from planner.joint.guess import Guess, guess_from
+from planner.joint.nlp import TubeNLP
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
+from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.solvers import TubeSolver
 from planner.machine import Machine
-from planner.methods.optimal import OptimalMethod
 from planner.motion.vertex_times import passing_times
 from planner.nc.program import Program
-from planner.tube.guess import Guess, guess_from
-from planner.tube.nlp import TubeNLP
-from planner.tube.outcome import TubeSolution
-from planner.tube.own import TubeOwn
-from planner.tube.run import TubeRun, tube_runs_of
-from planner.tube.solvers import TubeSolver
+from planner.planning.methods.optimal import OptimalMethod
 
 NAME = "tube-solvers"
 STEPS = 120  # of a job at most: ipopt takes 10 to 40 ms per step in all

@@ -27,15 +27,15 @@ from benchmarks.mutations import KINDS, Case, program_of
 from benchmarks.record import markdown, write_results
 from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
-from planner.job.method import Method
 from planner.machine import Axis, Machine
-from planner.methods.kinematic import KinematicMethod
-from planner.methods.optimal import OptimalMethod
-from planner.methods.second_order import SecondOrderMethod
-from planner.methods.stop import StopMethod
 from planner.motion.trajectory import Trajectory
+from planner.planning.job.method import Method
+from planner.planning.methods.kinematic import KinematicMethod
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.second_order import SecondOrderMethod
+from planner.planning.methods.stop import StopMethod
 from planner.report.trajectory_reader import read_trajectory
-from planner.verify import Given, Verdict, verify
+from planner.verifier import Given, Verdict, verify
 
 DRAWS = 40  # of a mutation until one is proved to be a fault
 POSITIONS = Given(columns=())

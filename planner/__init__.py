@@ -31,41 +31,42 @@ is imported on first use, so that `import planner` costs nothing.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from planner.job.shown import VIEWS
+from planner.planning.job.shown import VIEWS
 
 if TYPE_CHECKING:
     from planner.base.errors import InputError, NotSolvedError
-    from planner.constraints.own import JointLimit, PathLimit
     from planner.corners.own import PolynomialCorner
     from planner.geometry.toolpath import Toolpath
-    from planner.interactive.given_motion import verify
-    from planner.interactive.points import path
-    from planner.job.method import Method
-    from planner.job.plan import Plan
-    from planner.job.trace import Trace
     from planner.machine import Machine, load_machine
-    from planner.methods import MethodNames
-    from planner.methods.registry import plan
+    from planner.machine.user_limit import JointLimit, PathLimit
     from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
     from planner.nc.reader import read_program
     from planner.nc.reading import Reading
+    from planner.planning.job.method import Method
+    from planner.planning.job.plan import Plan
+    from planner.planning.job.trace import Trace
+    from planner.planning.methods.listing import MethodNames
+    from planner.planning.methods.registry import plan
     from planner.report.compare import compare
-    from planner.verify import Verdict
+    from planner.report.interactive.given_motion import verify
+    from planner.report.interactive.points import path
+    from planner.verifier import Verdict
 
     __version__: str
     methods: MethodNames
 
-# Packages that are public by themselves: two are called like functions (base/called.py), one lists its methods.
-_PACKAGES = ("methods", "path", "verify")
 _HOME = {
-    "plan": "planner.methods.registry",
-    "Plan": "planner.job.plan",
-    "Trace": "planner.job.trace",
-    "JointLimit": "planner.constraints.own",
-    "PathLimit": "planner.constraints.own",
+    "plan": "planner.planning.methods.registry",
+    "Plan": "planner.planning.job.plan",
+    "Trace": "planner.planning.job.trace",
+    "JointLimit": "planner.machine.user_limit",
+    "PathLimit": "planner.machine.user_limit",
     "PolynomialCorner": "planner.corners.own",
-    "Method": "planner.job.method",
+    "Method": "planner.planning.job.method",
+    "methods": "planner.planning.methods.listing",
+    "path": "planner.report.interactive.points",
+    "verify": "planner.report.interactive.given_motion",
     "compare": "planner.report.compare",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
@@ -74,17 +75,17 @@ _HOME = {
     "Reading": "planner.nc.reading",
     "Toolpath": "planner.geometry.toolpath",
     "Trajectory": "planner.motion.trajectory",
-    "Verdict": "planner.verify",
+    "Verdict": "planner.verifier",
     "InputError": "planner.base.errors",
     "NotSolvedError": "planner.base.errors",
 }
 
 VIEWS.update(
-    to_pandas="planner.interactive.frame:plan_frame",
-    plot="planner.interactive.figures:PlanFigures",
-    save="planner.interactive.files:save",
-    report="planner.interactive.page:ReportPage",
-    card="planner.interactive.card:plan_card",
+    to_pandas="planner.report.interactive.frame:plan_frame",
+    plot="planner.report.interactive.figures:PlanFigures",
+    save="planner.report.interactive.files:save",
+    report="planner.report.interactive.page:ReportPage",
+    card="planner.report.interactive.card:plan_card",
 )
 
 __all__ = [
@@ -116,8 +117,6 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return import_module("importlib.metadata").version("feedrate-planner")
-    if name in _PACKAGES:
-        return import_module(f"planner.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'planner' has no attribute '{name}'")
     return getattr(import_module(_HOME[name]), name)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from planner.geometry.build import toolpath_from_program
-from planner.job.records import GridHistory, PriceList
 from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
-from planner.verify import CornerCheck, Fault, Kind
+from planner.sensitivity.records import GridHistory, PriceList
+from planner.verifier import CornerCheck, Fault, Kind
 
 SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
 

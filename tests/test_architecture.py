@@ -14,81 +14,17 @@ import planner
 
 PACKAGE = Path(__file__).resolve().parent.parent / "planner"
 
-# Earlier stages first. A module is in the layer with the longest matching name; modules of one layer may import each other.
-LAYERS = (
-    "planner",
-    "planner.base.units",
-    "planner.base.errors",
-    "planner.base.arrays",
-    "planner.base.called",
-    "planner.base.files",
-    "planner.base.glossary",
-    "planner.base.own_folders",
-    "planner.base.kernel_files",
-    "planner.base.compiling",
-    "planner.base.kernel_content",
-    "planner.base.kernels",
-    "planner.base.names",
-    "planner.base.search",
-    "planner.base",
-    "planner.base.series",
-    "planner.constraints.own",
-    "planner.fir.filters",
-    "planner.machine",
-    "planner.kinematics",
-    "planner.machine_import",
-    "planner.constraints",
-    "planner.nc",
-    "planner.geometry",
-    "planner.corners",
-    "planner.smoothing",
-    "planner.path.calm",
-    "planner.path.rows",
-    "planner.path.grid",
-    "planner.path.own_rows",
-    "planner.path",
-    "planner.constraints.on_grid",
-    "planner.constraints.own_axes",
-    "planner.constraints.assemble",
-    "planner.feedrate",
-    "planner.motion.trajectory",
-    "planner.kinematics.setpoints",
-    "planner.motion.on_demand",
-    "planner.motion.vertex_times",
-    "planner.motion.time_law",
-    "planner.motion.sampling",
-    "planner.motion.lots",
-    "planner.motion.timing",
-    "planner.motion",
-    "planner.lookahead",
-    "planner.fir",
-    "planner.tube",
-    "planner.verify",
-    "planner.job.records",
-    "planner.sensitivity",
-    "planner.job.trace",
-    "planner.job.stages",
-    "planner.job.beside",
-    "planner.delivery",
-    "planner.job",
-    "planner.methods.kinematic",  # two motions that the loop compares its own with
-    "planner.methods.stop",
-    "planner.optimal",
-    "planner.methods",
-    "planner.report",
-    "planner.interactive",
-    "planner.control_files",
-    "planner.study",
-    "planner.commands",
-    "planner.cli",
-    "planner.__main__",
+# The rooms, earlier stages first: a room imports from those before it, and no file takes part in a circle.
+ROOMS = (
+    *("base", "machine", "nc", "geometry", "corners", "smoothing", "feedrate", "motion", "joint"),
+    *("baselines", "verifier", "delivery", "sensitivity", "planning", "controls", "report", "commands"),
+    *("cli", "__main__"),
 )
 # The judge sees the path, the machine and the samples, and no code of those it judges.
 VERIFY_MAY_IMPORT = {
     "base.units",
     "base.errors",
     "base.arrays",
-    "base.called",
     "base.kernels",
     "base.series",
     "base.sizes",
@@ -96,7 +32,7 @@ VERIFY_MAY_IMPORT = {
     "machine",
     "geometry.toolpath",
     "motion.trajectory",
-    "verify",
+    "verifier",
 }
 # The planner reads verdicts. It asks for one only where a motion is delivered, and measures nothing by the judge's means.
 VERDICT_RECORDS = {
@@ -115,7 +51,7 @@ VERDICT_RECORDS = {
     "Verdict",
 }
 JUDGING = {"verify", "verify_joints", "fit_axes"}
-MAY_JUDGE = ("job.job", "job.at_tip", "commands", "interactive", "report")
+MAY_JUDGE = ("planning.job.job", "planning.job.at_tip", "commands", "report")
 HEAVY = {"casadi", "matplotlib", "toppra", "numba", "scipy", "pyarrow", "ruckig"}
 
 
@@ -131,72 +67,63 @@ MODULES = modules()
 
 
 @cache
-def imports(file: Path) -> set[str]:
-    """Names of the package's modules that a file imports at run time; annotations do not count."""
+def imports(module: str) -> frozenset[str]:
+    """Names of the package's modules that a module imports; a package's own modules may be named by it."""
     names = set()
-    for node in ast.walk(_without_type_checking(ast.parse(file.read_text(encoding="utf-8")))):
+    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names |= {
-                f"{node.module}.{alias.name}" if f"{node.module}.{alias.name}" in MODULES else node.module
-                for alias in node.names
-            }
-        elif isinstance(node, ast.ImportFrom):
-            raise AssertionError(f"{file}: relative import; write the full name")
-    return {name for name in names if name.split(".")[0] == "planner"}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            assert not node.level, f"{module}: relative import; write the full name"
+            named = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= {name if name in MODULES else node.module for name in named}
+    return frozenset(names & MODULES.keys() - {"planner", module})
 
 
-def _without_type_checking(tree: ast.Module) -> ast.Module:
-    tree.body = [
-        node
-        for node in tree.body
-        if not (isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"))
-    ]
-    return tree
+def room(module: str) -> int:
+    return ROOMS.index(module.split(".")[1])
 
 
-def layer(module: str) -> int:
-    while module not in LAYERS:
-        assert "." in module, f"{module} is in no layer: add it to LAYERS"
-        module = module.rpartition(".")[0]
-    return LAYERS.index(module)
-
-
-def test_imports_go_to_earlier_layers() -> None:
-    without = [module for module in MODULES if module != "planner" and layer(module) == 0]
-    assert not without, "in no layer: add them to LAYERS"
+def test_no_room_imports_a_later_one() -> None:
+    """Imports inside functions count, and those for annotations."""
     later = {
         (module, name)
-        for module, file in MODULES.items()
-        for name in imports(file)
-        if module != "planner" and layer(name) > layer(module)
+        for module in MODULES
+        for name in imports(module)
+        if "." in module and room(name) > room(module)
     }
-    assert not later, "imports of later stages"
+    assert not later
+
+
+def test_no_file_is_in_a_circle() -> None:
+    left = {module: imports(module) for module in MODULES if module != "planner"}
+    while done := {module for module, names in left.items() if not names & left.keys()}:
+        left = {module: names for module, names in left.items() if module not in done}
+    assert not left, "each of these imports another of them"
 
 
 def test_the_verifier_is_independent() -> None:
-    for module, file in MODULES.items():
-        if module.startswith("planner.verify"):
-            for name in imports(file):
+    for module in MODULES:
+        if module.startswith("planner.verifier"):
+            for name in imports(module):
                 short = name.removeprefix("planner.")
-                assert short in VERIFY_MAY_IMPORT or short.startswith("verify."), f"{module} imports {name}"
+                assert short in VERIFY_MAY_IMPORT or short.startswith("verifier."), f"{module} imports {name}"
 
 
 def test_nobody_who_plans_uses_the_verifier() -> None:
     """All imports count, those for annotations and inside functions too."""
     for module, file in MODULES.items():
         short = module.removeprefix("planner.")
-        if short.split(".")[0] == "verify":
+        if short.split(".")[0] == "verifier":
             continue
         names = VERDICT_RECORDS | (
             JUDGING if any(f"{short}.".startswith(f"{may}.") for may in MAY_JUDGE) else set()
         )
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
-                assert not any(alias.name.startswith("planner.verify") for alias in node.names), module
-            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("planner.verify"):
-                assert node.module == "planner.verify", (
+                assert not any(alias.name.startswith("planner.verifier") for alias in node.names), module
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("planner.verifier"):
+                assert node.module == "planner.verifier", (
                     f"{module} imports {node.module}: only what the room says"
                 )
                 imported = {alias.name for alias in node.names}
@@ -205,10 +132,9 @@ def test_nobody_who_plans_uses_the_verifier() -> None:
 
 def test_a_plan_knows_nothing_of_what_shows_it() -> None:
     """Neither by an import for annotations nor by a module's name."""
-    for module in ("planner.job.plan", "planner.job.shown"):
+    for module in ("planner.planning.job.plan", "planner.planning.job.shown"):
         text = MODULES[module].read_text(encoding="utf-8")
-        for later in ("planner.interactive", "planner.report"):
-            assert later not in text, module
+        assert "planner.report" not in text, module
 
 
 def test_kernels_are_made_where_the_cache_may_fail() -> None:
@@ -248,8 +174,8 @@ NOT_OF_A_PLAN = {
     "scipy.optimize",
     "numba.np.arraymath",
     "planner.report",
-    "planner.interactive",
-    "planner.control_files",
+    "planner.report.interactive",
+    "planner.controls.export",
     "planner.nc.hpgl.plotter",
 }
 
@@ -261,11 +187,11 @@ def test_a_plan_loads_only_what_it_uses(tmp_path: Path) -> None:
     planner.plan(job, "mill")  # its kernels are on the disk now
     in_python = f"import planner; planner.plan({str(job)!r}, 'mill')"
     loaded = _loaded(in_python)
-    assert {"planner.optimal.loop", "numba"} <= loaded
+    assert {"planner.planning.optimal.loop", "numba"} <= loaded
     assert loaded & NOT_OF_A_PLAN == set()
     options = ["plan", str(job), "--quiet", "-o", str(tmp_path / "out")]
     loaded = _loaded(f"from planner.cli import app; app({options}, standalone_mode=False)")
-    assert {"planner.optimal.loop", "numba"} | OF_THE_FILES <= loaded
+    assert {"planner.planning.optimal.loop", "numba"} | OF_THE_FILES <= loaded
     assert loaded & NOT_OF_A_PLAN == OF_THE_FILES
 
 

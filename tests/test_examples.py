@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = [
     "planner",
-    "planner.interactive.given_motion",
-    "planner.interactive.points",
+    "planner.report.interactive.given_motion",
+    "planner.report.interactive.points",
     "planner.nc.reader",
 ]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "planner"
 LONGEST = 350  # [lines]
-NO_CODE = {"examples", "machines", "templates"}
+NO_CODE = {"baselines", "controls", "examples", "machines", "planning", "templates"}
 # Tested in the folder above: all solvers are held against each other there.
 WITH_PARENT = {"feedrate/jerk", "feedrate/reference"}
 FILES = sorted(TESTS.rglob("*.py"))

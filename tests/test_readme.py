@@ -96,7 +96,7 @@ def test_every_heading_that_is_linked_exists(page: str) -> None:
 
 
 def test_modules_in_the_pictures_exist() -> None:
-    """`optimal/reshape.py` and the like, and folders, in the pictures of the algorithm's page."""
+    """`planning/optimal/reshape.py` and the like, and folders, in the pictures of the algorithm's page."""
     blocks = re.findall(r"^```(\w*)\n(.*?)^```", PAGES["docs/algorithm.md"], re.MULTILINE | re.DOTALL)
     drawn = "".join(text for language, text in blocks if not language)
     assert "/" in drawn

@@ -21,7 +21,7 @@ INSTEAD = {
     "slice": "segment, leg, element or run; Python's own `slice` is a name of its own",
     "cell": "velocity pulse, link, step or interval",
 }
-CELLS_IN = ("report/", "verify/")
+CELLS_IN = ("report/", "verifier/")
 # In texts: a pattern, and what the glossary says instead.
 TEXTS = {r"\bset[ -]points?\b": "setpoint", r"\bstretch(es)?\b": "run, leg, element or range"}
 
@@ -54,16 +54,20 @@ def wrong_words(name: str, module: str) -> set[str]:
 
 
 def test_words_of_names_are_told_apart() -> None:
-    assert wrong_words("first_cell", "fir/command.py") == {"cell"}
-    assert wrong_words("cells_per_period", "verify/times.py") == set()
-    assert wrong_words("StraightCourse", "fir/guide.py") == {"course"}
+    assert wrong_words("first_cell", "baselines/fir/command.py") == {"cell"}
+    assert wrong_words("cells_per_period", "verifier/times.py") == set()
+    assert wrong_words("StraightCourse", "baselines/fir/guide.py") == {"course"}
     assert (
-        wrong_words("per_stretch", "fir/columns.py")
-        == wrong_words("STRETCHES", "path/calm.py")
+        wrong_words("per_stretch", "baselines/fir/columns.py")
+        == wrong_words("STRETCHES", "feedrate/sampling/calm.py")
         == {"stretch"}
     )
-    assert wrong_words("slice", "fir/rules.py") == set() != wrong_words("time_slices", "fir/rules.py")
-    assert wrong_words("excellent_intersections", "fir/rules.py") == set()
+    assert (
+        wrong_words("slice", "baselines/fir/rules.py")
+        == set()
+        != wrong_words("time_slices", "baselines/fir/rules.py")
+    )
+    assert wrong_words("excellent_intersections", "baselines/fir/rules.py") == set()
 
 
 def test_names_use_the_words_of_the_glossary() -> None:

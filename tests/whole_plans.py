@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.blend import CORNER_DTYPE, corner_point
 from planner.corners.elements import to_arc_length
 from planner.corners.own import PolynomialCorner
 from planner.corners.smooth import CornerShape, SmoothPath, round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import add_switching_points
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import RESOLUTION, sample_path
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import legs_of
@@ -23,8 +25,7 @@ from planner.machine import Machine
 from planner.motion.time_law import TimeLaw, law_of_solution
 from planner.motion.timing import Motion
 from planner.nc.program import Program
-from planner.optimal.geometry import corner_shape
-from planner.path.samples import RESOLUTION, PathSamples, sample_path
+from planner.planning.optimal.geometry import corner_shape
 
 CORNERS = ("bezier", "fir", "kinematic")
 

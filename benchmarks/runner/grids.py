@@ -2,7 +2,7 @@
 
     grid:F    the first splines, feed with its limits at the grid points, and nothing done about what is between them: its verdict
               fails by what the motion exceeds there
-    kept:F    the same, and limits tightened until they hold between the points too (optimal/tighten.py): what a plan would deliver
+    kept:F    the same, and limits tightened until they hold between the points too (tighten.py): what a plan would deliver
 
 F = 1 is a grid with an interpolation error of `RESOLUTION`; a step F times shorter has F^2 times less of it. The solver's own gap is
 far below what grids differ by. What comes of it is told by grid_report.py.
@@ -16,27 +16,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.errors import NotSolvedError
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
-from planner.job.job import Job
-from planner.job.method import Method
-from planner.job.plan import Plan
+from planner.feedrate.sampling.samples import sample_path
 from planner.machine import Machine
 from planner.nc.program import Program
-from planner.optimal.geometry import splined_with_stops
-from planner.optimal.on_path import OnPath
-from planner.optimal.order import ThirdOrder
-from planner.optimal.result import plan_of_solution
-from planner.optimal.tighten import within_limits
-from planner.path.samples import sample_path
+from planner.planning.job.job import Job
+from planner.planning.job.method import Method
+from planner.planning.job.plan import Plan
+from planner.planning.optimal.geometry import splined_with_stops
+from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.order import ThirdOrder
+from planner.planning.optimal.result import plan_of_solution
+from planner.planning.optimal.tighten import within_limits
 from planner.smoothing.spline_path import with_spline
 
-RESOLUTION = (
-    2e-3  # of F = 1: the coarsest final grid of small jobs is 8e-3, the finest 2e-4 (optimal/effort.py)
-)
+RESOLUTION = 2e-3  # of F = 1: the coarsest final grid of small jobs is 8e-3, the finest 2e-4 (planning/optimal/effort.py)
 FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 GAP = 1e-7  # of the solver [-]
 AT_POINTS, BETWEEN = "grid", "kept"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planner.verify import Verdict
+from planner.verifier import Verdict
 
 
 class NotApplicable(Exception):

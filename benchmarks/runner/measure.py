@@ -37,10 +37,10 @@ from benchmarks.runner.rows import (
 from benchmarks.runner.suites import Job
 from benchmarks.runner.ways import Made, Way
 from planner.base.errors import InputError, NotSolvedError
-from planner.job.plan import Plan
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
 from planner.report.compare import row_of_plan
-from planner.verify import Verdict
+from planner.verifier import Verdict
 
 REPEATS, ENOUGH = 3, 2.0  # calls, and the processor seconds after which none follows [s]
 LOOP = 60_000  # turns of the calibration loop: some 5 ms

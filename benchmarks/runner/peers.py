@@ -9,8 +9,8 @@
     ipopt, fatrop       geometry and feed together (method tube), by casadi's solvers on a whole run
 
 Models have no motion and no verdict: they are this project's short descriptions of what a control documents
-(planner/control_files), and give a time only. grbl, Klipper and Marlin stay on the path and know no jerk; LinuxCNC gets G64 P with the
-tolerance.
+(planner/controls/export), and give a time only. grbl, Klipper and Marlin stay on the path and know no jerk; LinuxCNC gets G64 P
+with the tolerance.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.names import NORMAL
-from planner.control_files import models
-from planner.control_files.candidates import standing
-from planner.control_files.chords import Polyline, programmed_polyline
-from planner.control_files.linuxcnc_model import linuxcnc_time
+from planner.controls.export import models
+from planner.controls.export.candidates import standing
+from planner.controls.export.chords import Polyline, programmed_polyline
+from planner.controls.export.linuxcnc_model import linuxcnc_time
 from planner.feedrate.solvers import ThirdOrderSolver
-from planner.job.plan import Plan
 from planner.machine import Machine
-from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Kind, Program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.optimal import OptimalMethod
 
 SEQUENTIAL_CONVEX, COPP, COPP_LP = ALONG_SPLINES = ("sequential-convex", "copp", "copp-lp")
 CHORDS = (

@@ -18,11 +18,11 @@ from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
 from benchmarks.runner import grids, nasty
 from planner.base.names import METHODS
 from planner.geometry.nurbs import Nurbs
-from planner.interactive.tip_path import tip_path
-from planner.kinematics import at_tip
 from planner.machine import Machine, load_machine
+from planner.machine.kinematics import at_tip
 from planner.nc.program import Program
 from planner.nc.reader import read_program
+from planner.report.interactive.tip_path import tip_path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))

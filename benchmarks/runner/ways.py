@@ -18,9 +18,9 @@ from benchmarks.runner.judged import Judged
 from benchmarks.runner.rows import METHOD, MODEL, PEER
 from planner.base.errors import InputError
 from planner.base.names import EFFORTS, METHODS, SMOOTHINGS, known_name, users_of
-from planner.job.plan import Plan
 from planner.machine import Machine
 from planner.nc.program import Program
+from planner.planning.job.plan import Plan
 
 Made = Plan | Judged | float  # a plan, another one's motion, or a predicted time [s]
 

@@ -17,7 +17,7 @@ PARTS = {
     "(`corners/elements.py`)",
     "run": "what lies between two full stops; of a spline, what it replaces: from one full stop, or the middle of a long straight leg, "
     "to the next (`smoothing/runs.py`)",
-    "interval": "what lies between two neighbouring grid points: N intervals, N+1 points (`path/samples.py`)",
+    "interval": "what lies between two neighbouring grid points: N intervals, N+1 points (`feedrate/sampling/samples.py`)",
 }
 # Words beside them, which are no parts of a path.
 BESIDE = {
@@ -27,13 +27,13 @@ BESIDE = {
     "vertex": "the programmed point of a corner",
     "chain": "legs, or links, one after the other, with the joints or vertices between them",
     "link": "a straight line of a chain that points are matched with: a segment, or one chord of it (`geometry/point_matching.py`)",
-    "guide": "what FIR filters are led along: the legs of the program, or the fine chords of a smooth path (`fir/guide.py`)",
+    "guide": "what FIR filters are led along: the legs of the program, or the fine chords of a smooth path (`baselines/fir/guide.py`)",
     "chord": "the straight line between two points of a curve: what the machine runs between two samples, or "
     "a line that stands for part of an arc",
     "combined step": "a step of path and feed together, with all limits linearised (`smoothing/combined.py`)",
     "piece": "a part of a motion, in time: each axis has constant jerk in it; of a feedrate problem, the grid points of one run; "
     "of a programmed curve, one rational cubic (`nc/bezier.py`)",
-    "velocity pulse": "a leg of a guide, or some of it, that is commanded at one speed (`fir/command.py`); "
+    "velocity pulse": "a leg of a guide, or some of it, that is commanded at one speed (`baselines/fir/command.py`); "
     "the pulses of a drive are the steps of its motor (`motion/pulses.py`)",
     "ramp": "where a motion only speeds up, or only brakes",
     "window": "neighbouring intervals, or spans, that are solved together",

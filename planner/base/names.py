@@ -1,9 +1,10 @@
 """The registry of every name that a user may type: methods, geometries, corner shapes, solvers, and the aliases of each.
 
-The command line makes its choices from these tables, `planner.methods.registry` makes the methods, and the messages name them. Nothing
-heavy is imported here: a method is named by its module and class, which `planner.methods.registry` imports when it is asked for.
+The command line makes its choices from these tables, `planner.planning.methods.registry` makes the methods, and the messages name
+them. Nothing heavy is imported here: a method is named by its module and class, which `planner.planning.methods.registry` imports
+when it is asked for.
 
-To add a method: its module in `planner/methods/` and a row of `METHODS`.
+To add a method: its module in `planner/planning/methods/` and a row of `METHODS`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ BEZIER, FIR, KINEMATIC = "bezier", "fir", "kinematic"
 CORNER_SHAPES = (BEZIER, FIR, KINEMATIC)
 # Every way to smooth a path, as `corner` of a method takes it: a geometry of splines, or the shape of single corners.
 SMOOTHINGS = (AUTO, SPLINE, *CORNER_SHAPES)
-# How much work a plan is worth (optimal/effort.py).
+# How much work a plan is worth (planning/optimal/effort.py).
 QUICK, NORMAL, BEST = "quick", "normal", "best"
 EFFORTS = (QUICK, NORMAL, BEST)
 
@@ -49,29 +50,29 @@ class MethodName:
 
 METHODS: dict[str, MethodName] = {
     OPTIMAL: MethodName(
-        home="planner.methods.optimal:OptimalMethod",
+        home="planner.planning.methods.optimal:OptimalMethod",
         shapes=True,
         joints=True,
         solvers=("own", "ipopt", "fatrop", "sequential-convex"),
     ),
     SECOND_ORDER: MethodName(
-        home="planner.methods.second_order:SecondOrderMethod",
+        home="planner.planning.methods.second_order:SecondOrderMethod",
         shapes=True,
         joints=True,
         solvers=("reachability", "toppra"),
     ),
-    "bezier": MethodName(home="planner.methods.bezier:BezierMethod", joints=True),
-    "kinematic": MethodName(home="planner.methods.kinematic:KinematicMethod"),
-    "fir": MethodName(home="planner.methods.fir:FirMethod"),
-    "fir-plain": MethodName(home="planner.methods.fir:FirMethod", settings={"plain": True}),
-    "fir-spline": MethodName(home="planner.methods.fir_spline:FirSplineMethod"),
+    "bezier": MethodName(home="planner.planning.methods.bezier:BezierMethod", joints=True),
+    "kinematic": MethodName(home="planner.planning.methods.kinematic:KinematicMethod"),
+    "fir": MethodName(home="planner.planning.methods.fir:FirMethod"),
+    "fir-plain": MethodName(home="planner.planning.methods.fir:FirMethod", settings={"plain": True}),
+    "fir-spline": MethodName(home="planner.planning.methods.fir_spline:FirSplineMethod"),
     "fir-spline-plain": MethodName(
-        home="planner.methods.fir_spline:FirSplineMethod", settings={"plain": True}
+        home="planner.planning.methods.fir_spline:FirSplineMethod", settings={"plain": True}
     ),
     "tube": MethodName(
-        home="planner.methods.tube:TubeMethod", joints=True, solvers=("own", "ipopt", "fatrop")
+        home="planner.planning.methods.tube:TubeMethod", joints=True, solvers=("own", "ipopt", "fatrop")
     ),
-    "stop": MethodName(home="planner.methods.stop:StopMethod"),
+    "stop": MethodName(home="planner.planning.methods.stop:StopMethod"),
 }
 # Names of earlier versions, which keep working.
 METHOD_ALIASES = {"toppra": SECOND_ORDER}

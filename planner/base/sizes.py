@@ -92,17 +92,17 @@ class Sizes:
     searched_least: int = _size(ROUTES, 60, 15)
 
     # What large jobs go without.
-    # points: coarser final grids of each leave up to 4e-3 of the time (optimal/effort.py)
+    # points: coarser final grids of each leave up to 4e-3 of the time (planning/optimal/effort.py)
     small_grids: tuple[float, float, float] = _size(EFFORT, (1_500, 4_000, 40_000), (15, 40, 400))
-    # more have a coarser grid, which leaves 0.3 to 0.5 % (path/samples.py)
+    # more have a coarser grid, which leaves 0.3 to 0.5 % (feedrate/sampling/samples.py)
     corners_finely: int = _size(EFFORT, 50_000, 2)
-    searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (methods/optimal.py)
-    searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: up to 2e-3 (optimal/effort.py)
+    searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (planning/methods/optimal.py)
+    searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: up to 2e-3 (planning/optimal/effort.py)
     searched_most: int = _size(EFFORT, 1_000_000, 200)  # steps: what takes a minute or two on two processors
     # points of a plan, and of each corner shape: about as many as get the finest grid
     rivals_planned: int = _size(EFFORT, 40_000, 100)
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
-    # points: beyond, only where it is worth solving again (optimal/tighten.py)
+    # points: beyond, only where it is worth solving again (planning/optimal/tighten.py)
     tightened_everywhere: int = _size(EFFORT, 50_000, 10)
     priced: int = _size(EFFORT, 200_000, 60_000)  # points of all problems solved again for prices: a second
 

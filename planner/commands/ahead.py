@@ -47,8 +47,8 @@ CORNERS = "corners"  # on the command line
 def compile_ahead() -> list[str]:
     """Plan `PROGRAMS`; returns the files of the kernels that this took, sorted."""
     from planner.machine import load_machine
-    from planner.methods.registry import plan
     from planner.nc.reader import parse_program
+    from planner.planning.methods.registry import plan
 
     machine = load_machine(MACHINE)
     for program in PROGRAMS:
@@ -61,8 +61,8 @@ def compile_corners() -> bool:
     import numpy as np
 
     from planner.machine import load_machine
-    from planner.methods.registry import plan
     from planner.nc.points import program_of_points
+    from planner.planning.methods.registry import plan
 
     program = program_of_points(np.array(POINTS), np.full(len(POINTS) - 1, FEED), None)
     made = plan(program, load_machine(MACHINE), method=OPTIMAL, geometry=SINGLE_CORNERS)

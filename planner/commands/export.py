@@ -76,8 +76,8 @@ def export_command(
         return
     if tolerance is not None:
         raise InputError(f"--tolerance is for programs; --for {for_} takes every setpoint as it is")
-    from planner.control_files.pvt import WITHIN, write_pvt
-    from planner.control_files.stream import write_stream
+    from planner.controls.export.pvt import WITHIN, write_pvt
+    from planner.controls.export.stream import write_stream
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     if within is not None and for_ is not For.pvt:
@@ -131,7 +131,7 @@ def _say_assumed(assumptions: Sequence[object]) -> None:
 
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
     """Write the program of a plan's directory for a control, and say what it holds."""
-    from planner.control_files.program import NO_JERK, write_program
+    from planner.controls.export.program import NO_JERK, write_program
     from planner.report.html.saved import saved_plan
 
     if os.path.lexists(output):

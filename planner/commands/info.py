@@ -20,7 +20,7 @@ def info_command(
     """Show what a program contains, and the line of every construct that is not supported."""
     from planner.machine import load_machine
     from planner.nc.info import inspect_program
-    from planner.report.export import info_summary
+    from planner.report.summary import info_summary
     from planner.report.tables import info_table
 
     found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE), reading)

@@ -75,7 +75,7 @@ def import_file(
     ] = None,
 ) -> None:
     """Make a machine file from the settings of a control, and say what they leave open."""
-    from planner.machine_import.convert import RAMP_TIME, import_machine
+    from planner.controls.machine_import.convert import RAMP_TIME, import_machine
 
     imported = import_machine(
         settings,

@@ -36,7 +36,7 @@ from planner.commands.terminal import guarded, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 INTO_OUTPUT = "into the output directory: name one with -o DIR"
 IN_OUTPUT = "in the output directory: name one with -o DIR"
@@ -126,7 +126,7 @@ def plan_command(
             if value:
                 raise InputError(f"{name} is for one program; {len(jobs)} are given")
         from planner.commands.many import plan_many
-        from planner.methods.registry import check_settings
+        from planner.planning.methods.registry import check_settings
 
         check_settings(method, **how)
         handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
@@ -136,9 +136,10 @@ def plan_command(
         return
     (job,) = jobs
     from planner import plan
-    from planner.job.trace import Trace
+    from planner.planning.job.trace import Trace
     from planner.report import trace_file
-    from planner.report.export import SUMMARY, check_places, summary, write_plan
+    from planner.report.export import SUMMARY, check_places, write_plan
+    from planner.report.summary import summary
 
     form = file_format or Format.parquet
     if output is not None:

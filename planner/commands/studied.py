@@ -22,7 +22,7 @@ from planner.commands.options import (
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
-    from planner.study.variant import StudiedJob
+    from planner.commands.study.variant import StudiedJob
 else:
     StudiedJob = Any  # of the commands' arguments: the module is loaded when a command runs
 
@@ -46,10 +46,10 @@ def _studied_job(
     *, job: Any, machine: str | None, tolerance: float | None, how: dict[str, Any], reading: Reading
 ) -> StudiedJob:
     """The job of a command line, read. Raises InputError, for settings that the method does not use too."""
+    from planner.commands.study.variant import StudiedJob
     from planner.machine import load_machine
-    from planner.methods.registry import check_settings
     from planner.nc.reader import read_program
-    from planner.study.variant import StudiedJob
+    from planner.planning.methods.registry import check_settings
 
     check_settings(**how)
     if tolerance is not None and not 0.0 < tolerance < float("inf"):

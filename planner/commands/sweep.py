@@ -58,11 +58,12 @@ def sweep_command(
     """
     if cluster is not None and threads is not None:
         raise InputError("--threads is for processes of this machine; a cluster has the workers that it has")
+    from planner.commands.study.points import SweepFolder
+    from planner.commands.study.ranges import grid_of, parse_varied
+    from planner.commands.study.sweep import sweep
+    from planner.commands.study.tables import sweep_table
+    from planner.commands.study.written import write_sweep
     from planner.report.tables import assumed_lines
-    from planner.study.points import SweepFolder
-    from planner.study.ranges import grid_of, parse_varied
-    from planner.study.sweep import sweep, write_sweep
-    from planner.study.tables import sweep_table
 
     varied = [parse_varied(text, studied.machine, studied.present_tolerance) for text in vary]
     for point in grid_of(varied)[:1]:

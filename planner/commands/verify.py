@@ -33,7 +33,7 @@ from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:
     from planner.machine import Machine
-    from planner.verify import Verdict
+    from planner.verifier import Verdict
 
 
 @guarded
@@ -73,13 +73,13 @@ def verify_command(
 ) -> None:
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.geometry.build import toolpath_from_program
-    from planner.job.at_tip import Judged, judged
     from planner.nc.reader import read_program
     from planner.nc.set_limits import limited
-    from planner.report.export import corner_summary, verdict_summary
+    from planner.planning.job.at_tip import Judged, judged
+    from planner.report.summary import corner_summary, verdict_summary
     from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
-    from planner.verify import NOT_LIMITED_NAMES, fit_axes
+    from planner.verifier import NOT_LIMITED_NAMES, fit_axes
 
     unjudged = tuple(not_limited or ())
     for name in unjudged:

@@ -41,10 +41,10 @@ def what_if_command(
     """
     if not changes:
         raise InputError("nothing to change: name a setting and its value, such as --set axes.y.jerk=4e5")
+    from planner.commands.study.settings import parse_setting
+    from planner.commands.study.tables import what_if_dict, what_if_table
+    from planner.commands.study.what_if import what_if
     from planner.report.tables import assumed_lines
-    from planner.study.settings import parse_setting
-    from planner.study.tables import what_if_dict, what_if_table
-    from planner.study.what_if import what_if
 
     settings = [parse_setting(text, studied.machine, studied.present_tolerance) for text in changes]
     with ProgressBar(quiet=quiet) as progress:

@@ -12,7 +12,7 @@ is a parabola with its top at eps/(2c), hence
 
 and where a short leg keeps the corner from using eps_ap, X = min(A, (eps - eps_ap)/c).
 
-A is what machine and axes allow in the direction of the corner's bisector (constraints/normal_limit.py). With it the closed-form speed
+A is what machine and axes allow in the direction of the corner's bisector (corners/budget.py). With it the closed-form speed
 is a true upper bound: no motion within the axis limits passes the apex faster, whatever it does along the path.
 """
 
@@ -21,13 +21,6 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints import chord_error, filter_error
-from planner.machine import Machine
-
-
-def error_rate(machine: Machine) -> float:
-    """c = dt^2/8 + sum T^2/24 [s2]: chord and filter error per unit of normal acceleration."""
-    return chord_error.rate(machine) + filter_error.rate(machine)
 
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:

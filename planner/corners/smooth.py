@@ -14,9 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.constraints import normal_limit
-from planner.corners.allocation import allocate, error_rate
+from planner.corners.allocation import allocate
 from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
+from planner.corners.budget import error_rate, normal_at_corners, normal_within_budget
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.spline import Spline, no_spline
@@ -183,7 +183,7 @@ def round_corners(
     feed = np.minimum(_finite_feed(toolpath, machine, before), _finite_feed(toolpath, machine, after))
 
     u1, u2 = toolpath.tangent_end[before], toolpath.tangent_start[after]
-    reachable = normal_limit.at_corners(machine, toolpath.axes, u1, u2, curvature)
+    reachable = normal_at_corners(machine, toolpath.axes, u1, u2, curvature)
     rate = error_rate(machine)
 
     usable = (1.0 - free) * legs.length
@@ -217,7 +217,7 @@ def round_corners(
         scale=scale,
         tol=tol,
         tol_ap=tol_ap,
-        normal_max=normal_limit.within_budget(tol, tol_ap, reachable, rate),
+        normal_max=normal_within_budget(tol, tol_ap, reachable, rate),
         spline=no_spline(len(toolpath.axes)),
     )
 

@@ -28,9 +28,9 @@ from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_r
 from planner.delivery.path_errors import SPARE, Errors, PathErrors
 from planner.delivery.periods import Standing, standing, with_standstills
 from planner.delivery.rests import mean_of_filters
-from planner.fir.filters import Filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.motion.filters import Filters
 from planner.motion.timing import MotionInTime, in_chunks
 
 STOPS_AT_ONCE = SIZES.stops_at_once

@@ -1,7 +1,7 @@
 """What a verdict finds is mended where it is found: the motion is run slower there, and as it was everywhere else.
 
 A limit that is exceeded, a feed, a corner passed too fast, and an error of the chords between samples or of filters all get less where
-the motion is slower (verify/excess.py says by what power), so that each says by how much it has to be. What does not get less, a path
+the motion is slower (verifier/excess.py says by what power), so that each says by how much it has to be. What does not get less, a path
 that leaves the tolerance by itself, is not mended here; nor is a motion that takes more than `MOST_SLOWER` times as long anywhere,
 which is a mistake to be seen.
 
@@ -20,7 +20,7 @@ from planner.delivery.periods import Standing
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import FAR, Place, Slowed, reach, without_stands
 from planner.motion.timing import MotionInTime
-from planner.verify import OF_CHORDS, Kind, Verdict
+from planner.verifier import OF_CHORDS, Kind, Verdict
 
 # So often a motion is mended and judged again, at other times each time: an excess may be larger between the places looked at before.
 ROUNDS = 6

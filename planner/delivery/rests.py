@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.fir.filters import Filters
+from planner.motion.filters import Filters
 from planner.motion.shaping import Shaper
 
 # Steps of Td: with one vibration mode each is less than 3 degrees of it, and straight lines between them miss 4e-4 of the amplitude.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import ROWS, FeedrateProblem
+from planner.feedrate.constraints.problem import ROWS, FeedrateProblem
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 

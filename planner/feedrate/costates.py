@@ -1,7 +1,7 @@
 """Multipliers of the second-order optimum: what its limits cost, from the profile alone.
 
-With x = feed^2 and u on the intervals (constraints/problem.py), rows g = (r' u + r'' x)/c, pi of the kinematics and mu of x/X, the
-Lagrangian
+With x = feed^2 and u on the intervals (feedrate/constraints/problem.py), rows g = (r' u + r'' x)/c, pi of the kinematics and mu of
+x/X, the Lagrangian
 
     L = sum_i 2 h_i/(sqrt(x_i) + sqrt(x_{i+1})) + pi_i (x_i + 2 h_i u_i - x_{i+1}) + lam_i g_i + mu_i x_i/X_i
 
@@ -27,7 +27,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import axis_rows
 from planner.feedrate.solution import FeedrateSolution, Multipliers
 

@@ -26,13 +26,14 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints import axis_jerk
-from planner.constraints.assemble import feedrate_problem, interval_feed_sq_max
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints import axis_jerk
+from planner.feedrate.constraints.assemble import feedrate_problem, interval_feed_sq_max
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import insert_points, straight
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
-from planner.path.samples import PathSamples, insert_points, straight
 
 # Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit. A point nearer to
 # an end of its interval is that end: rounding put points of tiny intervals there, 4e-16 mm apart beside a jump of a limit of one's own.

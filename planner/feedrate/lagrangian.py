@@ -21,7 +21,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.columns import ProblemColumns, columns_of
 from planner.feedrate.jerk.rows import duration
 from planner.feedrate.solution import FeedrateSolution

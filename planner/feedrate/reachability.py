@@ -29,7 +29,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
 # Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached with A <= 6.

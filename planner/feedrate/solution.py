@@ -11,9 +11,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import NotSolvedError
-from planner.constraints.limit import RowLimit, RowPoint
-from planner.constraints.limits import ACCELERATION, JERK, ROWS, VELOCITY
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.limit import RowLimit, RowPoint
+from planner.feedrate.constraints.limits import ACCELERATION, JERK, ROWS, VELOCITY
+from planner.feedrate.constraints.problem import FeedrateProblem
 
 
 class Status(Enum):

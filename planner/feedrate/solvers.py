@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from planner.base.errors import InputError
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.exact_motion import ExactMotion

@@ -41,7 +41,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.packages import import_needed
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
 # Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it must be small against 1e8 (module text).

@@ -20,7 +20,7 @@ _KEYS = {
 
 
 class KinematicsData(Record):
-    """How the rotary axes carry the workpiece and the tool; kinematics/chain.py has the formulas.
+    """How the rotary axes carry the workpiece and the tool; machine/kinematics/chain.py has the formulas.
 
     type         : "xyzac-trt", "xyzbc-trt" (both axes turn the table), "head-table" (the head tilts, the table turns about z) or
                    "head-head" (an axis c carries the axis that tilts the tool)

@@ -150,7 +150,7 @@ class DialectData(Record):
 
 
 class ControlData(Record):
-    """What is set in the control's own planner, for predictions of how long it takes (control_files/models.py); None for its default.
+    """What is set in the control's own planner, for predictions of how long it takes (controls/export/models.py); None for its default.
 
     name                   : of the control; the other keys count for programs that are written for it
     acceleration           : largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204

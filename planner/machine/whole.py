@@ -12,7 +12,6 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator, model
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
-from planner.constraints.own import OwnLimit, check_names
 from planner.machine.faults import faults_in_words
 from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import (
@@ -29,6 +28,7 @@ from planner.machine.parts import (
     Tolerance,
     ToolData,
 )
+from planner.machine.user_limit import OwnLimit, check_names
 
 LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
@@ -178,7 +178,7 @@ class Machine(Record):
 
     @property
     def own(self) -> tuple[OwnLimit, ...]:
-        """Limits beside those of a machine file (constraints/own.py)."""
+        """Limits beside those of a machine file (machine/user_limit.py)."""
         return self._own
 
     def check(self) -> None:

@@ -19,8 +19,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import PHASES, rest_to_rest_phases
-from planner.constraints.own import along_path
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine.user_limit import along_path
 from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory
 from planner.motion.vertex_times import passing_times_of

@@ -30,8 +30,8 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray, freeze
-from planner.fir.filters import damped_period
 from planner.machine import Mode
+from planner.motion.filters import damped_period
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
-from planner.path.samples import PathSamples
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

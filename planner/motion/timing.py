@@ -23,12 +23,12 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.search import nearest
 from planner.base.sizes import SIZES
+from planner.feedrate.sampling.path_samples import PathSamples
 from planner.motion.lots import sample
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.sampling import Grid, inverses
 from planner.motion.time_law import TimeLaw
 from planner.motion.trajectory import Trajectory
-from planner.path.samples import PathSamples
 
 # Where a piece of the law is looked at [share of the piece].
 WATCHED = np.array([0.05, 0.5, 0.95])

@@ -1,8 +1,8 @@
 """The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 switch it on and off on a machine with kinematics.
 
-While it is on, x, y, z of the program are those of the controlled point p of kinematics/chain.py: the tool's tip as seen from the
-workpiece, with the tool's length L in z. While it is off they are the joints q. The switch moves nothing: what stands still are the
-joints. L is the length of the tool offset in force, else `tool_length` of the machine file.
+While it is on, x, y, z of the program are those of the controlled point p of machine/kinematics/chain.py: the tool's tip as seen
+from the workpiece, with the tool's length L in z. While it is off they are the joints q. The switch moves nothing: what stands
+still are the joints. L is the length of the tool offset in force, else `tool_length` of the machine file.
 
 The program that is planned is one of p throughout. A move with the switch off is
 
@@ -23,8 +23,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
-from planner.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.machine import Machine
+from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.events import EventTable

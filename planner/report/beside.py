@@ -1,4 +1,4 @@
-"""What takes time beside the motion (job/beside.py), in words for the terminal and in numbers for `summary.json`."""
+"""What takes time beside the motion (planning/job/beside.py), in words for the terminal and in numbers for `summary.json`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from planner.report.times import hours_text
 
 if TYPE_CHECKING:
-    from planner.job.beside import Beside
-    from planner.job.plan import Plan
+    from planner.planning.job.beside import Beside
+    from planner.planning.job.plan import Plan
 
 
 def beside_rows(beside: Sequence[Beside], cycle_time: float, dwell: float) -> list[tuple[str, str]]:

@@ -19,15 +19,15 @@ from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.nc.reading import AS_USUAL, Reading
-from planner.report.export import summary, verdict_summary
+from planner.report.summary import summary, verdict_summary
 
 if TYPE_CHECKING:
-    from planner.constraints.own import OwnLimit
-    from planner.job.method import Method
-    from planner.job.plan import Plan
-    from planner.job.stages import Progress
+    from planner.machine.user_limit import OwnLimit
+    from planner.planning.job.method import Method
+    from planner.planning.job.plan import Plan
+    from planner.planning.job.stages import Progress
     from planner.report.html.data import Samples
-    from planner.verify import Verdict
+    from planner.verifier import Verdict
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.
 AFTER_PLANNING = ("read", "sample", "verify")
 
@@ -96,7 +96,7 @@ def compare(
     Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a method cannot do is its
     row.
     """
-    from planner.methods.registry import DEFAULT_MACHINE
+    from planner.planning.methods.registry import DEFAULT_MACHINE
 
     if not isinstance(machine, Machine):
         machine = load_machine(DEFAULT_MACHINE if machine is None else machine)

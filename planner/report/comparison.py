@@ -16,10 +16,10 @@ from rich.text import Text
 from planner.base.errors import InputError
 from planner.base.files import readable
 from planner.base.units import MICROMETRE
-from planner.constraints import normal_limit
+from planner.feedrate.constraints import normal_limit
 from planner.machine import Machine
-from planner.report.export import versions
 from planner.report.replace import check_file, replacing_file, starts_with
+from planner.report.summary import versions
 from planner.report.tables import ratio_text
 
 if TYPE_CHECKING:

@@ -7,45 +7,30 @@ places together (`planner.report.replace`), and trajectory and summary carry the
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import json
-import math
-import platform
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.job.at_tip import joints_of
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.nc.info import PLACES_SHOWN
 from planner.nc.points import SOURCE, points_file
-from planner.nc.program import ToolPoint
-from planner.report.beside import beside_summary
+from planner.planning.job.at_tip import joints_of
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
-from planner.report.optimum import optimum_summary
 from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
-from planner.report.rows import plan_rows
+from planner.report.summary import json_ready, not_limited, summary, tool_point_summary, uniform, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
 from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
-    from planner.nc.info import ProgramInfo
-    from planner.verify import CornerCheck, Verdict
+    from planner.planning.job.plan import Plan
 
 PLANNED = "planned.ngc"
 KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs that no other file has
-NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
-PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
 
 
 def write_plan(
@@ -150,69 +135,6 @@ def check_places(
     check_output(directory, names, force=force)
 
 
-def summary(plan: Plan) -> dict[str, Any]:
-    """The plan in numbers, ready for JSON: what `planner plan --json` prints."""
-    verdict = plan.verdict
-    return json_ready(
-        {
-            "program": plan.program.source,
-            "assumptions": plan.program.assumptions,
-            "machine": plan.machine.name,
-            "method": plan.method,
-            "geometry": plan.geometry,
-            "corner": plan.corner,
-            "solver": plan.solver,
-            "status": plan.status.name,
-            "sentence": plan.sentence,
-            "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
-            "beside_motion": beside_summary(plan),
-            "stop_time_s": plan.stop_time,
-            "tolerance_mm": _uniform(plan.toolpath.tolerance),
-            "verdict": verdict_summary(verdict) if verdict is not None else None,
-            "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
-            **optimum_summary(plan.grid, plan.prices),
-            "reading": plan.program.reading.changed(),
-            "blocks": len(plan.program),
-            "tool_point": _tool_point(plan.program.tool_point),
-            "grid_points": plan.grid_points,
-            "notes": plan.notes,
-            "timings_s": plan.timings,
-            "versions": versions(),
-            "told": plan_rows(plan),
-        }
-    )
-
-
-def verdict_summary(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers: the largest ratio to each limit, errors, faults."""
-    return json_ready(
-        {**verdict.summary(), "not_limited": _not_limited(verdict), "faults": verdict.sentences}
-    )
-
-
-def corner_summary(corners: CornerCheck) -> dict[str, Any]:
-    """Eq. 18-20 at the programmed corners in numbers."""
-    return json_ready(corners.summary())
-
-
-def _not_limited(verdict: Verdict) -> list[str]:
-    """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
-    return sorted({name.partition(".")[0] for name, check in verdict.limits.items() if not check.limited})
-
-
-def info_summary(info: ProgramInfo) -> dict[str, Any]:
-    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`.
-
-    Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
-    """
-    fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
-    fields["tool_point"] = _tool_point(info.tool_point)
-    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
-    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
-    fields["unsupported_places"] = len(info.unsupported)
-    return json_ready(fields)
-
-
 def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
     """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from it."""
     trajectory = plan.trajectory
@@ -228,31 +150,20 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "geometry": plan.geometry,
             "corner": plan.corner,
             "dt_s": trajectory.dt,
-            "tolerance_mm": _uniform(plan.toolpath.tolerance),
+            "tolerance_mm": uniform(plan.toolpath.tolerance),
             "reading": plan.program.reading.changed(),
-            "not_limited": _not_limited(plan.verdict) if plan.verdict is not None else [],
+            "not_limited": not_limited(plan.verdict) if plan.verdict is not None else [],
             "units": units(
                 trajectory.axes,
                 extruder=plan.toolpath.extrusion is not None,
                 tip=plan.joints is not None,
                 feed=WordFeed(plan.toolpath).units,
             ),
-            "tool_point": _tool_point(plan.program.tool_point),
+            "tool_point": tool_point_summary(plan.program.tool_point),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
             "versions": versions(),
         }
     )
-
-
-def _tool_point(point: ToolPoint | None) -> dict[str, Any] | None:
-    """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the joints."""
-    return None if point is None else dataclasses.asdict(point)
-
-
-def versions() -> dict[str, str]:
-    """Versions of this package, of Python, and of the packages that compute."""
-    found = {"planner": metadata.version("feedrate-planner"), "python": platform.python_version()}
-    return found | {name: metadata.version(name) for name in PACKAGES}
 
 
 def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple[bytes | None, list[str]]:
@@ -268,24 +179,6 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
 def _is_source(plan: Plan, file: Path) -> bool:
     """Whether the plan's program was read from that file, which must then not be replaced."""
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
-
-
-def _uniform(tolerance: FloatArray) -> float | None:
-    """The contour tolerance if it is the same at every joint; None where the program changes it (G64 P)."""
-    return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
-
-
-def json_ready(value: Any) -> Any:
-    """Numbers, strings, lists and dictionaries only; NaN and infinity, which JSON lacks, become None."""
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [json_ready(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _write_json(path: Path, value: dict[str, Any]) -> None:

@@ -1,5 +1,5 @@
 """What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py,
-toolpath_figure.py), plotly in notebooks (interactive/figures.py) and in pages (html/), for which
+toolpath_figure.py), plotly in notebooks (report/interactive/figures.py) and in pages (html/), for which
 plotly_figure.py puts it into plotly's words.
 
 A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of
@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.planning.job.at_tip import of_axes
 from planner.report.colours import COLOURS, DIM, INK
 from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
     from planner.machine import Machine
     from planner.motion.trajectory import Trajectory
+    from planner.planning.job.plan import Plan
 
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
 QUANTITIES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}

@@ -13,7 +13,7 @@ import numpy as np
 from planner.base.units import MICROMETRE
 
 if TYPE_CHECKING:
-    from planner.job.records import DearCorners, GridHistory, PriceList
+    from planner.sensitivity.records import DearCorners, GridHistory, PriceList
 
 LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
 SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]

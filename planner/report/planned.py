@@ -29,7 +29,7 @@ from planner.nc.writer import retimed
 from planner.report.block_feeds import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 _MOTION = (
     "kind", "end", "dwell", "line", "path_control", "tolerance",

@@ -14,7 +14,7 @@ from planner.report.profiles_figure import profiles_figure
 from planner.report.toolpath_figure import toolpath_figure
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 STYLE: Any = {
     "font.size": 8.5,

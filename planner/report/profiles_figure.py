@@ -15,14 +15,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
-from planner.job.records import WORDS
 from planner.report.colours import COLOURS, GREY, LIGHT, limit_colours
 from planner.report.figure import MotionColumns, profile_panels
 from planner.report.html.data import used_limits
 from planner.report.optimum import held_by_rows
+from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 COLUMNS = 1500  # about the width of a profile in pixels
 FAR = 4.0  # peaks beyond this multiple of the limit are drawn on a scale that is logarithmic beyond the limit

@@ -17,8 +17,8 @@ from planner.report.times import hours_text
 
 if TYPE_CHECKING:
     from planner.base.arrays import FloatArray
-    from planner.job.plan import Plan
-    from planner.verify import Ringing, Verdict
+    from planner.planning.job.plan import Plan
+    from planner.verifier import Ringing, Verdict
 
 FAULTS_SHOWN = 8  # so that a table fits a terminal of 24 rows
 VERDICT, PASSED, FAILED = "verdict", "passed", "FAILED"

@@ -26,11 +26,11 @@ from planner.report.rows import (
 )
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
     from planner.nc.faults import Fault
     from planner.nc.info import ProgramInfo
     from planner.nc.program import Expansion
-    from planner.verify import CornerCheck, Verdict
+    from planner.planning.job.plan import Plan
+    from planner.verifier import CornerCheck, Verdict
 
 CALLS_SHOWN = 10  # subprograms that `info` names
 CORNERS_SHOWN = SIZES.table_corners

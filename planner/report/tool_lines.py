@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.job.at_tip import directions_of
 from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
+from planner.planning.job.at_tip import directions_of
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 TOOL = "#D55E00"
 SEEN = 50  # samples looked at for each place: a long motion is not evaluated as a whole

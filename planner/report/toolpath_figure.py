@@ -22,7 +22,7 @@ from planner.report.html.data import programmed_path
 from planner.report.tool_lines import TOOL, tool_lines
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = SIZES.picture_points

@@ -1,6 +1,6 @@
 """The trace of a plan as a JSON file: `program`, `method`, `corner`, `cycle_time_s`, `sentence`, and `steps`, one object each.
 
-Every step has `at` [s], `name`, `found` and `before` [s] or null, `kept` or null, and facts by name (job/trace.py).
+Every step has `at` [s], `name`, `found` and `before` [s] or null, `kept` or null, and facts by name (planning/job/trace.py).
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from planner.job.plan import Plan
-from planner.job.trace import Trace
+from planner.planning.job.plan import Plan
+from planner.planning.job.trace import Trace
 from planner.report.replace import check_file, replacing_file
 
 KEYS = {"program", "method", "steps"}  # by which a file is known as a trace

@@ -28,7 +28,7 @@ from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 from planner.report.digits import on_grid, rounding
 from planner.report.trajectory_room import npz_shapes, require_room
-from planner.verify import DERIVATIVES, Given
+from planner.verifier import DERIVATIVES, Given
 
 Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
-from planner.job.records import GridHistory
+from planner.sensitivity.records import GridHistory
 
 # An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with jerk limits are within
 # 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 % (pentagon, zig-zag, arcs, spiral); more does not help.

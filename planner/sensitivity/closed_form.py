@@ -6,7 +6,7 @@ with A as in corners/allocation.py. The planned speed at the apex never exceeds 
 the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
 (docs/papers.md C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners
 and for all
-methods, is the verifier's business (verify/error_allocation.py), which shares nothing with this.
+methods, is the verifier's business (verifier/error_allocation.py), which shares nothing with this.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution, active_names, constraint_ratios
-from planner.job.records import CornerTable
-from planner.path.samples import PathSamples
+from planner.sensitivity.records import CornerTable
 
 STRAIGHT = 1e-9  # [1/mm] a curvature below this is none: a radius of a thousand kilometres
 

@@ -25,19 +25,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.limits import ACCELERATION, CHORD_ERROR, FILTER_ERROR
-from planner.constraints.on_grid import interval_sides
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath, round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.limits import ACCELERATION, CHORD_ERROR, FILTER_ERROR
+from planner.feedrate.constraints.on_grid import interval_sides
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.rows import FREE_PART_MIN
+from planner.feedrate.sampling.samples import moved_grid
 from planner.feedrate.solution import FeedrateSolution
 from planner.geometry.toolpath import lesser_end
-from planner.job.records import DearCorners
 from planner.machine import Machine
-from planner.path.rows import FREE_PART_MIN
-from planner.path.samples import PathSamples, moved_grid
 from planner.sensitivity.prices import MORE_TOLERANCE, STEP, dearest_of
+from planner.sensitivity.records import DearCorners
 from planner.sensitivity.savings import more_of
 
 STEP_OF_LEG = 1e-2  # of differences, at most: a share of the free part of a leg [-]

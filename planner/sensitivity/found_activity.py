@@ -1,4 +1,4 @@
-"""What a motion is at where geometry and feed were found together: step by step, from the search's steps (tube/shares.py).
+"""What a motion is at where geometry and feed were found together: step by step, from the search's steps (joint/shares.py).
 
 A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each. Shown is the one that has the
 largest price there. Where the motion of the start stays, it is what held that.
@@ -13,17 +13,17 @@ from types import MappingProxyType
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.limits import ACCELERATION, CHORD_ERROR, FEED, JERK, VELOCITY
+from planner.feedrate.constraints.limits import ACCELERATION, CHORD_ERROR, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Toolpath
-from planner.job.records import GridHistory
+from planner.joint import price
+from planner.joint.motion import Steps
+from planner.joint.parts import FoundRun
+from planner.joint.shares import shares
+from planner.joint.splice import Spliced, SplicedRun
 from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST
-from planner.tube import price
-from planner.tube.motion import Steps
-from planner.tube.parts import FoundRun
-from planner.tube.shares import shares
-from planner.tube.splice import Spliced, SplicedRun
+from planner.sensitivity.records import GridHistory
 
 TOLERANCE = "tolerance"
 STANDS = 1e-9  # shorter standstills are rounding of times [s]

@@ -1,4 +1,4 @@
-"""What limits and tolerance cost where geometry and feed were found together, from the multipliers of that search (tube/price.py).
+"""What limits and tolerance cost where geometry and feed were found together, from the multipliers of that search (joint/price.py).
 
 Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So nothing is solved again. A
 limit acts at every step through its price there; the tolerance, and accelerations once more, through what eq. (20) leaves for the path,
@@ -20,17 +20,17 @@ from math import fsum  # `sum` rounds otherwise from Python 3.12 on
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.records import PlacePrices, PriceList
+from planner.joint import price
+from planner.joint.parts import FoundRun
+from planner.joint.run import budgets_of
 from planner.machine import Machine
 from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, price_list
+from planner.sensitivity.records import PlacePrices, PriceList
 from planner.sensitivity.savings import more_of
-from planner.tube import price
-from planner.tube.parts import FoundRun
-from planner.tube.run import budgets_of
 
-QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of tube/price.py
+QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
 # By how much a plan made again is faster or slower for no other reason [share of the time] (benchmarks/found_prices.py).
 UNREST = 2e-4
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
@@ -41,12 +41,12 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + 5) of tube/price.py, and the same without feed and velocities where these hold together
+    step, alone          : (N, 3 A + 5) of joint/price.py, and the same without feed and velocities where these hold together
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
     def __init__(self, toolpath: Toolpath, found: FoundRun, step: FloatArray, place: FloatArray):
-        """step : (N, 3 A + 5) of tube/price.py; place : (N+1,) of the nodes along the run [mm]"""
+        """step : (N, 3 A + 5) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
         self.found, self.step, axes = found, step, len(found.run.axis)
         assert found.steps is not None
         least = TIED * found.steps.h

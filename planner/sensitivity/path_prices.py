@@ -7,13 +7,13 @@ accelerations, the other way: the more a corner could use, the more of its budge
 error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
 
 Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with
-the corners, the splines and the `limit_scale` that it has (optimal/tighten.py). Where two limits hold
+the corners, the splines and the `limit_scale` that it has (planning/optimal/tighten.py). Where two limits hold
 together and both must give (equal axes at 45 degrees) the time has a kink and the price is a slope between
 the left one and the right one. Prices of the programmed feed and of axis velocities are those of more of
 them: where both are equal, neither alone is worth anything.
 
 Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of
-reshaping (optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a multiplier,
+reshaping (planning/optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a multiplier,
 added up at the nearest joint of the program. Accelerations are priced with the path as it is.
 
 **Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is
@@ -32,19 +32,19 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints import chord_error
-from planner.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
-from planner.constraints.problem import FeedrateProblem
+from planner.corners.budget import chord_rate
 from planner.corners.smooth import SmoothPath
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, OF_AXES, VELOCITY
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
+from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution, Prices
 from planner.geometry.toolpath import Joint
-from planner.job.records import PriceList
 from planner.machine import Machine
-from planner.path.samples import PathSamples
 from planner.sensitivity.corner_prices import corner_prices, sums
 from planner.sensitivity.places import bounds_but_speeds, bounds_with, by_place
 from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, STEP, TOLERANCE, dearest, price_list
+from planner.sensitivity.records import PriceList
 from planner.sensitivity.savings import Change, more_of, solved_again
 
 WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
@@ -167,5 +167,5 @@ def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machin
     (18)."""
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
     tolerance = samples.path.toolpath.tolerance[samples.segment]
-    chord = kappa * solution.feed_sq * chord_error.rate(machine)
+    chord = kappa * solution.feed_sq * chord_rate(machine)
     return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())

@@ -17,15 +17,15 @@ import dataclasses
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.assemble import bounds_of, feedrate_problem
-from planner.constraints.limits import FEED, LIMITS, VELOCITY
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath
+from planner.feedrate.constraints.assemble import bounds_of, feedrate_problem
+from planner.feedrate.constraints.limits import FEED, LIMITS, VELOCITY
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.lagrangian import Lagrangian
-from planner.job.records import PlacePrices
+from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
-from planner.path.samples import PathSamples
 from planner.sensitivity.prices import MORE_LIMIT
+from planner.sensitivity.records import PlacePrices
 from planner.sensitivity.savings import Change
 
 SPEEDS = (FEED, VELOCITY)

@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.job.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
+from planner.sensitivity.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and of the tolerance [mm]

@@ -16,14 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.sizes import SIZES
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.own import ScaledLimit
-from planner.constraints.problem import FeedrateProblem
 from planner.corners.smooth import SmoothPath, round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import moved_grid
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
-from planner.path.samples import PathSamples, moved_grid
+from planner.machine.user_limit import ScaledLimit
 
 POINTS = SIZES.priced  # of all problems that are solved again
 SOLVER = JerkLimited(tol=1e-5)  # with a gap a tenth of the usual one: differences of times are wanted

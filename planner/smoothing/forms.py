@@ -147,7 +147,7 @@ def _add_prices(knots, control, motion, at, limits, H, Q):
 @njit(cache=True, error_model="numpy")
 def motion_bands(splines, motion, limits):
     """Two bands (A, n, 6) over the control points of all runs that fit: of what the motion pays, and of its squared jerks over their
-    limits, times dt (optimal/reshape.py), both [s/mm2].
+    limits, times dt (planning/optimal/reshape.py), both [s/mm2].
 
     limits : (2, A) of acceleration [mm/s2] and jerk [mm/s3]
     """

@@ -1,7 +1,7 @@
 """Smooth curves inside the corridor: each run relaxed to the least integral of its squared third derivative, and proved to be inside.
 
 Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed is known yet;
-optimal/reshape.py weights them by what the time-optimal motion pays for.
+planning/optimal/reshape.py weights them by what the time-optimal motion pays for.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
 is too large, and relaxed again.

@@ -9,7 +9,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.corners.allocation import allocate, error_rate
+from planner.corners.allocation import allocate
+from planner.corners.budget import error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath

@@ -12,9 +12,9 @@ import planner
 from planner.base.errors import InputError
 from planner.base.names import METHOD_ALIASES, METHODS, method_name, smoothing, users_of
 from planner.cli import app
-from planner.methods.optimal import OptimalMethod
-from planner.methods.registry import make_method
-from planner.methods.second_order import SecondOrderMethod
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.registry import make_method
+from planner.planning.methods.second_order import SecondOrderMethod
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -21,9 +21,9 @@ from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
 from benchmarks.campaign_table import BEGIN, END, PAGE, paragraph, with_paragraph
 from benchmarks.campaign_tally import LEAST, Tally, wrongs
 from benchmarks.record import planner_state
-from planner.job.plan import Plan
-from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.registry import plan
 
 
 @functools.cache

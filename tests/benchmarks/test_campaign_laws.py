@@ -22,8 +22,8 @@ from benchmarks.campaign_laws import (
 )
 from benchmarks.campaign_rows import blocks_of
 from planner.geometry.build import toolpath_from_program
-from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.planning.methods.registry import plan
 
 
 @pytest.mark.parametrize("change", ["mirrored", "reversed", "scaled"])

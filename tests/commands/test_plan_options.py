@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 import planner
 from planner.base.errors import InputError
 from planner.cli import app
-from planner.methods.stop import StopMethod
+from planner.planning.methods.stop import StopMethod
 
 
 def run(*arguments: object) -> Result:

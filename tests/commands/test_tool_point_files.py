@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from planner.geometry.build import toolpath_from_program
-from planner.job.at_tip import directions_of
-from planner.kinematics import kinematics_of
 from planner.machine import load_machine
+from planner.machine.kinematics import kinematics_of
 from planner.nc.reader import read_program
+from planner.planning.job.at_tip import directions_of
 from planner.report.block_feeds import planned_blocks
 from planner.report.html.picture import path_picture
 from planner.report.html.saved import saved_plan

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from whole_plans import smooth_path, solve
 
 from benchmarks import problems
-from planner.constraints import normal_limit
 from planner.corners.allocation import (
     allocate,
     error_rate,
 )
 from planner.corners.bezier import BezierCorner
+from planner.corners.budget import normal_of_axes, normal_within_budget
 from planner.machine import Fir
 from planner.sensitivity.closed_form import corner_table
 
@@ -47,7 +47,7 @@ def test_three_sources_use_the_whole_budget(tol, acceleration, dt, filters):
     rate = error_rate(problems.machine(dt=dt, fir=Fir(time_constants=filters)))
     assert rate == pytest.approx(dt**2 / 8 + (filters[0] ** 2 + filters[1] ** 2) / 24, rel=1e-12)
     chosen = allocate(np.array([tol]), np.array([acceleration]), rate)
-    X = normal_limit.within_budget(np.array([tol]), chosen, np.array([acceleration]), rate)[0]
+    X = normal_within_budget(np.array([tol]), chosen, np.array([acceleration]), rate)[0]
     assert pytest.approx(min(acceleration, tol / (2 * rate)), rel=1e-9) == X
     chord, fir = X * dt**2 / 8, X * sum(T * T for T in filters) / 24
     assert chosen[0] + chord + fir == pytest.approx(tol, rel=1e-9)
@@ -77,7 +77,7 @@ def test_equation_20_as_printed():
 def test_a_capped_corner_gives_what_it_cannot_use_to_the_chord(tol, acceleration, rate, cap):
     free = allocate(np.array([tol]), np.array([acceleration]), rate)[0]
     used = cap * free
-    X = normal_limit.within_budget(np.array([tol]), np.array([used]), np.array([acceleration]), rate)[0]
+    X = normal_within_budget(np.array([tol]), np.array([used]), np.array([acceleration]), rate)[0]
     assert pytest.approx(min(acceleration, (tol - used) / rate)) == X
     assert used + rate * X <= tol * (1 + 1e-12)
     tried = np.linspace(
@@ -95,7 +95,7 @@ def test_the_axes_support_along_the_bisector(theta, seed):
     side = np.cross(u1, rng.normal(size=3))
     side /= np.linalg.norm(side)
     u2 = np.cos(theta) * u1 + np.sin(theta) * side
-    found = normal_limit.of_axes(limits, u1[None], u2[None])[0]
+    found = normal_of_axes(limits, u1[None], u2[None])[0]
     corners = np.array(np.meshgrid(*[(-a, a) for a in limits])).reshape(3, -1).T
     if theta > 1e-5:
         n = (u2 - u1) / np.linalg.norm(u2 - u1)

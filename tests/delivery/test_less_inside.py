@@ -9,16 +9,16 @@ import pytest
 
 import planner
 from benchmarks import problems
-from planner.constraints.on_grid import remaining_budget
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.delivery.periods import LEFT_MIN, with_less_inside, with_less_tolerance
+from planner.feedrate.constraints.on_grid import remaining_budget
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import chorded
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Axis, Machine
 from planner.nc.reader import parse_program
-from planner.path.samples import sample_path
 
 MACHINE = Machine(
     name="slow samples",

@@ -13,15 +13,15 @@ from planner.delivery.pacing import runs_of, slower_runs
 from planner.delivery.periods import Standing
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
-from planner.job.job import Job
-from planner.job.stages import Stages
-from planner.job.trace import Trace
 from planner.machine import load_machine
-from planner.methods.kinematic import KinematicMethod
-from planner.methods.registry import plan
 from planner.motion.slowed import Slowed
 from planner.nc.reader import parse_program
-from planner.verify.excess import Excess, Fault, Kind
+from planner.planning.job.job import Job
+from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Trace
+from planner.planning.methods.kinematic import KinematicMethod
+from planner.planning.methods.registry import plan
+from planner.verifier.excess import Excess, Fault, Kind
 
 MACHINE = load_machine("mill").model_copy(update={"dt": 2e-3, "normal_acceleration": 500.0})
 NO_STANDS = Standing(np.empty(0), np.empty(0))

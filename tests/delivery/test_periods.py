@@ -13,15 +13,15 @@ from planner.delivery import mending, periods
 from planner.delivery.periods import ABOVE, USED, missed, with_less_tolerance
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
-from planner.job import job as jobs
-from planner.job import method as job_method
-from planner.methods.fir import FirMethod
-from planner.methods.registry import plan
 from planner.motion.axis_motion import AxisMotion
 from planner.motion.timing import sample_motion
 from planner.motion.trajectory import joined
 from planner.motion.vertex_times import passing_times, passing_times_of, standstills
 from planner.nc.reader import parse_program
+from planner.planning.job import job as jobs
+from planner.planning.job import method as job_method
+from planner.planning.methods.fir import FirMethod
+from planner.planning.methods.registry import plan
 
 LEG = 10.0  # [mm]
 
@@ -117,7 +117,7 @@ def test_waiting_shifts_what_follows():
 
 def _motion_of(made, job):
     """The motion along a path that method `stop` delivers."""
-    from planner.methods.stop import StopMethod
+    from planner.planning.methods.stop import StopMethod
 
     return StopMethod().plan_job(job).making.motion
 

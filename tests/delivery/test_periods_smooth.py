@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import problems
-from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.planning.methods.registry import plan
 
 TEXT = "G20\nG0 X1 Y2 Z3\nF120000\nG90 G5.1 X13.397 Y-17.91 I-10.207 J1.930\nM2\n"
 

@@ -8,10 +8,10 @@ import pytest
 from benchmarks.setpoints import trajectory_of
 from planner.base.arrays import FloatArray
 from planner.delivery.rests import HALVINGS, STEPS, Mean, mean_of_copies, mean_of_filters
-from planner.fir.filters import Filters
 from planner.machine import Mode
+from planner.motion.filters import Filters
 from planner.motion.shaping import Shaper, shaper_of
-from planner.verify.filtered import filtered
+from planner.verifier.filtered import filtered
 
 ARRIVAL, FAR = 0.3, 0.5  # when the corner is reached [s], and how far away the motion starts and ends [mm]
 FINE = 20_000

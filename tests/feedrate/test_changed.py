@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.changed import Known, solve_changed
+from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import FeedrateSolution, Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import load_machine
-from planner.path.samples import sample_path
 
 MACHINE = load_machine("mill")
 

@@ -12,16 +12,16 @@ from benchmarks import problems
 from benchmarks.jerk_campaign import small_problem
 from benchmarks.random_paths import random_path
 from planner.base.point_to_point import rest_to_rest_times
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.reachability import Reachability
+from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status, constraint_ratios
 from planner.geometry.build import toolpath_from_program
-from planner.path.samples import sample_path
 
 
 def third_order(program, machine):

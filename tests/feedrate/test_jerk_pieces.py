@@ -10,7 +10,7 @@ import pytest
 from benchmarks.jerk_campaign import faults, small_problem
 from benchmarks.random_paths import long_path, random_path
 from planner.base.threads import use_threads
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import part, solver
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.profile import Profile, backward

@@ -10,7 +10,7 @@ from oracles import needs_toppra
 from random_problems import random_problem
 
 from benchmarks.jerk_campaign import small_problem
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.reachability import Reachability

@@ -11,18 +11,18 @@ from whole_plans import smooth_path
 from benchmarks import problems
 from benchmarks.jerk_campaign import small_problem
 from planner.base.point_to_point import rest_to_rest_times
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
+from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status, active_names, constraint_ratios
 from planner.machine import Machine
 from planner.motion.time_law import law_of_solution
 from planner.motion.timing import Motion, dense_motion
 from planner.nc.program import Program
-from planner.path.samples import sample_path
 
 SOLVERS = ("ipopt", "fatrop")
 

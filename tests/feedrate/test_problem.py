@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from random_problems import line
 
 from planner.base.errors import NotSolvedError
-from planner.constraints import (
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.constraints import (
     axis_acceleration,
     axis_velocity,
     chord_error,
@@ -21,14 +23,12 @@ from planner.constraints import (
     phase_lag,
     programmed_feed,
 )
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
-from planner.corners.bezier import BezierCorner
-from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
-from planner.path.samples import sample_path
 
 positive = st.floats(1e-3, 1e3)
 curvature = st.floats(1e-6, 1e3)

@@ -16,7 +16,7 @@ from whole_plans import solve
 from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import (
     Interval,
     Reachability,

@@ -11,7 +11,7 @@ from random_problems import in_units, line, reversed_problem
 from scipy.integrate import quad
 
 from benchmarks.random_paths import nurbs, random_path
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reference.near_rest import NEAR
 from planner.feedrate.reference.nlp import JerkLimitedNLP

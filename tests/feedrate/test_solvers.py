@@ -16,13 +16,14 @@ from planner import plan
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.names import METHODS
-from planner.constraints.assemble import feedrate_problem
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.reference.sequential_convex import SequentialConvex
+from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.solvers import (
     OWN,
@@ -31,8 +32,7 @@ from planner.feedrate.solvers import (
     second_order_solver,
     third_order_solver,
 )
-from planner.methods.optimal import OptimalMethod
-from planner.path.samples import sample_path
+from planner.planning.methods.optimal import OptimalMethod
 
 FOREIGN = [name for name in THIRD_ORDER if name != OWN]
 CORNER = "G21 G90 G64 P0.05 F6000\nG1 X6\nX8 Y5\nM2\n"

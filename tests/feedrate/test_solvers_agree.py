@@ -12,7 +12,7 @@ from random_problems import circle, line, random_problem
 from whole_plans import solve
 
 from benchmarks import problems
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability, controllable_sets
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.toppra_adapter import ToppraSolver

@@ -9,13 +9,13 @@ import pytest
 from curves import circle, curve_named, wave
 
 from planner.base.arrays import FloatArray
+from planner.baselines.lookahead.stop_moves import parts_of
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_sagitta, chorded, points_on
 from planner.geometry.curves import PLACES, UNEVEN, CurveSegments, curve_segments
 from planner.geometry.legs import leg_point, leg_tangent, legs_of
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.lookahead.stop_moves import parts_of
 from planner.machine import load_machine
 from planner.nc.bezier import at, cubic_pieces, homogeneous
 from planner.nc.reader import parse_program

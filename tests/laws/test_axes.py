@@ -9,8 +9,8 @@ import pytest
 
 import planner
 from planner.base.units import RAD_PER_DEG
-from planner.job.plan import Plan
 from planner.machine import Machine
+from planner.planning.job.plan import Plan
 
 LINEAR = {"velocity": 200.0, "acceleration": 2000.0, "jerk": 40000.0}
 ROTARY = {"velocity": 120.0, "acceleration": 900.0, "jerk": 15000.0}

@@ -13,15 +13,15 @@ from scipy.spatial import cKDTree
 
 from benchmarks import problems
 from planner.delivery import mending
-from planner.job import job as job_module
 from planner.machine import Fir
-from planner.methods.fir import FirMethod
-from planner.methods.fir_spline import FirSplineMethod
-from planner.methods.optimal import OptimalMethod
-from planner.methods.registry import plan
-from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
-from planner.optimal import loop as loop_module
+from planner.planning.job import job as job_module
+from planner.planning.methods.fir import FirMethod
+from planner.planning.methods.fir_spline import FirSplineMethod
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.registry import plan
+from planner.planning.methods.tube import TubeMethod
+from planner.planning.optimal import loop as loop_module
 
 FINE = 2e-4  # [s] of the convolution
 STEP = 2e-3  # [mm] between points of the path

@@ -10,14 +10,14 @@ from quick import slow_but
 
 import planner
 from benchmarks import problems
-from planner.constraints import chord_error, normal_limit
 from planner.delivery import mending
-from planner.job import method as job_method
+from planner.feedrate.constraints import chord_error, normal_limit
 from planner.machine import Machine
-from planner.methods.bezier import BezierMethod
 from planner.nc.reader import parse_program
-from planner.verify import CornerCheck, verify
-from planner.verify.pieces import RATIO_ROUNDING
+from planner.planning.job import method as job_method
+from planner.planning.methods.bezier import BezierMethod
+from planner.verifier import CornerCheck, verify
+from planner.verifier.pieces import RATIO_ROUNDING
 
 MACHINE = problems.machine()
 BUDGETS = """G21 G17 G90 G94 F6000

@@ -17,12 +17,12 @@ from quick import slow_but
 
 from benchmarks import problems
 from planner.machine import Axis, Machine
-from planner.methods.registry import METHODS, plan
 from planner.nc.program import Program
-from planner.verify.pieces import RATIO_ROUNDING
+from planner.planning.methods.registry import METHODS, plan
+from planner.verifier.pieces import RATIO_ROUNDING
 
 PLAIN = {"fir-plain", "fir-spline-plain"}
-# `tube` takes seconds per corner: tests/methods/test_tube.py has its laws.
+# `tube` takes seconds per corner: tests/planning/methods/test_tube.py has its laws.
 HOLDING = tuple(name for name in METHODS if name not in PLAIN | {"tube"})
 # Methods that choose a full stop where it is faster: never slower than stopping everywhere, to the accuracy of their grids.
 NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "second-order": 1e-6, "stop": 1e-9}

@@ -10,11 +10,11 @@ from benchmarks import problems
 from benchmarks.one_meaning import agrees, row
 from benchmarks.setpoints import averaged, within
 from planner.machine import Fir
-from planner.methods.registry import plan
 from planner.nc.reader import parse_program
+from planner.planning.methods.registry import plan
 from planner.report.trajectory_file import write_trajectory
 from planner.report.trajectory_reader import read_trajectory
-from planner.verify import verify
+from planner.verifier import verify
 
 KINDS = ["linear", "cubic", "hold"]
 ARC = parse_program("G21 F9000\nG1 X4\nG3 X4 Y4 I0 J2\nG1 X1\n", source="a half circle")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from planner.base.errors import InputError
-from planner.kinematics import kinematics_of
 from planner.machine import KinematicsData, Machine, machine_from_dict
+from planner.machine.kinematics import kinematics_of
 
 LIMITS = {"velocity": 100.0, "acceleration": 1000.0, "jerk": 20000.0}
 

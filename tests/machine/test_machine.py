@@ -9,8 +9,8 @@ import pytest
 
 import planner
 from planner.base.errors import InputError
+from planner.controls.machine_import.linuxcnc import settings
 from planner.machine import builtin_text, load_machine
-from planner.machine_import.linuxcnc import settings
 
 TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
 

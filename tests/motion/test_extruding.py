@@ -7,8 +7,8 @@ import pytest
 
 import planner
 from planner.base.point_to_point import rest_to_rest_times
-from planner.job.plan import Plan
 from planner.machine import Machine, load_machine, machine_from_dict
+from planner.planning.job.plan import Plan
 
 TEXT = (
     "G21\nM83\nG1 X10 F3000 E0.5\nX20 Y5 E0.5\nY15 E0.5\nG1 E-2 F1800\nG0 X30\nG1 E2 F1800\nG1 X40 E1 F3000\n"

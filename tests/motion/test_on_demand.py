@@ -18,7 +18,7 @@ from planner.report import trajectory_file
 from planner.report.block_feeds import planned_blocks
 from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
-from planner.verify import reading, times
+from planner.verifier import reading, times
 
 METHODS = ("optimal", "stop", "bezier", "fir", "kinematic")
 

@@ -17,9 +17,9 @@ from benchmarks.pulse_variants import SLOPES, VARIANTS, deviations, speeds
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.cli import app
-from planner.methods.kinematic import KinematicMethod
 from planner.motion.pulses import HYSTERESIS, AxisPulses, Drive, overrun, pulses_of
 from planner.motion.trajectory import Trajectory
+from planner.planning.methods.kinematic import KinematicMethod
 from planner.report.pulse_file import write_pulses
 from planner.report.trajectory_file import write_trajectory
 

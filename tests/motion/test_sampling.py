@@ -8,11 +8,12 @@ from whole_plans import smooth_path
 
 from benchmarks import problems
 from planner.corners.elements import ElementTable, element_length, element_point
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.spline import span_dtype
 from planner.motion.lots import LANES, sample
 from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses
 from planner.nc.reader import parse_program
-from planner.path.samples import PathSamples, sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
 MACHINE = problems.machine()

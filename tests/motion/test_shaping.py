@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.fir.filters import damped_period
 from planner.machine import Mode
 from planner.motion.axis_motion import AxisMotion
+from planner.motion.filters import damped_period
 from planner.motion.shaping import ShapedMotion, shaper_of
 
 MODES = st.builds(Mode, frequency=st.floats(2.0, 200.0), damping=st.floats(0.0, 0.5))

@@ -14,15 +14,15 @@ from whole_plans import CORNERS, Solved, smooth_path, solve
 
 from benchmarks import problems
 from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.job.job import Job
-from planner.job.stages import Stages
-from planner.methods.optimal import OptimalMethod
 from planner.motion.time_law import law_of_moves
 from planner.motion.timing import Motion, dense_motion, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
-from planner.path.samples import sample_path
+from planner.planning.job.job import Job
+from planner.planning.job.stages import Stages
+from planner.planning.methods.optimal import OptimalMethod
 
 MACHINE = problems.machine()
 JOBS = problems.all_jobs()

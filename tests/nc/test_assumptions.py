@@ -18,7 +18,7 @@ from planner.machine import Machine
 from planner.nc.info import describe
 from planner.nc.reader import interpret, parse_program
 from planner.nc.reading import Reading
-from planner.report.export import info_summary
+from planner.report.summary import info_summary
 
 BARE = machine()
 TELLS = machine(

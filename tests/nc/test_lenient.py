@@ -17,7 +17,7 @@ from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
 from planner.nc.writer import retimed
-from planner.report.export import info_summary
+from planner.report.summary import info_summary
 from planner.report.tables import info_table
 
 # A line that moves nothing between two moves, and the note about it: the motion is that of the two moves.

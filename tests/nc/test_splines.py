@@ -10,11 +10,11 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.nurbs import Nurbs
 from planner.machine import machine_from_dict
-from planner.methods.registry import plan
 from planner.nc.bezier import at, evenly_weighted, halves, homogeneous, lengths, raised
 from planner.nc.info import describe
 from planner.nc.program import Kind, Program
 from planner.nc.reader import interpret, parse_program
+from planner.planning.methods.registry import plan
 from planner.report.planned import planned_program
 
 HEAD = "G21 G17 G90 G64 P0.01\nG0 X1 Y2\nF600\n"

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from planner.base.errors import InputError
-from planner.kinematics import kinematics_of
 from planner.machine import Machine
+from planner.machine.kinematics import kinematics_of
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
-from tests.kinematics.five_axis import table_machine
+from tests.machine.kinematics.five_axis import table_machine
 
 LENGTH = 60.0
 BARE = table_machine(y_offset=-20.0, z_offset=35.0, tool_length=LENGTH)

@@ -9,14 +9,14 @@ import pytest
 
 from planner import plan
 from planner.base.point_to_point import rest_to_rest_times
-from planner.job.plan import Plan
-from planner.lookahead.rest_to_rest import block_limits
+from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.machine import load_machine
-from planner.methods.optimal import OptimalMethod
-from planner.methods.stop import StopMethod
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.writer import retimed
+from planner.planning.job.plan import Plan
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.stop import StopMethod
 from planner.report.block_feeds import RUN_PERIODS, SPREAD, block_feeds, block_times, runs_of_feed
 
 MACHINE = load_machine("mill")

@@ -13,7 +13,8 @@ from planner.base.errors import InputError
 from planner.machine import machine_from_dict
 from planner.nc.info import describe
 from planner.nc.reader import parse_program
-from planner.report.export import check_places, info_summary, summary, write_plan
+from planner.report.export import check_places, write_plan
+from planner.report.summary import info_summary, summary
 from planner.report.trajectory_file import FORMATS, read_trajectory
 
 

@@ -11,12 +11,12 @@ from hand_made import make_plan
 from test_tables import text
 
 import planner
-from planner.job.records import DearCorners, PriceList
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
-from planner.report.export import summary
 from planner.report.optimum import held_by_text, price_rows
+from planner.report.summary import summary
 from planner.report.tables import plan_table
+from planner.sensitivity.records import DearCorners, PriceList
 
 DEAR = DearCorners(
     line=np.array([7, 4]),

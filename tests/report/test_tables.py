@@ -11,7 +11,7 @@ from planner.machine import builtin_machines, load_machine
 from planner.nc.faults import Fault
 from planner.nc.info import describe
 from planner.report.tables import corners_table, info_table, machines_table, plan_table
-from planner.verify import CornerCheck
+from planner.verifier import CornerCheck
 
 
 def text(table: RenderableType | None) -> str:

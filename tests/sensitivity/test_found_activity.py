@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.job.plan import Plan
-from planner.methods.optimal import OptimalMethod
-from planner.methods.tube import TubeMethod
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.tube import TubeMethod
 
 MACHINE = problems.machine()
 PROGRAMS = {

@@ -10,18 +10,18 @@ import pytest
 
 import planner
 from benchmarks import problems
+from planner.commands.study.forecast import forecast
+from planner.commands.study.settings import Setting
 from planner.feedrate.solution import Status
-from planner.job.plan import Plan
-from planner.methods.optimal import OptimalMethod
-from planner.methods.tube import TubeMethod
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.tube import TubeMethod
 from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.savings import more_of
-from planner.study.forecast import forecast
-from planner.study.settings import Setting
-from planner.tube.outcome import TubeSolution
-from planner.tube.own import TubeOwn
 
 MACHINE = problems.machine()
 PROGRAM = problems.polyline([[0, 0], [6, 0], [9, 4], [4, 7]], feed=90.0)

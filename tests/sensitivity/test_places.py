@@ -11,13 +11,13 @@ import planner
 from benchmarks import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.job.plan import Plan
-from planner.job.records import PlacePrices
 from planner.machine import load_machine
-from planner.path.samples import sample_path
+from planner.planning.job.plan import Plan
 from planner.sensitivity.places import bounds_but_speeds, bounds_with
 from planner.sensitivity.prices import MORE_LIMIT
+from planner.sensitivity.records import PlacePrices
 from planner.sensitivity.savings import Change, more_of
 
 MILL = load_machine("mill")

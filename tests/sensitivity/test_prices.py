@@ -10,21 +10,21 @@ import pytest
 
 import planner
 from benchmarks import problems
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.job.records import SAVED_MIN
 from planner.machine import Fir
-from planner.methods.optimal import SIGMA2, OptimalMethod
 from planner.nc.reader import parse_program
-from planner.optimal.geometry import corner_shape
-from planner.path.samples import sample_path
+from planner.planning.methods.optimal import SIGMA2, OptimalMethod
+from planner.planning.optimal.geometry import corner_shape
 from planner.sensitivity import prices
 from planner.sensitivity.path_prices import SitePrices, path_prices
 from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+from planner.sensitivity.records import SAVED_MIN
 
 MACHINE = problems.machine()
 LINES = "G21 G90 G17\nF4800\nG1 X3\nX4 Y2.5\nX9 Y3\nX9.2 Y6\nX6 Y9\nX0 Y9.5\n"

@@ -9,7 +9,7 @@ import planner
 from benchmarks import problems
 from benchmarks.prices import compared
 from planner import JointLimit, PathLimit
-from planner.constraints.own import Place, ScaledLimit
+from planner.machine.user_limit import Place, ScaledLimit
 from planner.nc.reader import parse_program
 from planner.sensitivity.path_prices import WORTH
 

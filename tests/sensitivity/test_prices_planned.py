@@ -119,7 +119,7 @@ def test_where_feed_and_an_axis_are_equally_fast_neither_alone_is_worth_anything
 def solved():
     """What `path_prices` gets of a plan."""
     got = {}
-    from planner.optimal import result
+    from planner.planning.optimal import result
 
     def kept(*given):
         got["given"] = given

@@ -14,8 +14,8 @@ from test_corridor_problem import objective, random_corridor
 from benchmarks import problems
 from planner.base.arrays import FloatArray
 from planner.base.threads import use_threads
-from planner.methods.optimal import OptimalMethod
 from planner.nc.program import Program
+from planner.planning.methods.optimal import OptimalMethod
 from planner.smoothing import combined, relax
 from planner.smoothing.combined_solver import MISSED, CombinedProblem, improve_window
 from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor

@@ -9,15 +9,15 @@ import pytest
 
 from benchmarks import problems
 from planner.base.threads import use_threads
-from planner.constraints.assemble import feedrate_problem
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.optimal.on_path import OnPath
-from planner.optimal.reshape import reshape, run_times
-from planner.path.samples import sample_path
+from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.reshape import reshape, run_times
 from planner.smoothing import combined
 from planner.smoothing.basis import knots_at
 from planner.smoothing.combined_places import places_of_run

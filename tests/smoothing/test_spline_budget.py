@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks import problems
-from planner.corners.allocation import error_rate
 from planner.corners.bezier import BezierCorner
+from planner.corners.budget import error_rate
 from planner.corners.smooth import round_corners
+from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.path.samples import sample_path
 from planner.smoothing.spline_path import spline_shape, with_spline
 
 

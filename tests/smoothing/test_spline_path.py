@@ -17,9 +17,9 @@ from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.spline import DEGREE, span_point
 from planner.geometry.toolpath import Joint
-from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program, read_program
-from planner.optimal.geometry import splined_with_stops
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.optimal.geometry import splined_with_stops
 from planner.smoothing import initial as lay
 from planner.smoothing import spline_path
 from planner.smoothing.initial import greville_control

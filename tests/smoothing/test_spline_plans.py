@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from random_polylines import random_polyline
 
 from benchmarks import problems
-from planner.methods.optimal import OptimalMethod
 from planner.nc.reader import parse_program
+from planner.planning.methods.optimal import OptimalMethod
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.chain import Chain, Task, reach_of_end, way_felt
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.window import Way

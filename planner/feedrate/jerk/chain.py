@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,9 @@ from planner.base.arrays import FloatArray
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.profile import Profile, backward
+from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Way, Window
-
-if TYPE_CHECKING:
-    from planner.feedrate.jerk.solver import JerkLimited
 
 # Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4 of some profiles' time, 5
 # gains nothing.
@@ -59,7 +56,7 @@ class Task:
     start, end : feed^2 at both ends, where the acceleration is 0; 0 at rest [mm2/s2]
     """
 
-    solver: JerkLimited
+    solver: WindowSettings
     columns: ProblemColumns
     profile: Profile
     first: int

@@ -27,7 +27,7 @@ from planner.feedrate.jerk.chain import reach_of_end
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.profile import Profile
 
-FREE = 0.5  # of accelerations and jerks [-]: what changes the speed needs them (path/calm.py)
+FREE = 0.5  # of accelerations and jerks [-]: what changes the speed needs them (feedrate/sampling/calm.py)
 LESS = 1e-6  # of feed^2 [-]: the interior-point method needs room at the ends of what lies between
 POINTS = 100  # of a held range at least: with what lies between, two ways to brake are solved more for each
 EDGE = (

@@ -7,7 +7,10 @@ number changed at a time: 3889 with the numbers as they are. None is critical: o
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
+
+from planner.base.sizes import SIZES
 
 
 class InteriorPointSettings(NamedTuple):
@@ -68,3 +71,19 @@ class InteriorPointSettings(NamedTuple):
 
 
 SETTINGS = InteriorPointSettings()
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowSettings:
+    """How a problem is solved in windows.
+
+    tol        : relative gap at which a window is optimal
+    iterations : at most, per window
+    window     : intervals solved at a time
+    settings   : of the interior-point method; the same for every problem
+    """
+
+    tol: float = 1e-4
+    iterations: int = 100
+    window: int = SIZES.solved_window
+    settings: InteriorPointSettings = field(default=SETTINGS, repr=False)

@@ -37,7 +37,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -47,7 +47,7 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.again import WIDER, Range, RangeAgain, ranges_of
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Task
 from planner.feedrate.jerk.columns import ProblemColumns, columns_of
@@ -55,7 +55,7 @@ from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.part import LONG
 from planner.feedrate.jerk.piece import Piece, Solved, slowed_piece
 from planner.feedrate.jerk.profile import Profile
-from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
+from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
@@ -67,19 +67,8 @@ POINTS_SHARED = SIZES.points_shared
 
 
 @dataclass(frozen=True, kw_only=True)
-class JerkLimited:
-    """The interior-point solver for third-order problems.
-
-    tol        : relative gap at which a window is optimal
-    iterations : at most, per window
-    window     : intervals solved at a time
-    settings   : of the interior-point method; the same for every problem
-    """
-
-    tol: float = 1e-4
-    iterations: int = 100
-    window: int = SIZES.solved_window
-    settings: InteriorPointSettings = field(default=SETTINGS, repr=False)
+class JerkLimited(WindowSettings):
+    """The interior-point solver for third-order problems."""
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None

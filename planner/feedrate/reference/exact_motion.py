@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.window import ScaledWindow

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 
 # Gauss' rule for the time of an interval: off by 4e-5 where feed^2 grows fourfold in it, 1e-3 where tenfold.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)

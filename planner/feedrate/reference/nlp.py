@@ -49,7 +49,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.packages import import_needed
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.exact_motion import polished
 from planner.feedrate.reference.piecewise import (

@@ -58,7 +58,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.packages import import_needed
-from planner.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.near_rest import NODES, WEIGHTS, IntervalShape, beside_rest
 from planner.feedrate.reference.piecewise import (

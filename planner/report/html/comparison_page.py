@@ -14,12 +14,12 @@ from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
-from planner.report.export import json_ready
 from planner.report.figure import AGAINST, Panel, Series, three
 from planner.report.html.page import is_report
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import fitted_scene, panel_figure
 from planner.report.replace import check_file, replacing_file
+from planner.report.summary import json_ready
 
 if TYPE_CHECKING:
     from planner.nc.program import Program

@@ -16,15 +16,15 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
-from planner.job.at_tip import of_axes
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
+from planner.planning.job.at_tip import of_axes
 from planner.report.block_feeds import planned_blocks
 from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 SAMPLES_MAX = SIZES.page_samples
 PROGRAMMED_MAX = SIZES.page_programmed

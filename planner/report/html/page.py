@@ -19,7 +19,6 @@ from planner.base.arrays import Array
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
 from planner.report.colours import limit_colours
-from planner.report.export import json_ready, summary
 from planner.report.figure import AGAINST, MotionColumns, profile_panels, three
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
@@ -27,9 +26,10 @@ from planner.report.html.picture import path_picture
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
 from planner.report.replace import check_file
 from planner.report.rows import plan_rows
+from planner.report.summary import json_ready, summary
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 REPORT = "report.html"
 PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
@@ -106,7 +106,7 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
 
 
 def _corners(plan: Plan) -> dict[str, list[Any]]:
-    """Eq. 18-20 at the corners that were looked at (verify/corners.py)."""
+    """Eq. 18-20 at the corners that were looked at (verifier/corners.py)."""
     found = plan.corners
     if found is None:
         return {}

@@ -12,7 +12,7 @@ from planner.report.figure import MotionColumns, highest_feed, three
 from planner.report.tool_lines import TOOL, tool_lines
 
 if TYPE_CHECKING:
-    from planner.job.plan import Plan
+    from planner.planning.job.plan import Plan
 
 TOOLS = 120  # places at which the tool is drawn
 POINTS = 3000  # of the motion: several for each pixel of its width

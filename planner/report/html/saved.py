@@ -15,18 +15,19 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
-from planner.job.at_tip import Judged, chain_of, judged
-from planner.job.plan import Plan
-from planner.kinematics.setpoints import tip_of_setpoints
 from planner.machine import machine_from_dict
+from planner.motion.chain_setpoints import tip_of_setpoints
 from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
 from planner.nc.reading import Reading
-from planner.report.export import json_ready, program_file
+from planner.planning.job.at_tip import Judged, chain_of, judged
+from planner.planning.job.plan import Plan
+from planner.report.export import program_file
 from planner.report.replace import SUMMARY
+from planner.report.summary import json_ready
 from planner.report.trajectory_reader import read_trajectory
 from planner.report.word_feed import WordFeed
-from planner.verify import NOT_LIMITED_NAMES, fit_axes
+from planner.verifier import NOT_LIMITED_NAMES, fit_axes
 
 
 def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:

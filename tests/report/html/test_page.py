@@ -17,9 +17,9 @@ import planner
 from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.distance import distance_near
-from planner.job.plan import Plan
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
+from planner.planning.job.plan import Plan
 from planner.report.export import write_plan
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.page import report_page

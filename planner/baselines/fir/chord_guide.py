@@ -1,0 +1,286 @@
+"""Paper 001's guide: a smooth path, or a curve, as chords so fine that they are the path.
+
+The chords leave the path by a fraction of its tolerance at most (`SAGITTA`), which is taken off the tolerance, and turn by little
+from one to the next. Each chord knows the largest curvature beside it, and how fast the limits of the axes let a point go round a
+circle of this curvature in the osculating plane (paper 001, par. 9 to 17): with the unit vectors T along the path and N towards the
+centre
+
+    |a_k| <= kappa v^2 amplitude_k,   |j_k| <= kappa^2 v^3 amplitude_k,   amplitude_k = sqrt(T_k^2 + N_k^2) = sqrt(1 - n_k^2).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.baselines.fir.columns import per_leg, picked
+from planner.baselines.fir.command import lower_between
+from planner.baselines.fir.guide import Guide
+from planner.corners.elements import ElementIntervals, element_point, to_arc_length
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.geometry.nurbs import Nurbs
+from planner.machine import Machine
+
+# Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their turning from one to the next
+# [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4. Motions of ten jobs hardly depend on it (0.2: 0.004 % slower).
+SAGITTA, TURN = 0.01, 0.1
+# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2 ms to 0.35 s, as filters
+# come, each 1.6 times the one before, by which a chord may be slow for longer than it should.
+CUTS = 2e-3 * 1.6 ** np.arange(12)
+STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChordGuide(Guide):
+    """The chords of a smooth path, with what paper 001's formulas need of each.
+
+    programmed : (R,) programmed feed, inf for rapids [mm/s]
+    kappa      : (R,) largest curvature of the path at the chord [1/mm]
+    v_acc      : (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13); inf if straight
+    v_jerk     : (R,) the same for their jerks (par. 17)
+    tol        : (R,) what filters and interpolation may use of the tolerance [mm]
+    corner     : (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half   : (R,) sine of half the turning angle there [-]
+    whole      : (R,) tolerance, with what the rounding uses of it [mm]
+    segment    : (R,) segment of the toolpath
+    """
+
+    feed: FloatArray = per_leg(finite=False)
+    programmed: FloatArray = per_leg(finite=False)
+    kappa: FloatArray = per_leg()
+    v_acc: FloatArray = per_leg(finite=False)
+    v_jerk: FloatArray = per_leg(finite=False)
+    tol: FloatArray = per_leg()
+    corner: Array = per_leg(np.int64)
+    sin_half: FloatArray = per_leg()
+    whole: FloatArray = per_leg()
+    segment: Array = per_leg(np.int64)
+
+    @property
+    def budget(self) -> FloatArray:
+        """(R, 2) the same on both halves of a chord [mm]."""
+        return np.stack([self.tol, self.tol], axis=1)
+
+
+def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
+    """The same guide with its chords cut beside feeds that are lower than theirs.
+
+    Filters make a lower feed hold on there (`feeds_held`), and a long chord should not have to as a whole: it is cut at the lengths
+    that the lower feed runs in the times `CUTS`.
+    """
+    change = np.flatnonzero((guide.programmed[1:] != guide.programmed[:-1]) & guide.inner[1:-1]) + 1
+    before, after = guide.programmed[change - 1], guide.programmed[change]
+    beside = np.where(before < after, before, -after)[:, None] * CUTS
+    run = np.repeat(guide.run[change], len(CUTS))
+    s = (guide.s[change, None] + beside).ravel()
+    inside = (s > guide.s[guide.first[run]]) & (s < guide.s[guide.first[run + 1]])
+    s = np.setdiff1d(s[inside], guide.s)
+    at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
+    rows = np.insert(np.arange(len(guide)), at + 1, at)
+    columns = picked(guide, {"leg": rows, "joint": np.arange(len(guide) + 1)})
+    cuts = guide.point[at] + (s - guide.s[at])[:, None] * guide.direction[at]
+    columns["point"] = np.insert(guide.point, at + 1, cuts, axis=0)
+    columns["s"] = np.insert(guide.s, at + 1, s)
+    columns["length"] = np.diff(columns["s"])
+    first = guide.first + np.searchsorted(at, guide.first)
+    return dataclasses.replace(guide, first=first, **columns)
+
+
+def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """Speeds (R,) [mm/s] up to which the chords keep the programmed feeds behind filters T1, T2 (S,) [s] of the runs.
+
+    Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most; so a feed V that is lower
+    than those beside it has to hold on V Td/2 before and behind.
+    """
+    speed = guide.programmed.copy()
+    edge = np.flatnonzero(~guide.inner[:-1] | (guide.programmed != np.roll(guide.programmed, 1)))
+    run, value = guide.run[edge], guide.programmed[edge]
+    ends = np.append(edge[1:], len(guide))  # one behind the last chord of each feed
+    beside = np.append(run[1:] == run[:-1], False)
+    lower = np.append(value[1:] > value[:-1], False) & beside
+    lower[1:] |= (value[:-1] > value[1:]) & beside[:-1]
+    edge, ends, run, value = edge[lower], ends[lower], run[lower], value[lower]
+    reach = value * (T1 + T2)[run] / 2
+    low, high = guide.first[run], guide.first[run + 1]
+    begin = np.searchsorted(guide.s, guide.s[edge] - reach, side="right") - 1
+    end = np.searchsorted(guide.s, guide.s[ends] + reach, side="left")
+    order = np.argsort(value)
+    lower_between(order, value, np.maximum(begin, low), np.clip(end, edge + 1, high), speed)
+    return speed
+
+
+def guide_of_path(
+    samples: PathSamples, machine: Machine, own: tuple[float, float] | None = None
+) -> ChordGuide:
+    """The chords of a smooth path, cut beside lower feeds too (`cut_beside_slower`).
+
+    samples : the path on a grid
+    own     : lengths of the two filters [s]; None to choose them
+    """
+    path, segment = samples.path, samples.segment
+    toolpath = path.toolpath
+    corner = np.where(samples.element < 0, ~samples.element, -1)
+    whole = np.where(corner >= 0, path.tol[corner], toolpath.along[segment])
+    tol = whole - np.where(corner >= 0, path.tol_ap[corner], 0.0)
+    behind = np.linalg.norm(np.append(samples.d2_left[1:], samples.d2_left[-1:], axis=0), axis=1)
+    kappa = np.maximum(np.linalg.norm(samples.d2_right, axis=1), behind)
+    h = np.diff(samples.s, append=samples.s[-1])
+    chords = np.ceil(np.maximum(h * np.sqrt(kappa / (8.0 * SAGITTA * tol)), h * kappa / TURN))
+    chords = np.maximum(chords, 1).astype(np.int64)
+    chords[samples.piece[1:] - 1] = 1
+    start, end = (np.empty((chords.sum(), 4, len(toolpath.axes))) for _ in range(2))
+    on = ElementIntervals(*samples.table, samples.element, samples.w0, samples.w1)
+    _evaluate(on, chords, start, end)
+    row = np.repeat(np.arange(len(samples)), chords)
+    first = np.concatenate([[0], np.cumsum(chords)])[samples.piece]
+    made = _guide(
+        machine,
+        start,
+        end,
+        axes=toolpath.axes,
+        first=first,
+        own=own,
+        dwell=toolpath.dwell[path.legs.first[samples.stop]],
+        columns={
+            "feed": toolpath.feed[segment][row],
+            "tol": tol[row],
+            "corner": corner[row],
+            "sin_half": np.where(corner >= 0, np.sin(path.theta[corner] / 2), 0.0)[row],
+            "whole": whole[row],
+            "segment": segment[row],
+        },
+    )
+    return cut_beside_slower(made)
+
+
+def guide_of_curve(
+    curve: Nurbs,
+    machine: Machine,
+    feed: float,
+    tolerance: float,
+    blocks: FloatArray,
+    reversals: FloatArray,
+    own: tuple[float, float] | None = None,
+) -> ChordGuide:
+    """The chords of a curve; full stops at its kinks and reversals.
+
+    feed      : programmed feed [mm/s]
+    tolerance : of the path [mm]
+    blocks    : (B+1,) parameters of the ends of the program's blocks
+    reversals : (n,) those of them at which the blocks turn back: cusps sharper than the chords
+    own       : lengths of the two filters [s]; None to choose them
+    """
+    u = curve.stations(SAGITTA * tolerance)
+    kappa = [
+        np.linalg.norm(curve.along(at, before=side)[:, 2], axis=1)
+        for at, side in ((u[:-1], False), (u[1:], True))
+    ]
+    turn = curve.length_between(u[:-1], u[1:]) * np.maximum(*kappa)
+    chords = np.maximum(np.ceil(turn / TURN), 1).astype(np.int64)
+    number = np.arange(chords.sum()) - np.repeat(np.cumsum(chords) - chords, chords)
+    u = np.append(np.repeat(u[:-1], chords) + number * np.repeat(np.diff(u) / chords, chords), u[-1])
+    stops = np.append(np.union1d(curve.kinks, reversals), u[-1])
+    closing = np.insert(np.zeros(len(u) - 1, bool), np.searchsorted(u, stops), True)
+    at = u[np.arange(len(closing)) - np.cumsum(closing) + closing]  # a kink's parameter is there twice
+    start, end = curve.along(at), curve.along(np.append(at[1:], at[-1]), before=True)
+    start[closing] = end[closing] = curve.along(at[closing], before=True)
+    count = len(at)
+    return _guide(
+        machine,
+        start,
+        end,
+        axes=curve.axes,
+        first=np.concatenate([[0], np.flatnonzero(closing) + 1]),
+        own=own,
+        dwell=np.zeros(len(stops) + 1),
+        columns={
+            "feed": np.full(count, feed),
+            "tol": np.full(count, tolerance),
+            "corner": np.full(count, -1),
+            "sin_half": np.zeros(count),
+            "whole": np.full(count, tolerance),
+            "segment": np.clip(np.searchsorted(blocks, at, side="right") - 1, 0, len(blocks) - 2),
+        },
+    )
+
+
+def _guide(
+    machine: Machine,
+    start: FloatArray,
+    end: FloatArray,
+    *,
+    axes: tuple[str, ...],
+    first: Array,
+    own: tuple[float, float] | None,
+    dwell: FloatArray,
+    columns: dict[str, Array],
+) -> ChordGuide:
+    """From points and arc-length derivatives (P, 4, A) at start and end of each chord; each run ends with one that has no length.
+
+    first   : (S+1,) first row of each run
+    columns : of the record, (P,); `feed` as programmed, `tol` with what the chords use of it
+    """
+    chord = end[:, 0] - start[:, 0]
+    chord[first[1:] - 1] = 0.0
+    length = np.linalg.norm(chord, axis=1)
+    moving = length > 0
+    start, end, chord, length = start[moving], end[moving], chord[moving], length[moving]
+    columns = {name: column[moving] for name, column in columns.items()}
+    with np.errstate(divide="ignore", over="ignore"):
+        axes_allow = length * (machine.limits("velocity", axes) / np.abs(chord)).min(axis=1)
+    speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
+    programmed = columns.pop("feed")
+    columns["tol"] = columns["tol"] * (1 - SAGITTA)
+    return ChordGuide(
+        axes=axes,
+        own=own,
+        first=np.append(0, np.cumsum(moving)[first[1:] - 1]),
+        dwell=dwell,
+        point=np.vstack([start[:, 0], end[-1:, 0]]),
+        s=np.append(0.0, np.cumsum(length)),
+        length=length,
+        direction=chord / length[:, None],
+        feed=np.minimum(programmed, axes_allow),
+        programmed=programmed,
+        kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),
+        v_acc=np.minimum(speeds[0][0], speeds[1][0]),
+        v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
+        **columns,
+    )
+
+
+def _circle_speeds(
+    by_s: FloatArray, machine: Machine, axes: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """v_acc and v_jerk (P,) from point and derivatives by the arc length (P, 4, A)."""
+    kappa = np.linalg.norm(by_s[:, 2], axis=1)
+    bent = kappa[:, None] > STRAIGHT
+    normal = np.divide(by_s[:, 2], kappa[:, None], out=np.zeros_like(by_s[:, 2]), where=bent)
+    amplitude = np.where(bent, np.sqrt(by_s[:, 1] ** 2 + normal**2), 0.0)
+    with np.errstate(divide="ignore", over="ignore"):
+        a, j = ((machine.limits(q, axes) / amplitude).min(axis=1) for q in ("acceleration", "jerk"))
+        return np.sqrt(a / kappa), np.cbrt(j / kappa**2)
+
+
+@njit(cache=True, error_model="numpy")
+def _evaluate(on, chords, start, end):
+    """Point and arc-length derivatives at start and end of all chords, into start and end (n, 4, A).
+
+    on     : `ElementIntervals`
+    chords : (P,) how many each interval is cut into
+    """
+    work = np.empty((2, 4, start.shape[2]))
+    n = 0
+    for i in range(len(on.element)):
+        w_ref = 0.5 * (on.w0[i] + on.w1[i])
+        for p in range(chords[i]):
+            for side in range(2):
+                out = start[n] if side == 0 else end[n]
+                w = on.w0[i] + (on.w1[i] - on.w0[i]) * (p + side) / chords[i]
+                element_point(on.legs, on.corners, on.spans, on.element[i], w, w_ref, work, out)
+                to_arc_length(out)
+            n += 1

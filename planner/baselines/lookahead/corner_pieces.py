@@ -1,0 +1,277 @@
+"""From a look-ahead to a motion: pieces of constant jerk of every axis.
+
+Every piece is anchored at a joint k between the legs k-1 and k with the directions u1 and u2; its position is
+
+    P_k + c1(t) u1 + c2(t) u2,      c1, c2 cubics in t: position, velocity, acceleration, jerk at the piece's start.
+
+On leg k only c2 moves, in the seven phases of two ramps and the cruise between them. In the corner at joint k (corners/kinematic.py)
+
+    zero entry acceleration    c1'' = -V h(t),  c2'' = V h(t),   h = the trapezoid of T1, T2 (docs/papers.md 0);
+    entry deceleration         c1''' = c2''' = A/Tc,
+
+and c1 + c2 is the distance from the vertex along the program at which the corner is matched with it (corners/blend.py): pieces are
+cut where that passes the end of a block, in a corner's middle and inside long legs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.baselines.lookahead.arc_pieces import spline_at_rest
+from planner.baselines.lookahead.passage import LegLimits, Passage
+from planner.baselines.lookahead.ramps import (
+    ENTRY,
+    PHASES,
+    ZERO,
+    corner_at,
+    leg_end,
+    leg_phases,
+    phase_times_of,
+)
+from planner.geometry.chords import arc_point
+from planner.geometry.legs import Legs
+from planner.geometry.toolpath import Toolpath
+
+# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius; and by less
+# where that is more than ARC_MISS [mm], a tenth of the least digit that programs carry.
+ARC_PIECE, ARC_MISS = 0.01, 1e-7
+# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this
+# fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets
+# in, and 2 kappa a^2 where the acceleration is constant.
+ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
+# Shortest piece of all [s]: at 1000 mm/s it is 1e-13 mm long.
+SHORTEST = 1e-16
+# Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
+ARC_SHORTEST = 2e-5
+# Shortest time in which the acceleration on an arc comes to its limit, in pieces that short: over a step of the acceleration a spline
+# with long pieces leaves the arc, by a h^2/48 or so.
+ARC_RAMP = 5 * ARC_SHORTEST
+BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
+
+
+class PieceRows(NamedTuple):
+    """L pieces of constant jerk, as the kernels write them.
+
+    joint    : (L,) the joint k that the piece is anchored at
+    leg      : (L,) the leg it belongs to
+    duration : (L,) [s], > 0
+    before   : (L, 4) c1 and its derivatives at the start
+    after    : (L, 4) c2
+    """
+
+    joint: Array
+    leg: Array
+    duration: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+class CornerPieces(NamedTuple):
+    """L pieces of constant jerk.
+
+    rows    : what the kernels know of them
+    segment : (L,) segment of the toolpath that each belongs to
+    """
+
+    rows: PieceRows
+    segment: Array
+
+
+def corner_pieces(passage: Passage, limits: LegLimits, path: Legs, dwell: FloatArray) -> CornerPieces:
+    """The motion of a look-ahead over n legs, in pieces (module text).
+
+    passage : what was chosen at the n+1 joints
+    limits  : of the legs
+    path    : the same legs with their segments
+    dwell   : (n+1,) standstill at each joint [s]
+    """
+    rows = _empty(_emit(passage.table, limits.table, dwell, _empty(0)))
+    _emit(passage.table, limits.table, dwell, rows)
+    cut = _empty(len(rows.leg) + len(path.offset))
+    segment = np.zeros(len(cut.leg), np.int64)
+    count = _cut(rows, limits.length, path.first, path.offset, cut, segment)
+    return CornerPieces(PieceRows(*(column[:count] for column in cut)), segment[:count])
+
+
+def along_axes(
+    pieces: CornerPieces, path: Legs, toolpath: Toolpath
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Position, velocity, acceleration and jerk (L, A) of the axes at the start of every piece."""
+    vertex = np.vstack([path.table["start"], toolpath.end[-1:]])
+    direction = path.table["direction"]
+    joint, before, after = pieces.rows.joint, pieces.rows.before, pieces.rows.after
+    u1, u2 = direction[np.maximum(joint - 1, 0)], direction[np.minimum(joint, len(path) - 1)]
+    position, velocity, acceleration, jerk = (
+        before[:, c, None] * u1 + after[:, c, None] * u2 for c in range(4)
+    )
+    position += vertex[joint]
+    arc = (toolpath.arc[pieces.segment] >= 0) & (after[:, 1:] != 0.0).any(axis=1)  # not at standstill
+    for values, along in zip(
+        (position, velocity, acceleration, jerk),
+        _along_arcs(pieces, np.flatnonzero(arc), toolpath),
+        strict=True,
+    ):
+        values[arc] = along
+    return position, velocity, acceleration, jerk
+
+
+def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[FloatArray, ...]:
+    """The same of the pieces `move`, which lie on arcs from rest to rest."""
+    leg, segment = pieces.rows.leg[move], pieces.segment[move]
+    ends = np.append(leg[1:] != leg[:-1], True)[: len(move)]
+    at = np.arange(len(move)) + np.cumsum(ends) - ends  # with room for the end point of every arc
+    # relative to the arc's centre, so that the rounding is that of the radius and not of the coordinates
+    points = np.empty((len(move) + int(ends.sum()), len(toolpath.axes)))
+    points[at] = arc_point(toolpath, segment, pieces.rows.after[move, 0])
+    points[at[ends] + 1] = arc_point(toolpath, segment[ends], toolpath.length[segment[ends]])
+    last = np.ones(len(points), bool)
+    last[at] = False
+    position = points[at] + toolpath.arcs.center[toolpath.arc[segment]]
+    return position, *spline_at_rest(pieces.rows.duration[move], points, last)
+
+
+def _empty(count: int) -> PieceRows:
+    """Room for so many pieces."""
+    return PieceRows(
+        joint=np.zeros(count, np.int64),
+        leg=np.zeros(count, np.int64),
+        duration=np.zeros(count),
+        before=np.zeros((count, 4)),
+        after=np.zeros((count, 4)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _advance(state, t):
+    """Move cubics (., 4) on by t, in place; their jerks stay."""
+    for m in range(len(state)):
+        state[m, 0] += t * (state[m, 1] + t * (0.5 * state[m, 2] + t * state[m, 3] / 6.0))
+        state[m, 1] += t * (state[m, 2] + 0.5 * t * state[m, 3])
+        state[m, 2] += t * state[m, 3]
+
+
+@njit(cache=True, error_model="numpy")
+def _put(n, t, k, leg, state, rows):
+    """Write a piece unless it is shorter than `SHORTEST`, advance its cubics c1, c2 (2, 4), return the next row."""
+    if t > SHORTEST and n < len(rows.duration):
+        rows.joint[n], rows.leg[n], rows.duration[n] = k, leg, t
+        for c in range(4):
+            rows.before[n, c], rows.after[n, c] = state[0, c], state[1, c]
+    _advance(state, t)
+    return n + (t > SHORTEST)
+
+
+@njit(cache=True, error_model="numpy")
+def _emit(ways, legs, dwell, rows):
+    """Write all pieces into the rows, as far as they have room; returns how many there are."""
+    n, count = 0, len(legs)
+    state, phases = np.zeros((2, 4)), np.zeros((2, PHASES))
+    for k in range(count + 1):
+        way = ways[k]
+        A, reach, lasting = corner_at(way, way.V, True)
+        state[:] = 0.0
+        if lasting > 0.0 and way.kind == ZERO:
+            T1, T2 = phase_times_of(way.V, way.p, way.q)
+            state[0, 0], state[0, 1] = -reach, way.V
+            bend = way.V / (T1 * T2)
+            for phase in range(4):  # jerk +, half of the plateau; half of the plateau, jerk -
+                state[1, 3] = bend if phase == 0 else (-bend if phase == 3 else 0.0)
+                state[0, 3] = -state[1, 3]
+                n = _put(n, T2 if phase in (0, 3) else 0.5 * (T1 - T2), k, k - 1 + phase // 2, state, rows)
+        elif lasting > 0.0 and way.kind == ENTRY:
+            state[0, 0], state[0, 1], state[0, 2] = -reach, way.V, -A
+            state[0, 3] = state[1, 3] = A / lasting
+            for half in range(2):
+                n = _put(n, 0.5 * lasting, k, k - 1 + half, state, rows)
+        state[:] = 0.0
+        n = _put(n, dwell[k], k, max(k - 1, 0), state, rows)
+        if k == count:
+            break
+        other = leg_end(ways[k + 1], ways[k + 1].V, legs[k].j, False)
+        leg_phases(leg_end(way, way.V, legs[k].j, True), other, legs[k], phases)
+        state[1, 0], state[1, 1], state[1, 2] = reach, way.V, A
+        if legs[k].turning > 0.0:
+            n = _emit_arc(n, k, legs[k], phases, state, rows)
+        else:
+            for f in range(PHASES):
+                state[1, 3] = phases[1, f]
+                n = _put(n, phases[0, f], k, k, state, rows)
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _emit_arc(n, k, leg, phases, state, rows):
+    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
+    two = state[1]
+    pending, began = 0.0, two[0]
+    turn = min(ARC_PIECE, (ARC_MISS * leg.turning * 384.0 / 5.0) ** 0.25)
+    for f in range(PHASES):
+        phase, jerk = phases[0, f], phases[1, f]
+        two[3] = jerk
+        if phase < ARC_SHORTEST:
+            _advance(state, phase)
+            pending += phase
+            continue
+        fastest = max(two[1], two[1] + phase * (two[2] + 0.5 * phase * jerk))
+        accuracy = max(np.sqrt(abs(jerk) / (3.0 * leg.v)), abs(two[2]) / (2.45 * leg.v))
+        accuracy /= np.sqrt(ARC_ACCURACY)
+        pieces = max(ARC_PIECES_MIN, 1 + int(phase * max(leg.turning * fastest / turn, accuracy)))
+        pieces = min(pieces, int(phase / ARC_SHORTEST))
+        for _ in range(pieces):
+            n = _put(n, phase / pieces, k, k, state, rows)
+            if pending > 0.0 and n <= len(rows.duration):
+                rows.duration[n - 1] += pending
+                rows.after[n - 1, 0] = began
+            pending = 0.0
+        began = two[0]
+    if n <= len(rows.duration):
+        rows.duration[n - 1] += pending
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _cut(rows, length, first, offset, out, segment):
+    """Cut pieces where they pass the end of a segment inside their leg; returns the number of pieces."""
+    n, m = 0, 0
+    state = np.zeros((2, 4))
+    for i in range(len(rows.duration)):
+        leg, left = rows.leg[i], rows.duration[i]
+        origin = length[leg] if rows.joint[i] == leg + 1 else 0.0
+        for c in range(4):
+            state[0, c], state[1, c] = rows.before[i, c], rows.after[i, c]
+        m = max(m, first[leg])
+        while m + 1 < first[leg + 1]:
+            border = offset[m + 1] - origin
+            if _along(state, left) <= border:
+                break
+            low, high = 0.0, left
+            for _ in range(BISECTIONS):
+                middle = 0.5 * (low + high)
+                if _along(state, middle) <= border:
+                    low = middle
+                else:
+                    high = middle
+            if _along(state, 0.0) <= border:
+                count = n
+                n = _put(n, low, rows.joint[i], leg, state, out)
+                if n > count:
+                    segment[count] = m
+                    left -= low
+            m += 1
+        count = n
+        n = _put(n, left, rows.joint[i], leg, state, out)
+        if n > count:
+            segment[count] = m
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _along(state, t):
+    """c1 + c2 after t: the distance from the joint along the program."""
+    x, v = state[0, 0] + state[1, 0], state[0, 1] + state[1, 1]
+    a, j = state[0, 2] + state[1, 2], state[0, 3] + state[1, 3]
+    return x + t * (v + t * (0.5 * a + t * j / 6.0))

@@ -1,0 +1,289 @@
+"""Look-ahead over legs and the corners between them: at which speed every corner is taken, or whether it is a stop.
+
+A leg is what has the same limits along the path between two joints; at a joint there is a corner, or the limits change. Corners are
+candidates of a kind (ramps.JointKind); passed with the speed V a corner of that kind has a start deceleration (and end acceleration)
+A, takes l of the legs beside it and lasts T. A and l grow with V (or do not depend on it), so every candidate is a family with one
+parameter. What a leg can do between two corners is in baselines/lookahead/ramps.py, with V' and x as there.
+
+Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible iff from the slower
+of its ends that speed of the faster one is within reach of what the corners leave: W_fast <= k (V' + x). The factor k, 0 < k <= 1,
+is paper 003's for short segments (eq. (9) as docs/papers.md reads it); with k = 1 the leg is used completely.
+
+1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible. Lowering a speed never
+   lengthens its corner, which leaves the neighbouring leg feasible, so two sweeps are enough.
+2. Faster corners are not always better (zero entry acceleration makes the deceleration die out twice, a corner at constant low speed
+   takes long). Over all choices of a candidate or a stop per corner, the fastest is found by dynamic programming; between two
+   corners the speeds where only limits change are the largest ones. All stops, and every candidate throughout, are among the choices:
+   the result is never slower than any of them. (Candidates at 0.2 to 0.8 of their speed too save 0.02 % at most on five NC programs,
+   and take twice as long; of constant speeds none was ever chosen on 120 random paths.)
+
+Everything is linear in the number of joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
+from planner.baselines.lookahead.passage import WAY, LegLimits, Passage, passage_of
+from planner.baselines.lookahead.ramps import (
+    ENTRY,
+    PASS,
+    PHASES,
+    ZERO,
+    corner_at,
+    gain_max,
+    leg_end,
+    leg_phases,
+    leg_time,
+)
+
+# The choice may lack this fraction of a leg's length [-]: rounding of sums of lengths.
+LENGTH_ROUNDING = 1e-14
+BISECTIONS = 60  # of a speed's bracket: to its last digit
+# A speed in closed form is lowered by this until it is feasible with its rounding [-]: two units of its last digit.
+SPEED_ROUNDING = 4e-16
+
+
+def look_ahead(legs: LegLimits, candidates: Sequence[Passage], k: float = 1.0) -> tuple[Passage, FloatArray]:
+    """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each joint's corner [s].
+
+    Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the corners beside them allow.
+
+    candidates : may overlap nowhere on a leg at their speeds (see `capped`)
+    k          : factor of the short-segment rule, 0 < k <= 1
+    """
+    wished = np.stack([one.table for one in candidates])
+    straight = (wished["kind"] == PASS).all(axis=0)
+    rows = np.concatenate([np.zeros((1, len(legs) + 1), WAY), wished])
+    for way in rows[1:]:
+        _sweep(way, legs.table, k)
+    rows["V"][1:, straight] = wished["V"][:, straight]
+    ways, time = _choose(rows, straight, legs.table, k)
+    return passage_of(ways), time
+
+
+def swept(legs: LegLimits, passage: Passage, k: float = 1.0) -> Passage:
+    """The same ways, lowered to the largest speeds at which every leg can be run.
+
+    k : factor of the short-segment rule, 0 < k <= 1
+    """
+    ways = passage.table.copy()
+    _sweep(ways, legs.table, k)
+    return passage_of(ways)
+
+
+def capped(passage: Passage, legs: LegLimits, room: FloatArray) -> Passage:
+    """The same candidates, slowed down until they have room and their ramps stay below the legs' speeds.
+
+    room : (n+1,) what each may need of the leg before it and of the one behind, ramps included [mm]
+    """
+    ways = passage.table.copy()
+    _cap(ways, legs.table, room)
+    return passage_of(ways)
+
+
+def needed(passage: Passage, legs: LegLimits) -> FloatArray:
+    """(n+1,) length that each candidate needs of its legs, ramps included [mm]."""
+    return _needed(passage.table, legs.table)
+
+
+def moves(passage: Passage, legs: LegLimits) -> tuple[FloatArray, FloatArray]:
+    """Durations [s] and jerks along the path [mm/s3], both (n, 8): the corner at constant speed before each leg, and its phases."""
+    duration, jerk = np.zeros((len(legs), 1 + PHASES)), np.zeros((len(legs), 1 + PHASES))
+    _moves(passage.table, legs.table, duration, jerk)
+    return duration, jerk
+
+
+# ---- speeds that fit -------------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, error_model="numpy")
+def _feasible(one, other, leg, k, slack):
+    """Whether a leg with the ends `one`, `other` can be run, up to `slack` of its length."""
+    fast, slow = (one, other) if one.top >= other.top else (other, one)
+    D = leg.length * (1.0 + slack) - one.corner - other.corner - fast.ramp + slow.pre
+    # gains are compared, not speeds: see leg_top
+    return D >= 0.0 and fast.top - k * slow.start <= k * gain_max(slow.start, D, leg.a, leg.j)
+
+
+@njit(cache=True, error_model="numpy")
+def _needed(ways, legs):
+    """(n+1,) length that each of the ways needs of its legs [mm]."""
+    out = np.zeros(len(ways))
+    for i in range(1, len(ways) - 1):
+        way = ways[i]
+        before, after = leg_end(way, way.V, legs[i - 1].j, False), leg_end(way, way.V, legs[i].j, True)
+        out[i] = before.corner + max(before.ramp, after.ramp)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _cap(ways, legs, room):
+    """Lower the speeds of the ways, in place, as `capped` says."""
+    for i in range(1, len(ways) - 1):
+        way = ways[i]
+        low, high = 0.0, way.V
+        trial = high
+        for _ in range(BISECTIONS):
+            before, after = leg_end(way, trial, legs[i - 1].j, False), leg_end(way, trial, legs[i].j, True)
+            if (
+                before.corner + max(before.ramp, after.ramp) <= room[i]
+                and before.top <= legs[i - 1].v
+                and after.top <= legs[i].v
+            ):
+                low = trial
+                if trial == high:
+                    break
+            else:
+                high = trial
+            trial = 0.5 * (low + high)
+        ways[i].V = low
+
+
+@njit(cache=True, error_model="numpy")
+def _lowered(way, V, behind, fixed, leg, k):
+    """The largest speed up to V with which a leg is feasible towards its other end `fixed`, but not below that end's W.
+
+    behind : True if the joint passed at V is the one that the leg begins at
+    """
+    here = leg_end(way, V, leg.j, behind)
+    if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+        return V
+    low, high = 0.0, V
+    if way.kind != ENTRY and way.kind != ZERO:  # what they take of the leg does not depend on the speed
+        D = leg.length - here.corner - fixed.corner + fixed.pre
+        trial = min(V, k * (fixed.start + gain_max(fixed.start, max(D, 0.0), leg.a, leg.j)))
+        for _ in range(BISECTIONS):
+            here = leg_end(way, trial, leg.j, behind)
+            if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+                return trial
+            trial *= 1.0 - SPEED_ROUNDING
+    for _ in range(BISECTIONS):
+        trial = 0.5 * (low + high)
+        here = leg_end(way, trial, leg.j, behind)
+        if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+            low = trial
+        else:
+            high = trial
+    return low
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(ways, legs, k):
+    """Lower the speeds of the ways (n+1,), in place, until every leg is feasible."""
+    if k < 1.0:  # where both ends want the same speed, the rule bounds that speed
+        for i in range(len(legs)):
+            _lower_both(ways, i, legs[i], k)
+    for i in range(len(legs) - 1, -1, -1):
+        fixed = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i], k)
+    for i in range(len(legs)):
+        fixed = leg_end(ways[i], ways[i].V, legs[i].j, True)
+        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i], k)
+
+
+@njit(cache=True, error_model="numpy")
+def _at_most(way, j, W):
+    """The largest speed of a way up to its own whose V + A^2/(2j) is at most W."""
+    if leg_end(way, way.V, j, True).top <= W:
+        return way.V
+    if way.kind != ENTRY:
+        return W
+    return min(way.V, max(W - 0.5 * way.p * way.p / j, W / (1.0 + way.q / j)))
+
+
+@njit(cache=True, error_model="numpy")
+def _lower_both(ways, i, leg, k):
+    """Lower both ends of leg i to the largest common W at which the leg is feasible."""
+    first, last, j = ways[i], ways[i + 1], leg.j
+    low, high = 0.0, min(leg_end(first, first.V, j, True).top, leg_end(last, last.V, j, False).top)
+    trial = high
+    for _ in range(BISECTIONS):
+        one = leg_end(first, _at_most(first, j, trial), j, True)
+        other = leg_end(last, _at_most(last, j, trial), j, False)
+        if _feasible(one, other, leg, k, 0.0) and _feasible(other, one, leg, k, 0.0):
+            low = trial
+            if trial == high:
+                return
+        else:
+            high = trial
+        trial = 0.5 * (low + high)
+    first.V, last.V = _at_most(first, j, low), _at_most(last, j, low)
+
+
+# ---- the fastest choice ----------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, error_model="numpy")
+def _between(ways, first, last, legs, k):
+    """Time [s] from the joint `first` to the joint `last`, the corner at that one not counted; inf if that is impossible.
+
+    In between there is no corner: there the speeds of the ways are lowered, in place, to the largest ones.
+    """
+    for i in range(first, last - 1):
+        fixed = leg_end(ways[i], ways[i].V, legs[i].j, True)
+        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i], k)
+    for i in range(last - 1, first, -1):
+        fixed = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i], k)
+    time = 0.0
+    for i in range(first, last):
+        one = leg_end(ways[i], ways[i].V, legs[i].j, True)
+        other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+        if not _feasible(one, other, legs[i], k, LENGTH_ROUNDING):
+            return np.inf
+        time += leg_time(one, other, legs[i])
+    return time
+
+
+@njit(cache=True, error_model="numpy")
+def _choose(rows, straight, legs, k):
+    """The fastest choice (n+1,) among the rows (R, n+1), and the time at the end of each corner; row 0 is the stop."""
+    count, joints = rows.shape
+    best, back = np.full((joints, count), np.inf), np.zeros((joints, count), np.int64)
+    best[0, 0] = 0.0
+    ways, corners, at = rows[count - 1].copy(), np.flatnonzero(~straight), 0
+    for n in range(1, len(corners)):
+        i, at = corners[n - 1], corners[n]
+        for t in range(count):
+            if t > 0 and rows[t, at].V <= 0.0:
+                continue  # the stop already
+            lasting = corner_at(rows[t, at], rows[t, at].V, True)[2]
+            for s in range(count):
+                time = best[i, s] + lasting
+                if time < best[at, t]:
+                    ways[i : at + 1] = rows[count - 1, i : at + 1]
+                    ways[i], ways[at] = rows[s, i], rows[t, at]
+                    time += _between(ways, i, at, legs, k)
+                    if time < best[at, t]:
+                        best[at, t], back[at, t] = time, s
+    row = 0
+    ways[:] = rows[count - 1]
+    for n in range(len(corners) - 1, -1, -1):
+        ways[corners[n]] = rows[row, corners[n]]
+        row = back[corners[n], row]
+    time = np.zeros(joints)
+    for n in range(1, len(corners)):
+        _between(ways, corners[n - 1], corners[n], legs, k)
+        for i in range(corners[n - 1], corners[n]):
+            one = leg_end(ways[i], ways[i].V, legs[i].j, True)
+            other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+            lasting = corner_at(ways[i + 1], ways[i + 1].V, True)[2]
+            time[i + 1] = time[i] + lasting + leg_time(one, other, legs[i])
+    return ways, time
+
+
+@njit(cache=True, error_model="numpy")
+def _moves(ways, legs, duration, jerk):
+    """Write durations and jerks of `moves` into duration and jerk (n, 8)."""
+    phases = np.empty((2, PHASES))
+    for i in range(len(legs)):
+        one = leg_end(ways[i], ways[i].V, legs[i].j, True)
+        other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+        leg_phases(one, other, legs[i], phases)
+        duration[i, 0] = corner_at(ways[i], ways[i].V, True)[2]
+        duration[i, 1:], jerk[i, 1:] = phases[0], phases[1]

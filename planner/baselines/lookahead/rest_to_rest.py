@@ -1,0 +1,97 @@
+"""Limits along a block from those of the axes: the point-to-point reference of the papers (base/point_to_point.py has its moves)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.point_to_point import rest_to_rest_times
+from planner.corners.budget import error_rate, largest_normal
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+
+GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
+GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v
+AT_REST = 1e-12  # an axis with a smaller component of a unit vector does not limit; below the rounding of unit vectors [-]
+
+
+def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own, wherever on the segment.
+
+    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest limit of the axes that
+    move, each over the largest component that a unit vector has there (`_components`), must hold for the vector: with kappa v^2 <=
+    a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s
+    <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N).
+    Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of |r'''| takes the
+    place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment takes least time from rest to rest: none of
+    these limits makes it longer when it gets larger.
+    """
+    axes = toolpath.axes
+    direction = np.abs(toolpath.tangent_start)
+    v, a, j = (
+        (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
+        for q in ("velocity", "acceleration", "jerk")
+    )
+    curved = ~toolpath.straight
+    kappa = toolpath.curvature[curved]
+    twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
+    twist[on_curve] = np.maximum(twist[on_curve], toolpath.curves.twist[toolpath.curve[curved][on_curve]])
+    component = np.maximum(_components(toolpath, curved), AT_REST)
+    v_all, a_all, j_all = (
+        (machine.limits(q, axes) / component).min(axis=1) for q in ("velocity", "acceleration", "jerk")
+    )
+    half = np.sqrt(0.5)
+    budget = toolpath.along[curved] / error_rate(machine)
+    across = np.minimum(half * a_all, np.minimum(budget, largest_normal(machine)))
+    v[curved] = np.min(
+        [
+            v_all,
+            np.sqrt(across / kappa),
+            np.cbrt(half * j_all / (2 * twist)),
+            toolpath.feed[curved],
+        ],
+        axis=0,
+    )
+    a[curved], j[curved] = half * a_all, half * j_all / 2
+    product = np.full(len(v), np.inf)  # bound of v a_s [mm2/s3]
+    product[curved] = half * j_all / (3 * kappa)
+    bound = np.flatnonzero(v * a > product)
+    v[bound], a[bound] = _fastest(toolpath.length[bound], v[bound], a[bound], j[bound], product[bound])
+    return np.minimum(v, toolpath.feed), a, j
+
+
+def _components(toolpath: Toolpath, curved: Array) -> FloatArray:
+    """(n, A) the largest component along each axis that a unit vector along or across the path can have, on the segments `curved` (M,):
+    on an arc its drift's and that of its plane, on a curve 1 for the axes in which its control points differ."""
+    arc, curve = toolpath.arc[curved], toolpath.curve[curved]
+    found = np.empty((len(arc), len(toolpath.axes)))
+    row = arc[arc >= 0]
+    in_plane = np.hypot(toolpath.arcs.e1[row], toolpath.arcs.e2[row])
+    found[arc >= 0] = np.minimum(in_plane + np.abs(toolpath.arcs.drift[row]), 1.0)
+    found[curve >= 0] = np.ptp(toolpath.curves.points[curve[curve >= 0]], axis=1) > 0.0
+    return found
+
+
+def _fastest(
+    length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray, product: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by golden sections of log v,
+    from the v that leaves a as it is to the one that is given. Where v is reached, a move takes L/v + v^2/P + P/(v j) with P the
+    product: a sum of exponentials of log v, which is convex. Where it is not, it takes the longer the lower a is: the higher v."""
+    low, high = np.log(product / a), np.log(v)
+
+    def time(at: FloatArray) -> FloatArray:
+        speed = np.exp(at)
+        return rest_to_rest_times(length, speed, product / speed, j)
+
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    times = [time(at) for at in inner]
+    for _ in range(GOLDEN_STEPS):
+        left = times[0] < times[1]
+        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        of_new = time(new)
+        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
+        times = [np.where(left, of_new, times[1]), np.where(left, times[0], of_new)]
+    speed = np.exp(np.where(times[0] < times[1], inner[0], inner[1]))
+    return speed, product / speed

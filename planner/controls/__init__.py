@@ -1,0 +1,1 @@
+"""Controls: programs for them, and machine files from their settings."""

@@ -1,0 +1,206 @@
+"""What a control might be given of a plan: the program as it is, its own moves in the control's words, the planned path as chords.
+
+The program as it is is the input, byte for byte; where the control cannot read it so (as_it_is.py), its lines are written in the
+control's words (translate.py). Chords replace only lines whose place the program's own words tell (rows.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
+from planner.controls.export.as_it_is import why_not
+from planner.controls.export.chords import (
+    DECIMALS,
+    Polyline,
+    breaks,
+    groups,
+    off_the_path,
+    planned_polyline,
+    programmed_polyline,
+    spliced,
+)
+from planner.controls.export.controls import Control, takes_move
+from planner.controls.export.header import head_of
+from planner.controls.export.rows import Row, Source
+from planner.controls.export.source import source_of, text_of
+from planner.controls.export.translate import Translator
+from planner.machine import Machine
+from planner.planning.job.plan import Plan
+
+ROUNDING = 2.0 * 10.0**-DECIMALS  # room that coordinates need [mm]
+LESS = 0.9  # of the tolerance: what a plan should take that leaves room for chords
+LITTLE = 0.05  # of the tolerance: room below this is worth a note
+AS_IT_IS = "program as it is"
+OWN_PATH = "program's own path, in the control's words"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A program that the control might be given.
+
+    name     : as printed
+    line     : its moves, for the model
+    replaced : (R,) the rows that chords replace; None for the program as it is
+    mode     : LinuxCNC's G64, or ""
+    time     : predicted [s]
+    """
+
+    name: str
+    line: Polyline
+    replaced: Array | None
+    mode: str = ""
+    time: float = np.nan
+
+    def at(self, time: float) -> Candidate:
+        """The candidate with its predicted time [s]."""
+        return dataclasses.replace(self, time=time)
+
+
+class Candidates:
+    """A plan that is exported for a control within a tolerance of the path [mm]."""
+
+    def __init__(self, plan: Plan, control: Control, tolerance: float):
+        self.plan, self.control, self.tolerance = plan, control, tolerance
+
+    @cached_property
+    def source(self) -> Source:
+        """The rows that are written. Raises InputError as `source_of` does."""
+        return source_of(self.plan)
+
+    @cached_property
+    def why_not(self) -> str:
+        """Why the control cannot be given the program as it is; "" if it can."""
+        text = text_of(self.plan.program)
+        if text is None:
+            return "it is no NC program"
+        return why_not(self.source, text, self.control, self.plan.machine)
+
+    @property
+    def text(self) -> bytes:
+        """The program as it is."""
+        found = text_of(self.plan.program)
+        assert found is not None
+        return found
+
+    @cached_property
+    def room(self) -> float | None:
+        """How far chords may miss the planned motion [mm]; None if that is nothing. Raises InputError if the motion leaves the
+        program."""
+        left = self.tolerance - self.used
+        return None if left < 2.0 * ROUNDING else left - ROUNDING
+
+    @cached_property
+    def used(self) -> float:
+        """What the plan takes of the tolerance [mm]. Raises InputError if the motion leaves the program."""
+        verdict = self.plan.verdict
+        assert verdict is not None
+        if verdict.contour_error_mm is None or verdict.vertex_error_mm is None:
+            raise InputError(
+                "the motion leaves the program, so there is no telling what chords may add; see its verdict"
+            )
+        return max(verdict.contour_error_mm, verdict.vertex_error_mm)
+
+    def own(self, within: float) -> list[Candidate]:
+        """The program as it is, or its own moves in the control's words: its arcs and curves as chords within so much [mm]."""
+        line = programmed_polyline(self.plan, within)
+        if not self.why_not:
+            return [Candidate(name=AS_IT_IS, line=line, replaced=None)]
+        return [Candidate(name=OWN_PATH, line=line, replaced=self._replaced(planned=False))]
+
+    def chords(self, within: float, name: str) -> list[Candidate]:
+        """The planned path with chords that miss it by so much at most [mm], if any line can be replaced."""
+        replaced = self._replaced(planned=True)
+        rows = self.source.rows
+        if not replaced.any():
+            return []
+        parts = groups(rows, replaced)
+        planned = planned_polyline(self.plan, within, breaks(rows, replaced))
+        line = spliced(planned, programmed_polyline(self.plan, within), self.source.program, parts)
+        if off_the_path(line, self.plan, parts) > self.tolerance:
+            return []
+        return [Candidate(name=name, line=line, replaced=replaced)]
+
+    def _replaced(self, *, planned: bool) -> Array:
+        """(R,) the rows whose moves are written as chords: all that can be, or those for which the control has no words."""
+        return np.array(
+            [row.plain and self._is_replaced(row, planned=planned) for row in self.source.rows], dtype=bool
+        )
+
+    def _is_replaced(self, row: Row, *, planned: bool) -> bool:
+        control = self.control
+        if row.radius:  # which the control would reckon with once more
+            return not control.cycles
+        return (planned and row.motion <= 30) or not takes_move(row, control, self.source.program.reading)
+
+    @cached_property
+    def feed_in_force(self) -> FloatArray:
+        """(B,) the F in force on each block [mm/s], at which such controls move with G0; inf before the first F word."""
+        feed, found = np.inf, np.full(len(self.plan.program), np.inf)
+        for row in self.source.rows:
+            word = row.value("F")
+            if word is not None:
+                feed = word.value / SECONDS_PER_MINUTE
+            found[row.first : row.last] = feed
+        return found
+
+    def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
+        """The file of a candidate, and notes on it. Raises InputError for a line that the control has no words for."""
+        if chosen.replaced is None:
+            return with_mode(self.text, chosen.mode), ()
+        rapid = _rapid_speed(chosen.line, self.plan.machine, self.plan.toolpath.axes)
+        found = Translator(
+            self.source, self.control, self.plan.machine, chosen.replaced, chosen.line, rapid
+        ).translated()
+        head = head_of(self.source, self.control, self.plan, self.tolerance, chosen.name)
+        lines = [*head, *([chosen.mode] if chosen.mode else []), *found.lines]
+        text = "\n".join([*lines, ""]).encode("ascii", "replace")
+        return text, found.notes
+
+    def room_notes(self) -> tuple[str, ...]:
+        """That the plan leaves no room for chords, or little."""
+        if self.room is not None and self.room > LITTLE * self.tolerance:
+            return ()
+        tolerance, less = self.tolerance, LESS * self.tolerance
+        uses = f"the plan uses {self.used / MICROMETRE:.3f} of {tolerance / MICROMETRE:g} µm"
+        if self.room is None:
+            return (
+                f"{uses}, which leaves no room for chords: plan with --tolerance {less:.4g}, and export with "
+                f"--tolerance {tolerance:g}",
+            )
+        return (
+            f"{uses}, which leaves little room for chords: a plan with --tolerance {less:.4g}, exported with "
+            f"--tolerance {tolerance:g}, may be faster on the control",
+        )
+
+
+def with_mode(text: bytes, mode: str) -> bytes:
+    """A program's text with its path mode on a line of its own, after the percent sign if it begins with one."""
+    if not mode:
+        return text
+    head = re.match(rb"\s*%[^\n]*\n", text)
+    cut = head.end() if head else 0
+    return text[:cut] + b"G21 " + mode.encode("ascii") + b"\n" + text[cut:]
+
+
+def standing(plan: Plan, line: Polyline) -> Array:
+    """(n+1,) the points of a polyline at which the program has the motion stand still."""
+    stands = np.zeros(len(line.points), dtype=bool)
+    still = np.flatnonzero(~np.isin(np.arange(len(plan.program)), plan.toolpath.block))
+    stands[np.searchsorted(line.block, still)] = True
+    return stands
+
+
+def _rapid_speed(line: Polyline, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
+    """(n,) highest speed of each move by the velocities of the axes [mm/s]; inf without a length."""
+    step = np.abs(np.diff(line.points, axis=0))
+    most = machine.limits("velocity", axes) * np.linalg.norm(step, axis=1, keepdims=True)
+    found: FloatArray = np.divide(most, step, out=np.full_like(step, np.inf), where=step > 0.0).min(axis=1)
+    return found

@@ -1,0 +1,247 @@
+"""The planned motion as a polyline: setpoints between which straight moves miss no other setpoint by more than a given distance.
+
+A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the path is
+(kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers; where the chords then miss by more,
+which is measured, the density is raised and all is done again. The ends of rapid moves, standstills and places where something else
+happens (an M word) are vertices in any case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.controls.export.rows import Row
+from planner.geometry.chords import polyline
+from planner.geometry.distance import distance_near
+from planner.motion.trajectory import Trajectory
+from planner.nc import codes
+from planner.nc.program import Kind, Program
+from planner.planning.job.plan import Plan
+
+ROUNDS = 30  # of raising the density, each by a tenth at least: far more than curvature between setpoints can ask for
+DECIMALS = 4  # of a coordinate in mm
+LINEAR = 3  # axes that chords have: x, y, z
+PLACES = 5  # of a chord at which its distance from the path is measured
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Polyline:
+    """Straight moves between n+1 points.
+
+    points : (n+1, A) [mm], rounded to `DECIMALS`
+    feed   : (n,) planned feed: the highest of the setpoints from one point to the next [mm/s]
+    block  : (n,) block of the program of each move
+    rapid  : (n,) whether that is a rapid move
+    miss   : how far the moves miss a setpoint at most [mm]
+    """
+
+    points: FloatArray
+    feed: FloatArray
+    block: Array
+    rapid: Array
+    miss: float
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed before them."""
+
+    first: int
+    last: int
+    replaced: bool
+    placed: frozenset[str]
+
+
+def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
+    """The planned motion as a polyline.
+
+    within : how far it may miss a setpoint [mm], above the rounding of coordinates
+    breaks : (K,) blocks before which something else happens, ascending; None for those of the program's events
+
+    Raises ValueError for a plan without a trajectory.
+    """
+    trajectory = plan.require().trajectory
+    assert trajectory is not None
+    if breaks is None:
+        breaks = np.unique([event.block for event in plan.program.events]).astype(np.int64)
+    fixed = _fixed(plan, trajectory, breaks)
+    density = _density(trajectory, within)
+    for _ in range(ROUNDS):
+        along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s))])
+        chosen = np.append(True, np.diff(np.floor(along)) > 0) | fixed
+        rows = np.flatnonzero(chosen)
+        points = _rounded(trajectory.position[rows])
+        misses = _misses(trajectory.position, rows, points)
+        if (misses <= within).all() or chosen.all():
+            break
+        worse = np.maximum.reduceat(misses, rows[:-1])
+        more = np.where(worse > within, np.maximum(np.sqrt(worse / within), 1.1), 1.0)
+        density = density * np.repeat(more, np.append(np.diff(rows)[:-1], len(density) - rows[-2]))
+    feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
+    block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
+    moves = (np.diff(points, axis=0) != 0).any(axis=1)
+    kept = np.append(True, moves)
+    return Polyline(
+        points=points[kept],
+        feed=feed[moves],
+        block=block[moves],
+        rapid=plan.program.kind[block[moves]] == Kind.RAPID,
+        miss=float(misses.max()),
+    )
+
+
+def programmed_polyline(plan: Plan, within: float) -> Polyline:
+    """The programmed path as a polyline, at the programmed feeds: straight moves as they are, arcs and curves as chords.
+
+    within : how far chords may be from arcs and curves [mm]
+    """
+    toolpath = plan.toolpath
+    chord = np.sqrt(8.0 * within / np.maximum(toolpath.curvature, 1e-12))
+    count = np.where(toolpath.straight, 1, np.ceil(toolpath.length / chord)).astype(np.int64)
+    ends, segment = polyline(toolpath, count)
+    vertices: FloatArray = np.vstack([toolpath.start[:1], ends])
+    return Polyline(
+        points=_rounded(vertices),
+        feed=toolpath.feed[segment],
+        block=toolpath.block[segment],
+        rapid=toolpath.rapid[segment],
+        miss=within if (count > 1).any() else 0.0,
+    )
+
+
+def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence[Group]) -> Polyline:
+    """The polyline of a program of which chords replace a part: theirs there, and else that of the program's own words.
+
+    Chords begin and end where the program has its blocks end, and leave axes alone that the program has not placed: the words around
+    them may be relative, or shift the coordinates.
+    """
+    points = [own.points[:1]]
+    feed: list[FloatArray] = []
+    block: list[Array] = []
+    rapid: list[Array] = []
+    for group in groups:
+        line = planned if group.replaced else own
+        begin, end = np.searchsorted(line.block, [group.first, group.last]).tolist()
+        ends, here = line.points[begin + 1 : end + 1].copy(), points[-1][-1]
+        of, fast, which = line.feed[begin:end], line.rapid[begin:end], line.block[begin:end]
+        if group.replaced:
+            last, k = here.copy(), group.last - 1
+            last[:LINEAR] = _rounded(program.end[k, :LINEAR])
+            if not len(ends) and (last != here).any():  # shorter than a period
+                ends, of, which = last[None].copy(), program.feed[k : k + 1], np.array([k])
+                fast = program.kind[k : k + 1] == Kind.RAPID
+            ends[-1:] = last
+            for a, letter in enumerate(program.axes):
+                if a >= LINEAR or letter.upper() not in group.placed:
+                    ends[:, a] = here[a]
+        if len(ends):
+            for column, more in zip((points, feed, block, rapid), (ends, of, which, fast), strict=True):
+                column.append(more)
+    return Polyline(
+        points=np.vstack(points),
+        feed=np.concatenate(feed),
+        block=np.concatenate(block),
+        rapid=np.concatenate(rapid),
+        miss=max(planned.miss, own.miss),
+    )
+
+
+def groups(rows: list[Row], replaced: Array) -> list[Group]:
+    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words; `replaced` (R,)."""
+    found: list[Group] = []
+    parted = True
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        shifts = any(codes.G_GROUP[code] in ("one-shot", "work offset", "tool length") for code in row.g())
+        parted |= shifts or bool(row.text) or row.feeds
+        if row.last == row.first:
+            continue
+        last = found[-1] if found else None
+        if last is not None and last.replaced == chords and not (parted and chords):
+            found[-1] = Group(last.first, row.last, last.replaced, last.placed)
+        else:
+            found.append(Group(row.first, row.last, chords, row.placed))
+        parted = shifts
+    return found
+
+
+def breaks(rows: list[Row], replaced: Array) -> Array:
+    """(K,) the blocks before which something else than a chord stands, ascending.
+
+    replaced : (R,) True for rows that chords replace
+    """
+    found: set[int] = set()
+    for row, chords in zip(rows, replaced.tolist(), strict=True):
+        if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:
+            found |= {row.first, row.last}
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def off_the_path(line: Polyline, plan: Plan, groups: Sequence[Group]) -> float:
+    """How far the first and last straight moves of the groups that chords replace are from the programmed path [mm]: these
+    end where the program does, not at a setpoint."""
+    toolpath = plan.toolpath
+    replaced = [group for group in groups if group.replaced]
+    first = np.searchsorted(line.block, [group.first for group in replaced])
+    last = np.searchsorted(line.block, [group.last for group in replaced]) - 1
+    moves = np.unique(np.concatenate([first, last]))
+    moves = moves[(moves >= 0) & (moves < len(line.block))]
+    start, step = line.points[moves], line.points[moves + 1] - line.points[moves]
+    segment = np.minimum(np.searchsorted(toolpath.block, line.block[moves]), len(toolpath) - 1)
+    worst = 0.0
+    for place in np.linspace(0.0, 1.0, PLACES):
+        worst = max(worst, float(distance_near(toolpath, start + place * step, segment).max(initial=0.0)))
+    return worst
+
+
+def _rounded(points: FloatArray) -> FloatArray:
+    """Points (n, A) as they are written."""
+    found: FloatArray = np.round(points, DECIMALS)
+    return found
+
+
+def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
+    """(T,) setpoints that are vertices: ends, standstills, those beside turning back, where rapid moves begin and end, and the last
+    before each of the breaks."""
+    fixed = np.zeros(len(trajectory), dtype=bool)
+    fixed[[0, -1]] = True
+    at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
+    fixed |= at_rest
+    back = (trajectory.velocity[1:] * trajectory.velocity[:-1]).sum(axis=1) < 0.0
+    fixed[1:] |= back
+    fixed[:-1] |= back
+    rapid = plan.program.kind[trajectory.block] == Kind.RAPID
+    fixed[:-1] |= rapid[1:] != rapid[:-1]
+    if len(breaks):
+        passed = np.searchsorted(breaks, trajectory.block, side="right")
+        fixed[:-1] |= passed[1:] != passed[:-1]
+    return fixed
+
+
+def _density(trajectory: Trajectory, within: float) -> FloatArray:
+    """(T,) vertices per mm of path, at least one for the whole of it."""
+    v, a = trajectory.velocity, trajectory.acceleration
+    speed_sq = (v * v).sum(axis=1)
+    moving = speed_sq > 1e-12 * max(float(speed_sq.max()), 1e-12)
+    along = np.divide((v * a).sum(axis=1), speed_sq, out=np.zeros(len(v)), where=moving)
+    across = np.linalg.norm(a - along[:, None] * v, axis=1)
+    kappa = np.divide(across, speed_sq, out=np.zeros(len(v)), where=moving)
+    density: FloatArray = np.sqrt(kappa / (8.0 * within)) + 1.0 / max(float(trajectory.s[-1]), 1e-9)
+    return density
+
+
+def _misses(position: FloatArray, rows: Array, points: FloatArray) -> FloatArray:
+    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1, A) at `rows`; or how far
+    they go back along it, if that is more: a way there and back lies on the chord, which would leave it out."""
+    move = np.clip(np.searchsorted(rows, np.arange(len(position)), side="right") - 1, 0, len(rows) - 2)
+    a, b = points[move], points[move + 1]
+    chord = b - a
+    size = (chord * chord).sum(axis=1)
+    u = np.divide(((position - a) * chord).sum(axis=1), size, out=np.zeros(len(position)), where=size > 0)
+    off: FloatArray = np.linalg.norm(position - a - np.clip(u, 0.0, 1.0)[:, None] * chord, axis=1)
+    along = u * np.sqrt(size)
+    along += move * 2.0 * float(np.abs(along).max(initial=1.0))  # each move above all before it
+    return np.maximum(off, np.maximum.accumulate(along) - along)

@@ -1,0 +1,191 @@
+"""What grbl, Klipper, Marlin and LinuxCNC know: the words of each, and how each is told what it has no word for.
+
+A word that stands in no table is refused with its line. Where the tables come from:
+
+    grbl      1.1h: gcode.c (gc_execute_line), protocol.c, wiki "Grbl v1.1 Commands", "Grbl v1.1 Laser Mode"
+    Klipper   docs/G-Codes.md, klippy/gcode.py, klippy/extras/gcode_move.py, homing.py
+    Marlin    2.1: marlinfw.org/meta/gcode, src/gcode/gcode.cpp, parser.cpp, queue.cpp, as Configuration.h comes: without
+              CNC_COORDINATE_SYSTEMS, CNC_WORKSPACE_PLANES, INCH_MODE_SUPPORT, PAREN_COMMENTS
+    LinuxCNC  2.9: docs/src/gcode/g-code.adoc, m-code.adoc, overview.adoc
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+
+from planner.controls.export.rows import G92, RETRACTIONS, Row, Word
+from planner.nc import codes
+from planner.nc.reading import ABSOLUTE, Reading
+
+_STAYS = "this control always stays on the path"
+_ONE_ZERO = "this control has no work offsets: its zero is the program's"
+_STRAIGHT = "what it would choose is written out as straight moves"
+_RPM = "S is in revolutions per minute there anyway"
+_OPERATOR = "what the operator may override is this control's own"
+_NOT_USED = "the control has no such mode"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """A control's words. Codes are in tenths: G61.1 is 611.
+
+    g, m          : codes that mean there what they mean in RS274NGC
+    arcs, cycles  : it is given arcs, and everything that moves besides G0 to G3, as the program has them; else as straight moves
+    settings      : M numbers that it knows beside those, kept with all their words
+    idle          : codes ("G64") that change nothing of what it does, and why
+    instead       : M codes ("M6"), and what is written for them
+    letters       : of the words that it takes beside those of codes; axes are among them
+    one_command   : a line holds one code, at its start, and moves have G0 or G1 on every line
+    rapid_feed    : G0 moves at the F in force
+    milliseconds  : P of G4 counts them
+    inch          : it knows G20
+    speed_by_code : S stands beside M3 and M4 only
+    number, percent, paren : lines may begin with N, hold %, hold comments in parentheses
+    line_max      : longest line without blanks and comments; 0 for no limit
+    end           : the last line of a program that has none, or whose M2 or M30 it does not know
+    """
+
+    name: str
+    g: frozenset[int]
+    m: frozenset[int]
+    arcs: bool = False
+    cycles: bool = False
+    settings: frozenset[int] = frozenset()
+    idle: dict[str, str] = field(default_factory=dict)
+    instead: dict[str, str] = field(default_factory=dict)
+    letters: str
+    one_command: bool = False
+    rapid_feed: bool = False
+    milliseconds: bool = False
+    inch: bool = True
+    speed_by_code: bool = False
+    number: bool = True
+    percent: bool = False
+    paren: bool = True
+    line_max: int = 0
+    end: str = "M2"
+
+    @property
+    def extruder(self) -> bool:
+        """Whether its E is an extruder's."""
+        return self.one_command and "E" in self.letters
+
+
+_IDLE_ON_MILLS = {
+    "G8": _NOT_USED,
+    "G97": _RPM,
+    "M48": _OPERATOR,
+    "M49": _OPERATOR,
+    "G64": _STAYS,
+    "G61.1": _STAYS,
+}
+_IDLE_ON_PRINTERS = {
+    **_IDLE_ON_MILLS,
+    **dict.fromkeys(("G17", "G18", "G19", "G80", "G91.1", "G98", "G99"), _STRAIGHT),
+    "G61": _STAYS,
+    "G54": _ONE_ZERO,
+    "G40": _NOT_USED,
+    "G49": _NOT_USED,
+    "G94": "F is always per minute there",
+}
+_PRINTER = frozenset(
+    (17, 18, 82, 83, 84, 104, 105, 106, 107, 109, 114, 115, 117, 118, 119, 140, 190, 204, 220, 221, 400)
+)
+
+GRBL = Control(
+    name="grbl",
+    g=frozenset((
+        0, 10, 20, 30, 40, 100, 170, 180, 190, 200, 210, 280, 281, 300, 301, 400, 431, 490, 530, 540, 550, 560, 570, 580, 590,
+        610, 800, 900, 910, 911, 920, 921, 930, 940,
+    )),
+    m=frozenset((0, 1, 2, 30, 3, 4, 5, 7, 8, 9)),
+    arcs=True,
+    idle={**_IDLE_ON_MILLS, "G98": _STRAIGHT, "G99": _STRAIGHT},
+    instead={"M6": "M0", "M60": "M0"},
+    letters="FIJKLNPRSTXYZ",
+    line_max=79,  # LINE_BUFFER_SIZE 80 with its end
+)  # fmt: skip
+KLIPPER = Control(
+    name="klipper",
+    g=frozenset((0, 10, 40, 210, 280, 900, 910, 920)),
+    m=frozenset(),
+    settings=_PRINTER - {17} | {73, 110, 112} | set(range(20, 28)),
+    idle=_IDLE_ON_PRINTERS,
+    instead={"M0": "PAUSE", "M1": "PAUSE", "M60": "PAUSE", "M6": "PAUSE"},
+    letters="FXYZE",
+    one_command=True,
+    rapid_feed=True,
+    milliseconds=True,
+    inch=False,
+    speed_by_code=True,
+    paren=False,
+    end="M400",
+)
+MARLIN = replace(
+    KLIPPER,
+    name="marlin",
+    m=frozenset((0, 1, 3, 4, 5, 7, 8, 9)),
+    settings=_PRINTER | {73, 75, 76, 77, 85, 110, 111, 112, 113, 155, 201, 203, 205, 301, 302, 420, 851, 900},
+    instead={"M60": "M0", "M6": "M0"},
+    number=False,  # a line number needs a checksum on the serial line
+)
+LINUXCNC = Control(
+    name="linuxcnc",
+    g=frozenset(codes.G_GROUP)
+    - {520, 541, 434, 62},  # G52, G54.1, G43.4, G6.2 are of other controls or later ones
+    m=frozenset(code // 10 for code in codes.M_GROUP),
+    arcs=True,
+    cycles=True,
+    settings=frozenset(range(100, 200)),
+    letters="ABCDEFHIJKLPQRSTUVWXYZ",
+    percent=True,
+    line_max=255,
+)
+# Lines that are no words, by control: homing, unlocking, messages, Klipper's own commands.
+_COMMANDS = {
+    "grbl": re.compile(r"\$[HX]", re.IGNORECASE),
+    "klipper": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*|SET_VELOCITY_LIMIT\b.*", re.IGNORECASE),
+    "marlin": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*", re.IGNORECASE),
+}
+
+
+def is_command(line: str, control: Control) -> bool:
+    """Whether a line that is no words is one that the control knows."""
+    known = _COMMANDS.get(control.name)
+    return known is not None and known.fullmatch(line) is not None
+
+
+def is_setting(words: list[Word], control: Control) -> bool:
+    """Whether the control knows a code that moves no axis, with its words: a setting, a retraction, G92 E."""
+    first, letters = words[0], {word.letter for word in words}
+    if first.letter == "M":
+        return first.code % 10 == 0 and first.code // 10 in control.settings
+    retracts = first.code in RETRACTIONS and letters == {"G"}
+    return control.one_command and (retracts or (first.code == G92 and letters <= set("GE")))
+
+
+def takes_move(row: Row, control: Control, reading: Reading) -> bool:
+    """Whether the control is given a move in the program's own words: no arcs with turns for grbl, none with absolute centres."""
+    if row.radius and not control.cycles:
+        return False
+    if row.motion in codes.ARCS:
+        known = control.arcs and reading.arc_centres != ABSOLUTE
+        return known and (control.cycles or row.value("P") is None)
+    return row.motion <= 30 or (control.cycles and row.motion in control.g)
+
+
+CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
+# Codes that mean the same on every control, but that need a build of it with an option: what is said of them.
+OPTIONS = {
+    ("grbl", "M7"): "M7 needs a grbl built with ENABLE_M7",
+    ("klipper", "PAUSE"): "PAUSE needs [pause_resume] in printer.cfg",
+    ("marlin", "M3"): "M3, M4 and M5 need a Marlin built with SPINDLE_FEATURE or LASER_FEATURE",
+    ("marlin", "M420"): "M420 needs a Marlin built with bed leveling",
+    ("marlin", "M900"): "M900 needs a Marlin built with LIN_ADVANCE",
+    **{
+        ("marlin", f"M{code}"): "M7, M8 and M9 need a Marlin built with COOLANT_CONTROL" for code in (7, 8, 9)
+    },
+    **{("klipper", code): "G10 and G11 need [firmware_retraction] in printer.cfg" for code in ("G10", "G11")},
+    **{("marlin", code): "G10 and G11 need a Marlin built with FWRETRACT" for code in ("G10", "G11")},
+}

@@ -1,0 +1,154 @@
+"""What has been written of a program for a control, and what it has in force there.
+
+G90, G91, the motion code and F are said again wherever straight moves have changed them. S waits for the line that it belongs to: grbl
+empties its buffer at an S on a line of its own.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NoReturn
+
+import numpy as np
+
+from planner.base.errors import InputError
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.controls.export.chords import DECIMALS
+from planner.controls.export.controls import OPTIONS, Control
+from planner.controls.export.rows import Row, Source, Word
+from planner.machine import Machine
+from planner.nc.events import plain
+from planner.nc.writer import round_down
+
+INCH_DECIMALS = DECIMALS + 2  # a hundredth of an inch is about a quarter of a millimetre
+_LENGTHS = frozenset("XYZIJKRUVWQE")
+
+
+class Output:
+    """The lines of a file, and the state of the control after them.
+
+    lines, notes : so far; notes by what they are about, each once, with its line
+    motion       : the motion code, "" for none that lines could leave out
+    absolute, inch : G90, G20
+    feed         : F per minute in force, None for none
+    programmed_feed, feed_inch : the program's last F word, and whether it was given in inches
+    speed        : an S word that waits for its line
+    spindle      : 3 or 4 after M3 and M4, 0 after M5
+    extrudes     : E words move an extruder of the control
+    """
+
+    def __init__(self, source: Source, control: Control, machine: Machine):
+        self.source, self.control, self.machine = source, control, machine
+        self.program = source.program
+        self.lines: list[str] = []
+        self.notes: dict[str, tuple[str, int]] = {}
+        self.motion, self.absolute, self.inch = "", True, False
+        self.feed: float | None = None
+        self.programmed_feed: Word | None = None
+        self.feed_inch = False
+        self.speed: Word | None = None
+        self.spindle = 0
+        self.extrudes = control.extruder and any(row.feeds for row in source.rows)
+
+    def _say_move(self, row: Row, distance: list[str], words: list[str]) -> None:
+        """A line of a move, with the speed that waits for it."""
+        speed: list[str] = []
+        if self.speed is not None and row.motion >= 0:
+            if not self.control.speed_by_code:
+                speed, self.speed = [str(self.speed)], None
+            elif self.spindle:
+                self._flush_speed()
+        if self.control.one_command:
+            self.lines += [*distance, " ".join(words)]
+        else:
+            self.lines.append(" ".join([*distance, *words, *speed]))
+
+    def _flush_speed(self) -> None:
+        """Say the speed on a line of its own, before what does not take it."""
+        if self.speed is None:
+            return
+        if self.control.speed_by_code:
+            if not self.spindle:
+                return
+            macro = self.machine.macros.get(f"M{self.spindle}")
+            self._say(f"M{self.spindle} {self.speed}" if macro is None else called(macro, [self.speed]))
+        else:
+            self._say(str(self.speed))
+        self.speed = None
+
+    def _distance(self, *, absolute: bool) -> list[str]:
+        if absolute == self.absolute:
+            return []
+        self.absolute = absolute
+        return ["G90" if absolute else "G91"]
+
+    def _length(self, word: Word, row: Row) -> str:
+        if row.inch and not self.control.inch and word.letter in _LENGTHS:
+            return plain(round(word.value * MM_PER_INCH, INCH_DECIMALS) + 0.0)
+        return word.text
+
+    def _feed_words(self, row: Row) -> list[str]:
+        """The F word of a move of the program, where the control does not have that feed in force."""
+        given = self.programmed_feed
+        if not row.per_minute:
+            own = row.value("F")
+            self.feed = None
+            return [str(own)] if own is not None else []
+        unit = MM_PER_INCH if self.inch else 1.0
+        if given is None:  # the machine's default
+            block = next((k for k in range(row.first, row.last) if np.isfinite(self.program.feed[k])), None)
+            return (
+                []
+                if block is None
+                else self._feed_of(float(self.program.feed[block]) * SECONDS_PER_MINUTE / unit)
+            )
+        same = self.feed_inch == self.inch
+        value = given.value if same else given.value * (MM_PER_INCH if self.feed_inch else 1.0) / unit
+        return self._feed_of(value, given.text if same else "")
+
+    def _feed_of(self, value: float, text: str = "", *, as_is: bool = True) -> list[str]:
+        written = text or (plain(round(value, INCH_DECIMALS)) if as_is else round_down(value))
+        if self.feed is not None and float(written) == self.feed:
+            return []
+        self.feed = float(written)
+        return [f"F{written}"]
+
+    def _say(self, text: str) -> None:
+        """A line that is no move; the next move says its code again."""
+        self.lines.append(text)
+        self.motion = ""
+
+    def comment(self, text: str) -> str:
+        """A comment of the control."""
+        return comment(text, self.control)
+
+    def _option(self, name: str, row: Row) -> None:
+        said = OPTIONS.get((self.control.name, name))
+        if said is not None:
+            self._note(said, said, row)
+
+    def _note(self, key: str, text: str, row: Row) -> None:
+        self.notes.setdefault(key, (text, row.line))
+
+    def _refuse(self, row: Row, what: str) -> NoReturn:
+        name = self.control.name
+        where = " or a line [macros] of the machine file" if self.control.one_command else ""
+        raise InputError(
+            f"{what}: {name} does not know it, and nothing else does the same; export for another control, or take it out of the "
+            f"program{where}",
+            source=self.program.source,
+            line=row.line,
+        )
+
+
+def comment(text: str, control: Control) -> str:
+    """A comment of a control, in ASCII."""
+    text = text.replace("µ", "u")
+    clean = "".join(c if c.isascii() and c.isprintable() and c not in "()" else "_" for c in text)
+    return f"({clean})" if control.paren else f"; {clean}"
+
+
+def called(macro: str, words: list[Word]) -> str:
+    """A call of a macro with the words that it gets: as they are where its name is a code (M3 S900), else as parameters (S=900)."""
+    traditional = re.fullmatch(r"[A-Za-z]\d+(\.\d+)?", macro) is not None
+    return " ".join([macro, *(str(w) if traditional else f"{w.letter}={w.text}" for w in words)])

@@ -1,0 +1,130 @@
+"""A program that a control's own planner runs best: the planned path as straight moves at the planned feeds, if that is faster.
+
+grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smooth path inside the tolerance can let them go faster,
+with F words that keep the axes within their limits in its bends; how far apart its points should be depends on how they look ahead
+and on the time of a line. Their times are predicted by short models (models.py), for the program as it is and for the planned path
+with chords of several widths (`SHARES` of what is allowed); the fastest is written. LinuxCNC rounds corners itself and has a model and
+candidates of its own (for_linuxcnc.py); benchmarks/results/controls.md says how they did.
+
+Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners of LinuxCNC add up to
+it at most. A plan that uses all of it leaves no room; one with a tenth less does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.base.errors import InputError
+from planner.base.units import MICROMETRE
+from planner.controls.export import for_linuxcnc
+from planner.controls.export.candidates import AS_IT_IS, Candidate, Candidates, standing
+from planner.controls.export.controls import CONTROLS
+from planner.controls.export.header import FIRST_RUN, assumptions
+from planner.controls.export.models import CONTROLS as MODELS
+from planner.controls.export.models import predicted_time
+from planner.planning.job.plan import Plan
+
+SHARES = (
+    1.0,
+    0.5,
+    0.25,
+    0.1,
+)  # of the room for chords: wider ones need fewer lines, narrower ones turn less at each
+NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster than the plan"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exported:
+    """What was written.
+
+    file      : its name
+    sentence  : what it holds
+    predicted : predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path mode of its own
+    assumptions : where coordinates and start are, and how a first run goes
+    notes     : what was left out or written another way, what the control needs, and what would leave the chords more room
+    """
+
+    file: str
+    sentence: str
+    predicted: dict[str, float]
+    assumptions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -> Exported:
+    """Write a program for a control into an existing directory.
+
+    control   : "grbl", "klipper", "marlin" or "linuxcnc"
+    tolerance : of the path [mm], which plan and chords share
+
+    Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises InputError if the motion
+    leaves the program, for a program with the tool centre point on, and with its line for what the control has no words for.
+    """
+    if plan.joints is not None:
+        raise InputError(
+            "a program with the tool centre point on: chords and corners are reckoned in the axes, not at the tip; planned.ngc has its "
+            "planned feeds, and --for linuxcnc-stream and --for pvt play the setpoints of its joints",
+            source=plan.program.source,
+        )
+    job = Candidates(plan, CONTROLS[control], tolerance)
+    linuxcnc = control == for_linuxcnc.NAME
+    found = for_linuxcnc.candidates(job) if linuxcnc else _candidates(job)
+    order = for_linuxcnc.best_first(found) if linuxcnc else sorted(found, key=lambda one: one.time)
+    chosen, data, notes = _first_written(job, order)
+    file = f"{control}.ngc" if linuxcnc else f"{control}.gcode"
+    (directory / file).write_bytes(data)
+    if chosen.replaced is not None and job.why_not:
+        notes = (f"the program as it is is no {control} program: {job.why_not}", *notes)
+    if len(found) > 1 or job.room is None:
+        notes = (*notes, *job.room_notes())
+    return Exported(
+        file=file,
+        sentence=_sentence(chosen),
+        predicted={one.name: one.time for one in found if np.isfinite(one.time)},
+        assumptions=(*assumptions(job.source, as_it_is=chosen.replaced is None), FIRST_RUN),
+        notes=notes,
+    )
+
+
+def _first_written(job: Candidates, order: list[Candidate]) -> tuple[Candidate, bytes, tuple[str, ...]]:
+    """The first candidate for which the control has the words. Raises InputError if there is none."""
+    refused: InputError | None = None
+    for one in order:
+        try:
+            return one, *job.written(one)
+        except InputError as fault:
+            refused = refused or fault
+    assert refused is not None
+    raise refused
+
+
+def _sentence(chosen: Candidate) -> str:
+    if chosen.replaced is None:
+        return f"{chosen.name}, byte for byte" + (f" behind a line G21 {chosen.mode}" if chosen.mode else "")
+    return ", ".join(part for part in (chosen.name, f"{len(chosen.line.feed):,} moves", chosen.mode) if part)
+
+
+def _candidates(job: Candidates) -> list[Candidate]:
+    """For controls that stay on the path."""
+    room = job.room
+    found = []
+    for share in SHARES if room is not None else ():
+        chords = share * (room or 0.0)
+        found += job.chords(chords, f"planned path, chords within {chords / MICROMETRE:.3g} µm")
+    found += job.own(room or job.tolerance)
+    return [one.at(_predicted(job, one)) for one in found]
+
+
+def _predicted(job: Candidates, one: Candidate) -> float:
+    """Time that the control takes for a candidate, dwells included [s]."""
+    plan, line = job.plan, one.line
+    feed = np.where(line.rapid, np.inf, line.feed)
+    if one.name == AS_IT_IS and job.control.rapid_feed:
+        feed = np.where(line.rapid, job.feed_in_force[line.block], feed)
+    moving = predicted_time(
+        line.points, feed, standing(plan, line), plan.machine, plan.toolpath.axes, MODELS[job.control.name]
+    )
+    return moving + float(plan.toolpath.dwell.sum())

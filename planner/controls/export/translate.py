@@ -1,0 +1,239 @@
+"""A program in the words of a control: line by line its own, with chords where a line's moves are replaced.
+
+A line gives up to three things, in the order of RS274NGC: what it says before it moves (switches.py), its move, and a stop after it.
+The move is that of the program, word for word, or a run of straight moves in the same coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.controls.export.chords import DECIMALS, Polyline
+from planner.controls.export.controls import GRBL, Control, takes_move
+from planner.controls.export.output import INCH_DECIMALS
+from planner.controls.export.rows import G4, G10, G53, HOMES, LENGTHS, Row, Source, Word, sets_tools
+from planner.controls.export.switches import Switches
+from planner.machine import Machine
+from planner.nc import codes
+from planner.nc.events import plain
+from planner.nc.program import Kind
+from planner.nc.reading import FANUC, IGNORE
+from planner.nc.settings import AXES
+from planner.nc.writer import FEED_MIN
+
+
+@dataclass(frozen=True, kw_only=True)
+class Translation:
+    """What was written.
+
+    lines : of the file, without its header
+    notes : what was left out, or is written another way, each with its first line
+    """
+
+    lines: list[str]
+    notes: tuple[str, ...]
+
+
+class Translator(Switches):
+    """Writes a program for a control; `translated` once.
+
+    replaced : (R,) rows of the source whose moves are written as those of `line`
+    rapid    : (n,) speed of each move if it is a rapid one [mm/s]
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        control: Control,
+        machine: Machine,
+        replaced: Array,
+        line: Polyline,
+        rapid: FloatArray,
+    ):
+        super().__init__(source, control, machine)
+        self.replaced, self.line, self.rapid = replaced, line, rapid
+        self.move = 0  # of the polyline
+
+    def translated(self) -> Translation:
+        """The whole program. Raises InputError for the first line that the control has no words for."""
+        for row, chords in zip(self.source.rows, self.replaced.tolist(), strict=True):
+            self._row(row, chords=chords)
+        if not self.ended:
+            self._end()
+        notes = tuple(f"line {line}: {text}" for text, line in self.notes.values())
+        return Translation(lines=self.lines, notes=notes)
+
+    def _row(self, row: Row, *, chords: bool) -> None:
+        if row.text:
+            self._command(row)
+            self._pass(row)
+            return
+        for other in row.others:
+            self._other(row, other)
+        if row.feeds and not self.control.extruder:
+            self._no_extruder(row)
+        feed = row.value("F")
+        if feed is not None:
+            self.programmed_feed, self.feed_inch = feed, row.inch_before
+        self.speed = row.value("S") or self.speed
+        self._switches(row)
+        self._modes(row, chords=chords)
+        if G4 in row.g():
+            self._say_dwell(self.source.dwell(row))
+        if chords:
+            self._chords(row)
+        elif row.named or row.moves or _one_shot(row) >= 0 or (row.feeds and self.control.extruder):
+            self._move(row)
+        self._pass(row)
+        self._stops(row)
+
+    def _move(self, row: Row) -> None:
+        """A line of its own that moves, or whose coordinates shift others, word for word."""
+        g = row.g()
+        one_shot = _one_shot(row)
+        if self.control.name == GRBL.name and sets_tools(row):
+            self._refuse(row, "G10 or G43.1 with more than an origin, or a length in Z")
+        if not LENGTHS.isdisjoint(g):
+            return  # the coordinates are those of the tool length
+        if one_shot == G10 and self.program.reading.dialect == FANUC:
+            self._refuse(row, "G10, which other controls read otherwise than Fanuc's")
+        if (
+            one_shot in HOMES
+            and self.control.one_command
+            and (row.named or self.program.origins.at(row.first)[0].any())
+        ):
+            self._refuse(
+                row, f"G{codes.number(one_shot)} with coordinates, or after G92 (this control homes there)"
+            )
+        head, fed = self._head(row, one_shot)
+        if head is None:
+            return
+        letters = self.control.letters
+        used = self._used(row)
+        words = []
+        for word in row.words:
+            if word.letter in "GMFSTN":
+                continue
+            if word.letter in AXES and word.letter not in letters:
+                self._parked(row, word)
+            elif word.letter in used:
+                words.append(word.letter + self._length(word, row))
+        if fed:
+            words += self._feed_words(row)
+        elif row.motion == 0 and self.control.rapid_feed and row.named:
+            limits = self.machine.limits(
+                "velocity", tuple(c.lower() for c in row.named if c.lower() in self.machine.axes)
+            )
+            words += self._feed_of(float(limits.min()) * SECONDS_PER_MINUTE, as_is=False)
+        distance = self._distance(absolute=row.absolute) if row.named or row.moves else []
+        self._say_move(row, distance, [*head, *words])
+        self.motion = self.motion if one_shot < 0 else ""
+
+    def _head(self, row: Row, one_shot: int) -> tuple[list[str] | None, bool]:
+        """The codes of a move, None for what needs no line; and whether it has a feed."""
+        name = f"G{codes.number(one_shot)}" if one_shot >= 0 else ""
+        if one_shot >= 0 and one_shot not in self.control.g:
+            self._refuse(row, name)
+        if one_shot >= 0 and one_shot != G53:
+            return [name], False
+        if row.motion < 0:
+            self._refuse(row, "coordinates without a motion code")
+        code = f"G{codes.number(row.motion)}"
+        if not takes_move(row, self.control, self.program.reading):
+            if row.motion in codes.SPLINES and not row.moves:
+                return None, False  # a further line of a spline that is written as straight moves
+            what = code if not row.radius else f"{code} under cutter radius compensation"
+            self._refuse(row, f"{what} (it cannot be written as straight moves here: {self._why_kept(row)})")
+        said = [name] if name else []
+        if code != self.motion or self.control.one_command or name or row.motion > 30:
+            said.append(code)
+        self.motion = code
+        return said, row.motion != 0 or row.feeds
+
+    def _why_kept(self, row: Row) -> str:
+        if not row.per_minute:
+            return "its feed is not per minute"
+        away = [c for c in "XYZ" if c not in row.placed]
+        return (
+            f"the program does not say where {' and '.join(away)} are before it"
+            if away
+            else "it is no plain move"
+        )
+
+    def _used(self, row: Row) -> set[str]:
+        """Letters of a row that belong to its move: not those of its modes."""
+        modal = {
+            letter
+            for code in row.g()
+            if codes.G_GROUP[code] not in ("motion", "one-shot")
+            for letter in codes.WORDS.get(("G", code), "")
+        }
+        shot = set(codes.WORDS["G", G10]) if G10 in row.g() else set()
+        motion = set(codes.WORDS.get(("G", row.motion), "")) if row.motion >= 0 else set()
+        if row.motion in codes.ARCS:  # many programs write K0 in G17, which is an error on LinuxCNC
+            motion -= {"IJK"["XYZ".index(axis)] for axis in "XYZ" if axis not in row.plane}
+        return (
+            (set(AXES + "E" * (row.feeds and self.control.extruder)) | shot | motion)
+            - (modal - motion - shot)
+            - ({"P"} if G4 in row.g() else set())
+        )
+
+    def _no_extruder(self, row: Row) -> None:
+        """E on a control without an extruder: left out if the user says so."""
+        word = row.value("E")
+        if self.program.reading.extruder != IGNORE:
+            self._refuse(row, f"{word}: an extruder")
+        self._note("E", f"{word} is left out, as --extruder ignore says", row)
+
+    def _parked(self, row: Row, word: Word) -> None:
+        """An axis that the control does not have: its words may go where it stands still."""
+        axes = self.program.axes
+        letter = word.letter.lower()
+        if letter in axes:
+            self._refuse(row, f"{word}: axis {word.letter}")
+        if word.letter in self.program.reading.ignore:
+            self._refuse(row, f"{word}, which --ignore leaves out of the plan alone")
+        self._note(word.letter, f"{word} is left out: axis {word.letter} stands still", row)
+
+    def _chords(self, row: Row) -> None:
+        """The straight moves of the polyline up to the end of the row's blocks, and its dwells."""
+        line = self.line
+        unit = MM_PER_INCH if self.inch else 1.0
+        decimals = INCH_DECIMALS if self.inch else DECIMALS
+        offset = self.program.origins.at(row.first)[0]
+        rests = [k for k in range(row.first, row.last) if self.program.kind[k] == Kind.DWELL]
+        stop = int(np.searchsorted(line.block, row.last))
+        while self.move < stop or rests:
+            k = self.move
+            if rests and (k >= stop or line.block[k] > rests[0]):
+                self._say_dwell(float(self.program.dwell[rests.pop(0)]))
+                continue
+            end, start = line.points[k + 1], line.points[k]
+            words = [
+                f"{letter}{plain(round(float((end[a] - offset[a]) / unit), decimals) + 0.0)}"
+                for a, letter in enumerate("XYZ")
+                if end[a] != start[a]
+            ]
+            self.move += 1
+            if not words:
+                continue
+            code = "G0" if line.rapid[k] else "G1"
+            head = [code] if code != self.motion or self.control.one_command else []
+            self.motion = code
+            if not line.rapid[k] or self.control.rapid_feed:
+                speed = float(self.rapid[k] if line.rapid[k] else line.feed[k])
+                words += self._feed_of(max(speed, FEED_MIN) * SECONDS_PER_MINUTE / unit, as_is=False)
+            self._say_move(row, self._distance(absolute=True), [*head, *words])
+
+    def _pass(self, row: Row) -> None:
+        """Leave the moves of the polyline that the row's own words have made."""
+        self.move = max(self.move, int(np.searchsorted(self.line.block, row.last)))
+
+
+def _one_shot(row: Row) -> int:
+    """The code of G10, G28, G53, G92 and the like on a row; -1 without one."""
+    return next((code for code in row.g() if codes.G_GROUP[code] == "one-shot" and code != G4), -1)

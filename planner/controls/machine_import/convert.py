@@ -1,0 +1,220 @@
+"""From a control's settings to the text of a machine file: every number with its place, and what is assumed said aloud.
+
+Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion without it would step in
+acceleration at every switch. It is assumed from the time in which a drive builds up its acceleration,
+
+    jerk = acceleration / ramp time
+
+`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the frame rings: a
+ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
+
+Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in machines for such controls.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from planner.base.errors import InputError
+from planner.base.names import known_name
+from planner.controls.machine_import import grbl, klipper, linuxcnc, marlin
+from planner.controls.machine_import.ini_file import read_settings
+from planner.controls.machine_import.settings import ControlSettings, Sourced
+from planner.machine import ALL_AXES, Machine, machine_from_dict
+
+RAMP_TIME = 0.04  # [s]
+TOLERANCE = {
+    "LinuxCNC": 0.02,
+    "grbl": 0.05,
+    "Klipper": 0.05,
+    "Marlin": 0.05,
+    "RepRapFirmware": 0.05,
+}  # [mm], as of the built-in mill and router
+DT = 0.001  # [s], where the control does not say: setpoints of offline plans
+
+# In the order in which a text is tried: Klipper's and LinuxCNC's sections are told apart by their names.
+CONTROLS: dict[str, tuple[Callable[[str], bool], Callable[[str, str], ControlSettings]]] = {
+    "linuxcnc": (linuxcnc.recognised, linuxcnc.settings),
+    "klipper": (klipper.recognised, klipper.settings),
+    "marlin": (marlin.recognised, marlin.settings),
+    "grbl": (grbl.recognised, grbl.settings),
+}
+
+
+@dataclass(frozen=True)
+class Imported:
+    """text : of the machine file; machine : what it holds; assumed : what the settings do not say, one sentence each"""
+
+    text: str
+    machine: Machine
+    assumed: tuple[str, ...]
+
+
+def import_machine(
+    path: str | Path,
+    *,
+    control: str | None = None,
+    ramp_time: float = RAMP_TIME,
+    tolerance: float | None = None,
+    given: Mapping[str, float] | None = None,
+) -> Imported:
+    """A machine file from the settings of a control.
+
+    path      : LinuxCNC's INI file, what `$$` of grbl or M503 of Marlin printed, or Klipper's printer.cfg
+    control   : whose settings it is: "linuxcnc", "grbl", "klipper" or "marlin"; None to recognise it
+    ramp_time : in which an axis builds up its acceleration [s], for jerks that the control does not know
+    tolerance : contour tolerance [mm]; None for that of the settings
+    given     : limits that the settings lack or that replace theirs, such as {"z.jerk": 1e4}, in mm (deg) and s
+
+    Raises InputError for files that hold no settings of these controls, for limits that are missing, and for names of `given` that
+    are none.
+    """
+    text, source = read_settings(Path(path)), str(path)
+    found = _settings_of(text, source, control)
+    lathe = _without_y(found)
+    axes, assumed = _axes(lathe or found, ramp_time, given or {}, source)
+    if lathe is not None:
+        assumed.append(
+            "y: the machine has none; its limits are those of x, and a program that moves y is not refused"
+        )
+    eps = found.tolerance or Sourced(TOLERANCE[found.control], "assumed")
+    if tolerance is not None:
+        eps = Sourced(tolerance, "given")
+    dt = found.dt or Sourced(DT, "assumed")
+    if eps.place == "assumed":
+        assumed.append(f"tolerance {eps.value:g} mm: the settings have none; --tolerance gives another")
+    if dt.place == "assumed":
+        assumed.append(f"interpolation period {dt.value * 1e3:g} ms: the settings do not say it")
+    written = _text(lathe or found, Path(path), axes, eps, dt, [*found.notes, *assumed])
+    machine = machine_from_dict(tomllib.loads(written), source=source)
+    return Imported(written, machine, (*found.notes, *assumed))
+
+
+def _settings_of(text: str, source: str, control: str | None) -> ControlSettings:
+    if control is not None:
+        known_name("control", control, CONTROLS)
+    for name, (recognised, settings) in CONTROLS.items():
+        if control == name or (control is None and recognised(text)):
+            return settings(text, source)
+    raise InputError(
+        "no settings found of LinuxCNC (an INI file), grbl (what $$ prints), Klipper (printer.cfg), Marlin (what M503 prints) "
+        "or RepRapFirmware (config.g)",
+        source=source,
+    )
+
+
+def _without_y(found: ControlSettings) -> ControlSettings | None:
+    """The settings of a lathe, which says nothing of y, with those of x for y; None for other machines."""
+    limits = (found.velocity, found.acceleration)
+    if not all("z" in limit and "x" in limit and "y" not in limit for limit in limits):
+        return None
+    of_x = [{**limit, "y": Sourced(limit["x"].value, "x's: the machine has no y")} for limit in limits]
+    return dataclasses.replace(found, velocity=of_x[0], acceleration=of_x[1])
+
+
+def _axes(
+    found: ControlSettings, ramp_time: float, given: Mapping[str, float], source: str
+) -> tuple[dict[str, dict[str, Sourced]], list[str]]:
+    """Limits by axis and quantity, and what of them is assumed. Raises InputError for what is missing."""
+    if not 0.0 < ramp_time < float("inf"):
+        raise InputError(f"the ramp time must be above 0 s, found {ramp_time:g}")
+    letters = ALL_AXES
+    limits = {
+        "velocity": dict(found.velocity),
+        "acceleration": dict(found.acceleration),
+        "jerk": dict(found.jerk),
+    }
+    for name, value in given.items():
+        letter, _, quantity = name.partition(".")
+        if letter not in letters or quantity not in limits:
+            raise InputError(f"'{name}' is no limit of an axis; write e.g. x.acceleration=500")
+        limits[quantity][letter] = Sourced(value, "given")
+    axes: dict[str, dict[str, Sourced]] = {}
+    missing, no_jerk = [], []
+    for letter in letters:
+        velocity, acceleration = limits["velocity"].get(letter), limits["acceleration"].get(letter)
+        if velocity is None and acceleration is None and letter not in "xy":
+            continue
+        missing += [
+            f"{letter}.{quantity}"
+            for quantity in ("velocity", "acceleration")
+            if letter not in limits[quantity]
+        ]
+        if velocity is None or acceleration is None:
+            continue
+        jerk = limits["jerk"].get(letter)
+        if jerk is None:
+            no_jerk.append(letter)
+            jerk = Sourced(acceleration.value / ramp_time, "assumed")
+        axes[letter] = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    if missing:
+        raise InputError(
+            f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s, e.g. --set {missing[0]}=500",
+            source=source,
+        )
+    if not no_jerk:
+        return axes, []
+    said = f"jerk of {', '.join(no_jerk)}: acceleration / {ramp_time * 1e3:g} ms"
+    return axes, [f"{said}: the settings have none; --ramp-time or --set x.jerk=... give another"]
+
+
+def _text(
+    found: ControlSettings,
+    path: Path,
+    axes: Mapping[str, Mapping[str, Sourced]],
+    tolerance: Sourced,
+    dt: Sourced,
+    said: Sequence[str],
+) -> str:
+    """The text of the machine file."""
+    name = "".join(c if c not in '"\\' else "-" for c in path.stem) or "machine"
+    lines = [f"# From the settings of {found.control}. Lengths in mm, rotary axes in degrees, times in s."]
+    lines += [f"# Note: {sentence}." for sentence in said]
+    lines += ["", f'name = "{name}"', _line("dt", dt), _line("tolerance", tolerance)]
+    lines.append(f'path_control = "{found.path_control or "blend"}"')
+    if found.feed_max:
+        lines.append(_line("feed_max", found.feed_max))
+    for letter, limits in axes.items():
+        lines += ["", f"[axes.{letter}]", *(_line(quantity, limit) for quantity, limit in limits.items())]
+        lines += ["wrapped = true  # WRAPPED_ROTARY"] * (letter in found.wrapped)
+    lines += _tables(found)
+    for mode in found.modes:
+        lines += [
+            "",
+            "[[modes]]",
+            f"frequency = {mode.frequency!r}  # {mode.place}",
+            f"damping = {mode.damping!r}",
+        ]
+    return "\n".join(_printable(line) for line in lines) + "\n"
+
+
+def _tables(found: ControlSettings) -> list[str]:
+    """The tables that say how the control reads programs, what its planner does, and how it carries the tool."""
+    lines: list[str] = []
+    if found.inch or found.lathe:
+        lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
+        lines += ["lathe = false  # X is a radius until G7"] * found.lathe
+    lines += ["", "[control]", f'name = "{found.control.lower()}"']
+    lines += [_line(key, value) for key, value in found.law.items() if value is not None]
+    if found.corner_jump:
+        lines += ["", "[control.corner_jump]", *(_line(*jump) for jump in found.corner_jump.items())]
+    if found.kinematics:
+        lines += ["", "[kinematics]"]
+        lines += [
+            f'{key} = "{value}"' if isinstance(value, str) else _line(key, value)
+            for key, value in found.kinematics.items()
+        ]
+    return lines
+
+
+def _printable(text: str) -> str:
+    """The text without what TOML does not take in names and comments: settings may have any character in a value that is quoted."""
+    return "".join(c if c.isprintable() else "-" for c in text)
+
+
+def _line(key: str, found: Sourced) -> str:
+    return f"{key} = {float(f'{found.value:.12g}')!r}  # {found.place}"

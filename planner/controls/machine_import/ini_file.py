@@ -1,0 +1,256 @@
+"""Settings in tables, `[NAME]`, then `key = value` or `key: value`: LinuxCNC's INI files and Klipper's printer.cfg.
+
+Both take a file that is included at the place where it is named. For the rest they differ in what counts, and each is read as its
+control reads it (LinuxCNC 2.9: src/libnml/inifile/inifile.cc and scripts/linuxcnc; Klipper: klippy/configfile.py):
+
+    LinuxCNC   the first table of a name and in it the first of equal keys; upper and lower case differ; a comment is a line of its own;
+               a backslash at its end goes on with the next line; a file that is not there is left out
+    Klipper    the last of equal keys, whichever table of that name it is in; `key = ` begins at a line's start, and an indented line
+               belongs to the value above it; "#" begins a comment anywhere, ";" after a blank; a file that is not there is an error.
+               What SAVE_CONFIG wrote ("#*#" at the end of the first file) counts where the rest says nothing
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from planner.base.errors import InputError
+from planner.base.files import require_ending
+from planner.controls.machine_import.numbers import finite_number, leading_number, positive
+from planner.controls.machine_import.settings import Sourced
+
+INCLUDES_MAX = 100  # files that one file may include, with those that they include
+
+_LINUXCNC_INCLUDE = re.compile(r"^\s*#INCLUDE(?:\s+(.*?))?\s*$")
+_KLIPPER_INCLUDE = re.compile(r"^\[include (.+)\]")
+_TABLE = re.compile(r"^\[(.+)\]")
+_SETTING = re.compile(r"^([^=:]+?)\s*[=:]\s*(.*)$")
+_READ = re.compile(
+    r"(?:TRAJ|KINS|HAL|EMCMOT|DISPLAY|RS274NGC|AXIS_\w|JOINT_\d+)$"
+)  # tables of LinuxCNC that are read
+_SAVED = re.compile(
+    r"\n#\*# <-+ SAVE_CONFIG -+>\n#\*# DO NOT EDIT THIS BLOCK OR BELOW\. The contents are auto-generated\.\n#\*#\n"
+)
+_SAVED_LINE = "#*#"
+
+
+@dataclass(frozen=True)
+class IniSetting:
+    """The text of one setting and its place."""
+
+    text: str
+    source: str
+    line: int
+
+
+class _Line(NamedTuple):
+    """A line of a file; `after_include` where a file was included before it."""
+
+    text: str
+    source: str
+    number: int
+    after_include: bool = False
+
+
+class IniFile:
+    """Settings by table and key.
+
+    begins : whether a number is what a text begins with ("3 mm", as C's scanf reads it), not all of it
+    names  : of the tables
+    notes  : what was left out, one sentence each
+    """
+
+    def __init__(self, *, begins: bool = False) -> None:
+        self._begins = begins
+        self._settings: dict[tuple[str, str], list[IniSetting]] = {}
+        self.names: list[str] = []
+        self.notes: list[str] = []
+
+    def add(self, table: str, key: str, setting: IniSetting) -> None:
+        """Take in a setting behind those of the same key that are there."""
+        self._settings.setdefault((table, key), []).append(setting)
+
+    def counts_last(self) -> None:
+        """Keep only the last of equal keys."""
+        self._settings = {key: found[-1:] for key, found in self._settings.items()}
+
+    def take_missing(self, other: IniFile) -> None:
+        """Take in what another one has and this one has not."""
+        for key, found in other._settings.items():
+            self._settings.setdefault(key, found)
+        self.names += [name for name in other.names if name not in self.names]
+
+    def text(self, table: str, key: str) -> str | None:
+        """The text of a setting, the first of equal keys; None where it is not set."""
+        found = self._settings.get((table, key))
+        return found[0].text if found else None
+
+    def texts(self, table: str, key: str) -> list[str]:
+        """The texts of all equal keys."""
+        return [found.text for found in self._settings.get((table, key), [])]
+
+    def number(self, table: str, key: str) -> Sourced | None:
+        """A setting's number; None where it is not set. Raises InputError if it is none."""
+        return self._read(finite_number, table, key)
+
+    def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
+        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above 0."""
+        found = self._read(positive, table, key)
+        return found and Sourced(found.value * scale, found.place)
+
+    def _read(
+        self, reads: Callable[[str, str, str, int | None], float], table: str, key: str
+    ) -> Sourced | None:
+        found = self._settings.get((table, key))
+        if found is None or not found[0].text:
+            return None
+        place, text = f"[{table}] {key}", found[0].text
+        begun = leading_number(text) if self._begins else None
+        return Sourced(
+            reads(text if begun is None else repr(begun), place, found[0].source, found[0].line), place
+        )
+
+
+def read_linuxcnc_ini(text: str, source: str) -> IniFile:
+    """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each other."""
+    ini = IniFile(begins=True)
+    table: str | None = None
+    pending = ""
+    for line in _expanded(text, source, _LINUXCNC_INCLUDE, ini.notes):
+        whole = pending + line.text.rstrip("\r")
+        if whole.endswith("\\"):
+            pending = whole[:-1]
+            continue
+        pending, found = "", whole.strip()
+        header = _TABLE.match(found)
+        if header:
+            name = header.group(1)
+            if name in ini.names and _READ.match(name):
+                ini.notes.append(f"the second [{name}] is left out, as in LinuxCNC: the first counts")
+            table = None if name in ini.names else name
+            ini.names.append(name)
+        elif table is not None and found[:1] not in ("", "#", ";", "[") and "=" in found:
+            key, _, value = found.partition("=")
+            ini.add(table, key.strip(), IniSetting(value.strip(), line.source, line.number))
+    return ini
+
+
+def read_klipper_config(text: str, source: str) -> IniFile:
+    """The settings of a printer.cfg, as Klipper reads it.
+
+    Raises InputError for a setting outside of a table, for files that include each other and for those that are not there.
+    """
+    text = text.replace("\r\n", "\n")
+    mark = _SAVED.search(text)
+    own, saved = (text[: mark.start()], text[mark.end() :].strip()) if mark else (text, "")
+    lines = saved.split("\n") if saved else []
+    if any(not line.startswith(_SAVED_LINE) or line[3:4] not in ("", " ") for line in lines):
+        own, lines = text, []  # changed by hand: Klipper leaves it out
+    if f"\n{_SAVED_LINE} " in own:
+        own, lines = text, []
+    config = _klipper_tables(own, source)
+    if lines:
+        config.take_missing(_klipper_tables("\n".join(line[4:] for line in lines), source))
+    elif f"\n{_SAVED_LINE} [" in text:
+        config.notes.append("the block of SAVE_CONFIG was changed by hand and is left out, as Klipper does")
+    return config
+
+
+def _klipper_tables(text: str, source: str) -> IniFile:
+    """The settings of a text, the last of equal ones."""
+    config = IniFile()
+    table = key = ""
+    indent = 0
+    for line in _expanded(text, source, _KLIPPER_INCLUDE, None):
+        if line.after_include:
+            table = key = ""
+        bare = re.split(r"(?:^|\s);", line.text.partition("#")[0], maxsplit=1)[0].rstrip()
+        found = bare.strip()
+        depth = len(bare) - len(bare.lstrip())
+        if not found or (key and depth > indent):
+            continue  # what goes on belongs to macros
+        header, setting = _TABLE.match(found), _SETTING.match(found)
+        if header:
+            table, key = header.group(1), ""
+            config.names.append(table)
+        elif not table:
+            raise InputError(
+                f"'{found[:40]}' is in no table: Klipper begins anew after an [include ...]; write its table above it again",
+                source=line.source,
+                line=line.number,
+            )
+        elif setting:
+            key, indent = setting.group(1).lower(), depth
+            config.add(table, key, IniSetting(setting.group(2), line.source, line.number))
+    config.counts_last()
+    return config
+
+
+def _expanded(
+    text: str,
+    source: str,
+    include: re.Pattern[str],
+    left_out: list[str] | None,
+    included: list[str] | None = None,
+) -> Iterator[_Line]:
+    """The lines of a text, with those of the files that it includes in their places.
+
+    include  : of lines that include a file; its first group is a name or, for Klipper, a pattern
+    left_out : takes a note on every file that is not there; None to refuse them
+    included : the files so far
+    """
+    included = [] if included is None else included
+    after = False
+    for number, line in enumerate(text.split("\n"), start=1):
+        found = include.match(line)
+        if not found:
+            yield _Line(line, source, number, after)
+            after = False
+            continue
+        after, name = True, found.group(1) or ""
+        for path in _files(name, source):
+            included.append(str(path))
+            if len(included) > INCLUDES_MAX:
+                raise InputError(
+                    f"more than {INCLUDES_MAX} files are included; is it a circle?",
+                    source=source,
+                    line=number,
+                )
+            try:
+                part = read_settings(path, f"included in {source}, line {number}: ")
+            except InputError:
+                if left_out is None:
+                    raise
+                left_out.append(
+                    f"line {number}: the file '{name}' cannot be read and is left out, as in LinuxCNC"
+                )
+                continue
+            yield from _expanded(part, str(path), include, left_out, included)
+
+
+def _files(name: str, source: str) -> list[Path]:
+    """The files that a line includes, looked for beside the file that names them."""
+    folder, path = Path(source).parent, Path(name.strip()).expanduser()
+    if any(c in name for c in "*?["):
+        return (
+            sorted(folder.glob(name.strip()))
+            if not path.is_absolute()
+            else sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+        )
+    return [folder / path]
+
+
+def read_settings(path: Path, said: str = "") -> str:
+    """The text of a file of settings. Raises InputError if there is none."""
+    try:
+        require_ending(path)
+        return path.read_text(encoding="utf-8", errors="replace")
+    except (OSError, ValueError) as fault:
+        if isinstance(fault, InputError):
+            raise
+        reason = fault.strerror if isinstance(fault, OSError) else fault
+        raise InputError(f"{said}the file cannot be read: {reason}", source=str(path)) from fault

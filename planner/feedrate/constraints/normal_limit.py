@@ -1,0 +1,36 @@
+"""The limit of the normal acceleration: kappa feed^2 <= A, in a path's corners and along its curves (paper 002, eq. (19)).
+
+A is the machine's (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes give in the direction n
+of the path's normal, and what the error budget leaves of it (corners/budget.py). Between grid points a motion may exceed it by as
+little as any limit; motion/limits_used.py says where. The judge has code of its own for it (verifier/limits.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from planner.base.arrays import FloatArray
+from planner.feedrate.constraints.limit import Cap, Limit, over
+from planner.machine import Machine
+
+if TYPE_CHECKING:
+    from planner.feedrate.constraints.on_grid import Side
+
+NAME = "normal_acceleration"
+ORDER = 2  # slower by lam, it is less by lam^2
+
+
+def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
+    """(P,) limit / kappa, inf on straights [mm2/s2]."""
+    return over(limit, kappa)
+
+
+class NormalAcceleration(Limit):
+    """kappa x <= A, on machines that name A."""
+
+    name, unit, order = NAME, "mm/s2", ORDER
+
+    def on_side(self, side: Side, machine: Machine) -> Iterator[Cap]:
+        if machine.normal_acceleration is not None:
+            yield Cap(self.name, feed_sq_within(side.kappa, machine.normal_acceleration))

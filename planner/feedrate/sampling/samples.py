@@ -1,0 +1,249 @@
+"""The smooth path sampled along its arc length, on a grid that adapts until linear interpolation is good enough.
+
+A second-order solver sees the axis acceleration g(s) = r'(s) u + r''(s) x(s) only at grid points; in an interval u is constant
+and x = feed^2 linear. Between the points g leaves the chord of its end values by at most (midpoint values, one interval of
+length h, fastest x and largest u that the limits allow there)
+
+    e_k = x |r''_mid - (r''_0 + r''_1)/2|  +  u h |r''_1 - r''_0|/2  +  u |r'_mid - (r'_0 + r'_1)/2|        per axis k
+
+(the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k is below
+`RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to its limit, may be `JERK_SHARE`
+times as large, and x is bounded by the jerk limits as well. What remains is kept per interval as `margin`, and the constraints are
+tightened by it, so that they hold between
+grid points and not only at them. Straight elements need one interval: there g is exactly linear.
+
+PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
+is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other
+end gets a slightly larger *effective* curvature, such that the line meets X/kappa_mid in the middle:
+
+    1/kappa_low = min(1/kappa_low, 2/kappa_mid - 1/kappa_high);     both ends kappa_mid where that is the largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
+from planner.corners.budget import largest_normal
+from planner.corners.elements import element_table
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.sampling.calm import Calm, calm, quiet_way
+from planner.feedrate.sampling.grid import Intervals, divide, evaluate, grade
+from planner.feedrate.sampling.own_rows import own_rows
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.rows import Joints, Longest, PathLimits, cut_path
+from planner.geometry.toolpath import Joint
+from planner.machine import Machine
+
+# Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
+# above that of an infinitely fine grid on the shared jobs (tests/feedrate/sampling): first order in the step, because u is constant
+# on it.
+RESOLUTION = 2e-3
+# Jobs with more corners than the first number get the second resolution instead, or their grids would fill the memory (a relief of
+# 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the cycle time.
+MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
+# For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis needs for its
+# acceleration [-], where feedrate/sampling/calm.py does not say that it may last longer.
+ARC_PERIOD = 0.5
+# ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
+REST_PERIOD = 0.25
+# A spline passes a change of the feed within so many tolerances of where the program has it [-].
+NEAR = 2.0
+# Rounds of halving intervals for limits of one's own, down to a um: from 10^9 km at most.
+HALVINGS_OF_OWN = 60
+
+
+def sample_path(
+    path: SmoothPath, machine: Machine, resolution: float | None = None, *, third_order: bool = False
+) -> PathSamples:
+    """Sample a smooth path on an adaptive grid.
+
+    resolution  : interpolation error allowed between grid points [share of the acceleration limits]; None for `RESOLUTION`, or
+                  `COARSE_RESOLUTION` where there are many corners
+    third_order : the grid is for a solver with jerk limits
+
+    Raises InputError if the machine lacks an axis of the path.
+    """
+    axes = path.toolpath.axes
+    if resolution is None:
+        resolution = RESOLUTION if np.count_nonzero(path.d) <= MANY_CORNERS else COARSE_RESOLUTION
+    table = element_table(path)
+    velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
+    jerk, longest, shortest = np.full(len(axes), np.inf), np.inf, np.inf
+    if third_order:
+        jerk = machine.limits("jerk", axes)
+        delay = float((acceleration / jerk).min())
+        longest = ARC_PERIOD * delay
+        shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
+    acceleration = np.minimum(acceleration, largest_normal(machine))
+    where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
+    if third_order:
+        where_calm = calm(path, table, (velocity, acceleration, jerk))
+    limits = PathLimits(path.toolpath.feed, velocity, acceleration, jerk)
+    quiet = quiet_way(path.toolpath.feed, acceleration, jerk)
+    rows = cut_path(table, _joints(path), limits, Longest(longest, *where_calm, quiet))
+    rows = divide(table, rows, limits, resolution, shortest)
+    if third_order:
+        rows = grade(table.legs, rows)
+    grid = Intervals(*(rows[name].copy() for name in ("curve", "w0", "w1", "segment", "last")))
+    samples = PathSamples(
+        path=path,
+        table=table,
+        piece=np.concatenate([[0], np.flatnonzero(grid.last) + 1]),
+        stop=np.flatnonzero(path.joint == Joint.STOP),
+        element=grid.element,
+        w0=grid.w0,
+        w1=grid.w1,
+        segment=grid.segment,
+        **evaluate(table, grid, limits)._asdict(),
+    )
+    if machine.own:
+        for _ in range(HALVINGS_OF_OWN):
+            coarse = own_rows(samples, machine, resolution).coarse
+            if not coarse.any():
+                break
+            samples = _halved(samples, np.flatnonzero(coarse), limits)
+    return samples
+
+
+def _halved(samples: PathSamples, interval: Array, limits: PathLimits) -> PathSamples:
+    """The grid with the intervals (n,) halved in their parameter; the limits matter to the margin."""
+    after = interval + 1
+    middle = 0.5 * (samples.w0[interval] + samples.w1[interval])
+
+    def put(values: Array, new: Array) -> Array:
+        return np.insert(values, after, new, axis=0)
+
+    w1 = samples.w1.copy()
+    w1[interval] = middle
+    w0, w1 = put(samples.w0, middle), put(w1, samples.w1[interval])
+    element, segment = (put(column, column[interval]) for column in (samples.element, samples.segment))
+    piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
+    last = np.zeros(len(w0), dtype=bool)
+    last[piece[1:] - 1] = True
+    grid = Intervals(element, w0, w1, segment, last)
+    return replace(
+        samples,
+        path=samples.path,
+        table=samples.table,
+        piece=piece,
+        element=element,
+        w0=w0,
+        w1=w1,
+        segment=segment,
+        **evaluate(samples.table, grid, limits)._asdict(),
+    )
+
+
+def _joints(path: SmoothPath) -> Joints:
+    """The kernels' view of what the path does between its legs."""
+    return Joints(
+        first=path.legs.first,
+        place=path.legs.place,
+        passed=path.passed,
+        d_in=path.d_in,
+        d_out=path.d_out,
+        blended=path.d > 0.0,
+        is_stop=path.joint == Joint.STOP,
+        breaks=_corner_breaks(path),
+        run=path.run,
+        run_first=path.spline.first,
+    )
+
+
+def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
+    """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the free part of each leg
+    is scaled from its first and last block's ends, and the margins stay as they are."""
+    legs, element, segment = path.legs, samples.element, samples.segment
+    free = element >= 0
+    leg = np.maximum(element, 0)
+    begin = legs.offset[segment]
+    closes = segment + 1 == legs.first[leg + 1]  # the last block of its leg
+    end = np.where(closes, legs.length[leg], legs.offset[np.minimum(segment + 1, len(legs.offset) - 1)])
+
+    def span(on: SmoothPath) -> tuple[FloatArray, FloatArray]:
+        return np.maximum(begin, on.d_out[leg]), np.minimum(end, legs.length[leg] - on.d_in[leg + 1])
+
+    (a, b), (a_new, b_new) = span(samples.path), span(path)
+    rate = np.divide(b_new - a_new, b - a, out=np.ones(len(a)), where=free & (b > a))
+    w0, w1 = (np.where(free, a_new + (w - a) * rate, w) for w in (samples.w0, samples.w1))
+    last = np.zeros(len(samples), dtype=bool)
+    last[samples.piece[1:] - 1] = True
+    table = element_table(path)
+    axes = np.full(samples.d1.shape[1], np.inf)  # for the margins, which are not asked for
+    limits = PathLimits(path.toolpath.feed, axes, axes, axes)
+    grid = Intervals(
+        element.copy(), w0, w1, segment.copy(), last
+    )  # read-only arrays would compile a second kernel
+    columns = evaluate(table, grid, limits)._replace(margin=samples.margin)
+    return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns._asdict())
+
+
+def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
+    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
+
+    Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
+    """
+    table = samples.table
+    element = samples.element[interval]
+    if not straight(table.legs, element).all():
+        raise ValueError("insert_points: only straight intervals can be split")
+    after = interval + 1
+    ds = s - samples.s[interval]
+    w = samples.w0[interval] + ds
+
+    def put(values: Array, new: Array | float) -> Array:
+        return np.insert(values, after, new, axis=0)
+
+    w0 = put(samples.w0, w)
+    w1 = put(samples.w1, samples.w1[interval])
+    place = interval + 1 + np.arange(len(interval))  # where the new points are now
+    w1[place - 1] = w
+    zero = np.zeros((len(interval), samples.d1.shape[1]))
+    return PathSamples(
+        path=samples.path,
+        table=table,
+        piece=samples.piece + np.searchsorted(interval, samples.piece, side="left"),
+        stop=samples.stop,
+        s=put(samples.s, s),
+        position=put(samples.position, samples.position[interval] + ds[:, None] * samples.d1[interval]),
+        d1=put(samples.d1, samples.d1[interval]),
+        d2_left=put(samples.d2_left, zero),
+        d2_right=put(samples.d2_right, zero),
+        d3_left=put(samples.d3_left, zero),
+        d3_right=put(samples.d3_right, zero),
+        element=put(samples.element, element),
+        w0=w0,
+        w1=w1,
+        segment=put(samples.segment, samples.segment[interval]),
+        margin=put(samples.margin, samples.margin[interval]),
+        kappa_left=put(samples.kappa_left, 0.0),
+        kappa_right=put(samples.kappa_right, 0.0),
+    )
+
+
+def straight(legs: Array, element: Array) -> Array:
+    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of geometry/legs.py."""
+    leg = (element >= 0) & (element < len(legs))
+    return leg & ~legs["round"][np.where(leg, element, 0)]
+
+
+def _corner_breaks(path: SmoothPath) -> FloatArray:
+    """(R+1, B) parameters where each corner starts with a grid point, ascending, padded with 1.
+
+    Quarters besides the shape's own breaks, so that no symmetric half is mistaken for a straight line.
+    """
+    always = (0.25, 0.5, 0.75)
+    blended = np.flatnonzero(path.d > 0)
+    width = 3 if not len(blended) else max(len(path.corner.breaks(path.params[blended[0]])), 1) + 8
+    out = np.ones((len(path.d), width))
+    if path.corner.shape == 0:
+        out[:, :3] = always
+        return out
+    for k in blended:
+        points = sorted(set(path.corner.breaks(path.params[k])) | set(always))
+        out[k, : len(points)] = points
+    return out

@@ -1,0 +1,231 @@
+"""Whether steps keep everything exactly: their limits at every time, and the tolerance by the control points of their cubics.
+
+Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed has degree 4: it is
+looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is
+looked at in the same places. For the tolerance see nlp.py: control points within the budget of those of the leg's own cubic, along
+places that never go back. On arcs a step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.joint.legs import LegFormulas, along_tangent, formula_point, nearest_point
+from planner.joint.run import TubeRun
+
+PLACES = 33  # where a step is looked at first [-]
+NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
+AWAY = 1e-12  # rounding of (p - V).v, in tolerances and largest speeds [-]
+# Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
+PIECES = 4
+
+
+class Keeps(NamedTuple):
+    """What steps on R legs with A axes have to keep."""
+
+    legs: LegFormulas
+    velocity: FloatArray  # (A,)
+    acceleration: FloatArray  # (A,)
+    jerk: FloatArray  # (A,)
+    feed: FloatArray  # (R,)
+    normal: FloatArray  # (R,)
+    budget: FloatArray  # (R,)
+    curvature: FloatArray  # (R,)
+    vertex_budget: FloatArray  # (R+1,)
+
+
+@njit(cache=True, error_model="numpy")
+def _at(v, a, j, t):
+    """Squared speed, v.a, and the squared normal acceleration times the squared speed, at time t in a step."""
+    square, along, push = 0.0, 0.0, 0.0
+    for k in range(len(v)):
+        w, b = v[k] + t * (a[k] + 0.5 * t * j[k]), a[k] + t * j[k]
+        square, along, push = square + w * w, along + w * b, push + b * b
+    return square, along, push * square - along * along
+
+
+@njit(cache=True, error_model="numpy")
+def _of_limits(keeps, r, h, v, a, j):
+    """The largest share of a limit in a step on leg r."""
+    worst, axes = 0.0, len(v)
+    for k in range(axes):
+        worst = max(worst, abs(j[k]) / keeps.jerk[k])
+        worst = max(worst, max(abs(a[k]), abs(a[k] + h * j[k])) / keeps.acceleration[k])
+        turn = -a[k] / j[k] if j[k] != 0.0 else 0.0
+        turn = turn if 0.0 < turn < h else 0.0
+        fastest = max(abs(v[k]), abs(v[k] + h * (a[k] + 0.5 * h * j[k])), abs(v[k] + 0.5 * turn * a[k]))
+        worst = max(worst, fastest / keeps.velocity[k])
+    best, at = 0.0, 0.0
+    for n in range(PLACES):
+        t = h * n / (PLACES - 1)
+        square, _, across = _at(v, a, j, t)
+        if square > best:
+            best, at = square, t
+        if square > 0.0 and across > 0.0:
+            worst = max(worst, np.sqrt(across / square) / keeps.normal[r])
+    for _ in range(NEWTON_STEPS):
+        _, along, _ = _at(v, a, j, at)
+        slope = 0.0
+        for k in range(axes):
+            b = a[k] + at * j[k]
+            slope += b * b + (v[k] + at * (a[k] + 0.5 * at * j[k])) * j[k]
+        if slope < 0.0:
+            at = min(max(at - along / slope, 0.0), h)
+    return max(worst, np.sqrt(max(best, _at(v, a, j, at)[0])) / keeps.feed[r])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def normal_shares(keeps, leg, h, state, jerk):
+    """(N,) the largest share of the normal acceleration's limit in every step; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
+    shares = np.zeros(len(leg))
+    for i in range(len(leg)):
+        for n in range(PLACES):
+            square, _, across = _at(state[i, 1], state[i, 2], jerk[i], h[i] * n / (PLACES - 1))
+            if square > 0.0 and across > 0.0:
+                shares[i] = max(shares[i], np.sqrt(across / square) / keeps.normal[leg[i]])
+    return shares
+
+
+@njit(cache=True, error_model="numpy")
+def _apart(c, point, tangent, far):
+    """Distance of c (A,) from the point (A,) `far` along a tangent (A,) from another."""
+    square = 0.0
+    for k in range(len(c)):
+        square += (c[k] - point[k] - far * tangent[k]) ** 2
+    return np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def bend_of(curvature, rate, s):
+    """Bound of |d4/dt4 P(x(t))|/384 for the places x of a cubic piece with the ordinates s (4,) on an arc."""
+    first = 3.0 * max(s[1] - s[0], s[2] - s[1], s[3] - s[2])
+    second = 6.0 * max(abs(s[2] - 2.0 * s[1] + s[0]), abs(s[3] - 2.0 * s[2] + s[1]))
+    third = 6.0 * abs(s[3] - 3.0 * s[2] + 3.0 * s[1] - s[0])
+    turned = abs(rate) * first * first
+    fourth = turned * (turned + 6.0 * second)
+    return curvature * (fourth + 3.0 * second * second + 4.0 * first * third) / 384.0
+
+
+@njit(cache=True, error_model="numpy")
+def _split(c, part, piece):
+    """The Bezier ordinates c (4, B) of a cubic: `piece` (4, B) gets those of its first part, c keeps those of the rest."""
+    piece[0] = c[0]
+    for level in range(3):  # de Casteljau
+        for m in range(3 - level):
+            c[m] += part * (c[m + 1] - c[m])
+        piece[level + 1] = c[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _of_arc(keeps, r, c, s0, end, known, budgets, work):
+    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten, from the place s0; budgets
+    (2,) of both ends. It ends at the place `end`, or, if that is not known, at one sought from there. Returns where it ends too."""
+    legs, budget = keeps.legs, keeps.budget[r]
+    point, ahead, tangent, ahead_tangent, bend, piece, s, part_of_s = work
+    worst = 0.0
+    s3 = end if known else max(nearest_point(legs, r, c[3], end, point, tangent), s0)
+    formula_point(legs, r, s3, ahead, ahead_tangent, bend)
+    s[2, 0] = s3 + along_tangent(legs.length[r], c[2], s3, False, ahead, ahead_tangent)
+    formula_point(legs, r, s0, ahead, ahead_tangent, bend)
+    s[1, 0] = s0 + along_tangent(legs.length[r], c[1], s0, True, ahead, ahead_tangent)
+    s[0, 0], s[1, 0], s[2, 0], s[3, 0] = s0, min(s[1, 0], s3), max(s[2, 0], s0), s3
+    if s[1, 0] > s[2, 0]:
+        s[1, 0] = s[2, 0] = 0.5 * (s[1, 0] + s[2, 0])
+    for n in range(PIECES):
+        part = 1.0 / (PIECES - n)
+        _split(c, part, piece)
+        _split(s, part, part_of_s)
+        x = part_of_s[:, 0]
+        point[:], tangent[:] = ahead, ahead_tangent
+        formula_point(legs, r, x[3], ahead, ahead_tangent, bend)
+        inner = max(
+            _apart(piece[1], point, tangent, x[1] - x[0]),
+            _apart(piece[2], ahead, ahead_tangent, x[2] - x[3]),
+        )
+        begin = _apart(piece[0], point, tangent, 0.0) / (budgets[0] if n == 0 else budget)
+        last = _apart(piece[3], ahead, ahead_tangent, 0.0) / (budgets[1] if n == PIECES - 1 else budget)
+        far = max(begin, inner / budget, last)
+        worst = max(worst, far + bend_of(keeps.curvature[r], legs.rate[r], x) / budget)
+    return worst, s3
+
+
+@njit(cache=True, error_model="numpy")
+def _of_line(keeps, r, c, s0, end, known, budgets, work):
+    """The same on a line."""
+    legs, s = keeps.legs, s0
+    point, tangent, bend = work[0], work[2], work[4]
+    formula_point(legs, r, s, point, tangent, bend)
+    worst = _apart(c[0], point, tangent, 0.0) / budgets[0]
+    for m in range(1, 4):
+        s = end if m == 3 and known else max(nearest_point(legs, r, c[m], s, point, tangent), s)
+        formula_point(legs, r, s, point, tangent, bend)
+        worst = max(worst, _apart(c[m], point, tangent, 0.0) / (budgets[1] if m == 3 else keeps.budget[r]))
+    return worst, s
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def worst_shares(keeps, leg, h, state, jerk, place):
+    """The largest share of a limit, and of the tolerance, in N steps.
+
+    leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points along the leg: where
+    places on arcs are sought from
+    """
+    N, axes = jerk.shape
+    limit, tube, before = 0.0, 0.0, 0.0
+    c, budgets = np.empty((4, axes)), np.empty(2)
+    work = (
+        *(np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)),
+        *(np.zeros((4, axes)), np.zeros((4, 1)), np.zeros((4, 1))),
+    )
+    for i in range(N):
+        r = leg[i]
+        limit = max(limit, _of_limits(keeps, r, h[i], state[i, 1], state[i, 2], jerk[i]))
+        begins, ends = i > 0 and leg[i - 1] != r, i < N - 1 and leg[i + 1] != r
+        third = h[i] / 3.0
+        for k in range(axes):
+            p, q = state[i, 0, k], state[i + 1, 0, k]
+            c[0, k], c[1, k] = p, p + third * state[i, 1, k]
+            c[2, k], c[3, k] = q - third * state[i + 1, 1, k], q
+        budgets[:] = keeps.budget[r]
+        if begins:
+            before, budgets[0] = 0.0, min(budgets[0], keeps.vertex_budget[r])
+        elif i == 0:
+            before = nearest_point(keeps.legs, r, c[0], place[i, 0], work[0], work[1])
+        if ends:
+            budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1])
+        end = keeps.legs.length[r] if ends else max(place[i, 2], before)
+        if keeps.legs.radius[r] > 0.0:
+            share, before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
+        else:
+            share, before = _of_line(keeps, r, c, before, end, ends, budgets, work)
+        tube = max(tube, share)
+    return limit, tube
+
+
+def switches_kept(run: TubeRun, leg: Array, state: FloatArray) -> bool:
+    """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end: where the feed falls the way
+    to the vertex comes nearer up to its node, where it rises the way from there on goes away. That is looked at next to the node, on
+    the nodes within the budget of the vertex: what is farther than that from the vertex is not nearest to it, and on an arc of more
+    than half a turn the way to its end goes away from there at first.
+
+    leg (N,), state (N+1, 3, A)
+    """
+    begins = np.flatnonzero(np.diff(leg)) + 1  # the nodes at vertices
+    edges = np.concatenate([[0], begins, [len(leg)]])
+    for k, node in enumerate(begins):
+        way, budget = run.switch[leg[node]], run.vertex_budget[leg[node]]
+        if way == 0.0:
+            continue
+        # from the vertex on, backwards where the feed falls
+        part = np.arange(node, edges[k] - 1, -1) if way > 0 else np.arange(node, edges[k + 2] + 1)
+        off = state[part, 0] - run.vertex[leg[node]]
+        far = np.linalg.norm(off[1:], axis=1) > budget
+        beside = 1 + (int(np.argmax(far)) if far.any() else len(far))
+        away = (off * state[part, 1]).sum(axis=1)[:beside]
+        if (way * away > AWAY * budget * np.linalg.norm(run.velocity)).any():
+            return False
+    return True

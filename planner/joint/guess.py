@@ -1,0 +1,186 @@
+"""Where the search begins: the motion of another method, cut into steps.
+
+A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3), or takes it to its
+full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it has `Cut.per_unit` steps, and all of a leg
+at least `Cut.of_leg` and one in `LONGEST` units. So phases of full jerk get short steps and cruises a few long ones.
+
+Every step is a cubic in time with the control points
+
+    c0 = p0,   c1 = p0 + h v0/3,   c2 = p1 - h v1/3,   c3 = p1
+
+and each of them has its place on the run, the nearest one, never going back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.joint.run import TubeRun
+from planner.motion.trajectory import Trajectory
+
+# Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
+LONGEST, MOST_FOR_LENGTH = 4.0, 60
+# Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to move.
+ARC_STEP = 0.8
+# Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
+NEAREST_STEPS = 5
+
+
+class Cut(NamedTuple):
+    """How finely a motion is cut into steps.
+
+    Twice as many find motions 2e-5 to 5e-5 faster in three times the time; begun with half as many, a corner of 90 degrees and a
+    pentagon do not converge.
+    """
+
+    per_unit: float = 4.0  # steps in a unit of time where the jerk is at its limit (module text) [-]
+    of_leg: float = 2.0  # steps of a leg at least [-]
+
+
+DEFAULT_CUT = Cut()
+
+
+class CutMotion(Protocol):
+    """A motion cut into steps: what is read of a `Guess` and of what becomes of it."""
+
+    @property
+    def leg(self) -> Array:
+        """(N,) leg of each step."""
+        ...
+
+    @property
+    def h(self) -> FloatArray:
+        """(N,) duration [s]."""
+        ...
+
+    @property
+    def state(self) -> FloatArray:
+        """(N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]."""
+        ...
+
+    @property
+    def place(self) -> FloatArray:
+        """(N, 4) places of the control points along the run [mm]."""
+        ...
+
+    def __len__(self) -> int: ...
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Guess:
+    """N steps along a run, the N+1 nodes around them, A axes.
+
+    leg   : (N,) leg of each step
+    h     : (N,) duration [s], > 0
+    state : (N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]
+    place : (N, 4) places of the control points along the run [mm], non-decreasing
+    """
+
+    leg: Array
+    h: FloatArray
+    state: FloatArray
+    place: FloatArray
+
+    def __post_init__(self) -> None:
+        steps = len(self.h)
+        freeze(self, "leg", np.int64, (steps,))
+        freeze(self, "h", np.float64, (steps,))
+        freeze(self, "state", np.float64, (steps + 1, 3, None))
+        freeze(self, "place", np.float64, (steps, 4))
+        if not (self.h > 0).all():
+            raise ValueError("Guess.h: every step must last longer than 0 s")
+
+    def __len__(self) -> int:
+        return len(self.h)
+
+    def slower(self, by: float) -> Guess:
+        """The same path in `by` times the time."""
+        return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
+
+
+def guess_from(
+    run: TubeRun,
+    motion: Trajectory,
+    vertex_time: FloatArray,
+    cut: Cut = DEFAULT_CUT,
+) -> Guess:
+    """Cut a motion along a run of R legs into steps.
+
+    motion      : along this run alone, at rest at both ends
+    vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
+    """
+    leg, nodes = _steps(run, motion, vertex_time, cut)
+    of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
+    state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
+    state[[0, -1], 1:] = 0.0
+    state[[0, -1], 0] = run.vertex[[0, -1]]
+    h = np.diff(nodes)
+    place = _places(run, leg, h, state, np.interp(nodes, motion.t, motion.s))
+    return Guess(leg=leg, h=h, state=state, place=place)
+
+
+def unit_of(run: TubeRun) -> float:
+    """The unit of time in which a corner is shaped (module text) [s]."""
+    return float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
+
+
+def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
+    """(R,) steps of each leg at least, whatever its jerks are; lasting: (R,) [s]."""
+    of_time = cut.of_leg + np.minimum(lasting / (LONGEST * unit_of(run)), MOST_FOR_LENGTH)
+    least: FloatArray = np.maximum(of_time, run.length / (ARC_STEP * run.step_max))
+    return least
+
+
+def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
+    """(N,) legs and (N+1,) times of the nodes [s]."""
+    unit = unit_of(run)
+    busy = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
+    lasting = np.diff(motion.t)
+    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * cut.per_unit / unit
+    least = least_of_legs(run, np.diff(vertex_time), cut)
+    # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from that of the run
+    inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
+    t = np.union1d(inside, vertex_time)
+    leg = np.minimum(np.searchsorted(vertex_time, t, side="right") - 1, len(run) - 1)
+    spent_at = np.interp(vertex_time, motion.t, spent)
+    even = (t - vertex_time[leg]) / np.diff(vertex_time)[leg]
+    done = np.interp(t, motion.t, spent) + (least[leg] * even - spent_at[leg])
+    whole = spent_at[1:] + (least - spent_at[:-1])
+    before = np.append(0.0, np.cumsum(whole))
+    share = done + before[leg]
+    steps = np.ceil(whole).astype(np.int64)
+    of_step = np.repeat(np.arange(len(run)), steps)
+    first = np.cumsum(steps) - steps
+    number = np.arange(len(of_step)) - first[of_step]
+    times = np.interp(before[of_step] + whole[of_step] * number / steps[of_step], share, t)
+    times[first] = vertex_time[:-1]
+    return of_step, np.append(times, vertex_time[-1])
+
+
+def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArray:
+    """(n, A) a column (T, A) at times t (T,), interpolated at the times (n,)."""
+    return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
+
+
+def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelled: FloatArray) -> FloatArray:
+    """(N, 4) places of the control points; travelled: (N+1,) length that the motion has travelled at the nodes [mm]."""
+    p, v = state[:, 0], state[:, 1]
+    third = h[:, None] / 3
+    controls = np.stack([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
+    last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
+    begin = np.append(0, last[:-1] + 1)
+    per_length = run.length / (travelled[last + 1] - travelled[begin])
+    places = np.empty((len(leg), 4))
+    for k, (control, fraction) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
+        there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
+        x = (there - travelled[begin][leg]) * per_length[leg]
+        for _ in range(NEAREST_STEPS):
+            miss, along = control - run.points(leg, x), run.tangents(leg, x)
+            x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[leg])
+        places[:, k] = x
+    places[begin, 0], places[last, 3] = 0.0, run.length
+    return np.maximum.accumulate((places + run.offset[leg][:, None]).ravel()).reshape(-1, 4)

@@ -1,0 +1,129 @@
+"""From steps to a motion: integrated exactly, ending exactly, and slowed down by what is left of rounding.
+
+A solver's rows have residuals of some 1e-8. The steps' jerks are integrated from the first node, and the smallest change of the jerks
+that makes the last node meet its end is added (least squares, per axis). Slowing down by lam divides speeds by lam, accelerations
+by lam^2 and jerks by lam^3 and leaves the path as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.joint.guess import Guess
+from planner.joint.run import TubeRun
+
+# Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their square from acceleration to
+# position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
+CLOSED_EVERY = 50
+# Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
+MEASURED_AT = np.linspace(0.0, 1.0, 257)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Steps:
+    """N steps of constant jerk over A axes, from rest to rest.
+
+    h                                    : (N,) duration [s]
+    position, velocity, acceleration     : (N, A) at the start of each
+    jerk                                 : (N, A) on the step
+    """
+
+    h: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+
+def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Steps:
+    """The motion with the jerk (N, A) [mm/s3] over steps of h (N,) [s], from vertex to vertex and within all limits (module text).
+
+    guess : what the search began with
+    """
+    begin, end = (np.zeros((3, len(run.axis))) for _ in range(2))
+    begin[0], end[0] = run.vertex[0], run.vertex[-1]
+    jerk = closed(begin, end, h, jerk)
+    p, v, a = np.moveaxis(integrated(begin, h, jerk)[:-1], 1, 0)
+    steps = Steps(h=h, position=p, velocity=v, acceleration=a, jerk=jerk)
+    by = max(_excess(run, guess, steps), 1.0)
+    return Steps(h=h * by, position=p, velocity=v / by, acceleration=a / by**2, jerk=jerk / by**3)
+
+
+def integrated(begin: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A) [mm, s].
+
+    h    : (N,) durations [s]
+    jerk : (N, A) constant on each step [mm/s3]
+    """
+    h, state = h[:, None], np.empty((len(h) + 1, 3, jerk.shape[1]))
+    a = state[:, 2] = _summed(begin[2], h * jerk)
+    v = state[:, 1] = _summed(begin[1], h * (a[:-1] + h * jerk / 2))
+    state[:, 0] = _summed(begin[0], h * (v[:-1] + h * (a[:-1] / 2 + h * jerk / 6)))
+    return state
+
+
+def _summed(begin: FloatArray, change: FloatArray) -> FloatArray:
+    """(N+1, A) begin (A,) and the sums of the changes (N, A) after it."""
+    return begin + np.vstack([np.zeros_like(change[:1]), np.cumsum(change, axis=0)])
+
+
+def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those given, changed least.
+
+    h    : (N,) durations [s]
+    jerk : (N, A) [mm/s3]
+    """
+    lasts = h.sum()
+    rest = (lasts - np.cumsum(h)) / lasts  # after each step, in units of the whole time
+    own = h / lasts
+    to_end = np.stack(
+        [own * (own**2 / 6 + rest * (own / 2 + rest / 2)), own * (own / 2 + rest), own]
+    )  # of p, v, a, in those units
+    missed = (integrated(begin, h, jerk)[-1] - end) / lasts ** np.array([[3.0], [2.0], [1.0]])
+    return jerk - np.linalg.lstsq(to_end, missed, rcond=None)[0]
+
+
+def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The motion that meets every `CLOSED_EVERY`th of the nodes, state (N+1, 3, A), and the last one: its nodes, and the jerks (N, A),
+    those given changed least between two of them.
+
+    h    : (N,) durations [s]
+    jerk : (N, A) [mm/s3]
+    """
+    ends = np.linspace(0, len(h), max(len(h) // CLOSED_EVERY, 1) + 1).astype(int)
+    nodes, jerks = state.copy(), np.empty_like(jerk)
+    for lo, hi in pairwise(ends.tolist()):
+        jerks[lo:hi] = closed(state[lo], state[hi], h[lo:hi], jerk[lo:hi])
+        nodes[lo:hi] = integrated(state[lo], h[lo:hi], jerks[lo:hi])[:-1]
+    return nodes, jerks
+
+
+def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
+    """By what factor the motion has to be slowed down to keep all limits; <= 1 if it keeps them."""
+    h, v, a, j = steps.h[:, None], steps.velocity, steps.acceleration, steps.jerk
+    middle, after = v + h * a / 2, v + h * (a + h * j / 2)
+    ordinates = np.concatenate(
+        [v, middle]
+    )  # both bound the parabola; every step ends where the next one begins
+    # Bernstein coefficients of the squared feed (rows.py)
+    square = [(v * v).sum(axis=1), (v * middle).sum(axis=1), (middle * after).sum(axis=1)]
+    square.append((2.0 * (middle * middle).sum(axis=1) + (v * after).sum(axis=1)) / 3.0)
+    leg = guess.leg
+    ratios = [
+        (np.abs(ordinates) / run.velocity).max(),
+        np.sqrt((np.maximum(np.max(square, axis=0), 0.0) / run.feed[leg] ** 2).max()),
+        np.sqrt((np.abs(a) / run.acceleration).max()),
+        np.cbrt((np.abs(j) / run.jerk).max()),
+    ]
+    for fraction in MEASURED_AT if np.isfinite(run.across_max).any() else ():
+        tau = fraction * h
+        along, push = v + tau * (a + tau * j / 2), a + tau * j
+        speed_sq = (along**2).sum(axis=1)
+        across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
+        normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
+        ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / run.across_max[leg]).max())
+    return float(max(ratios))

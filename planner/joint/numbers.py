@@ -1,0 +1,71 @@
+"""What the free optimum (nlp.py) needs to know of its steps, in numbers: their legs and limits, and how fast they are about."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.joint.guess import Guess
+from planner.joint.run import TubeRun
+
+# The tolerance is narrowed by this fraction [-], so that rounding stays inside it.
+ROUNDING = 1e-4
+
+
+def step_numbers(
+    run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
+) -> FloatArray:
+    """(N, 5 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its end, its limits; the
+    vertex at the leg's end, and what the feed does where the step ends there (`TubeRun.switch`, over tolerance and pace).
+
+    mean_step          : (N,) mean length of a step on each step's leg [mm]
+    length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
+    """
+    leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
+    room, feed = run.room[leg] * (1.0 - ROUNDING), run.feed[leg]
+    room_end, feed_end = room.copy(), feed.copy()
+    beside = np.minimum(run.room[:-1], run.room[1:])
+    room_end[last] = np.minimum(run.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
+    feed_end[last] = np.minimum(feed[last], feed[last + 1])
+    fastest = np.linalg.norm(run.velocity)  # instead of inf, where nothing else limits
+    strongest = 2.0 * np.linalg.norm(run.acceleration)
+    own_pace, switch = pace(guess.state[:, 1]), np.zeros(len(leg))
+    switch[last] = run.switch[leg[last + 1]] * length * speed / (room_end[last] * own_pace[last + 1])
+    return np.column_stack(
+        [
+            run.base[leg] / length,
+            run.drift[leg],
+            run.e1[leg],
+            run.e2[leg],
+            run.offset[leg] / length,
+            run.radius[leg] / length,
+            run.rate[leg] * length,
+            room / length,
+            room_end / length,
+            np.minimum(run.step_max[leg], run.offset[-1]) / length,
+            np.minimum(feed, fastest) / speed,
+            np.minimum(feed_end, fastest) / speed,
+            np.minimum(run.across_max[leg], strongest) / acc,
+            mean_step / length,
+            own_pace / speed,
+            run.vertex[leg + 1] / length,
+            switch,
+        ]
+    )
+
+
+def pace(velocity: FloatArray) -> FloatArray:
+    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
+    to be as small as the speed.
+
+    velocity : (N+1, A) at the nodes [mm/s]
+    """
+    at_nodes = np.linalg.norm(velocity, axis=1)
+    return np.maximum(np.maximum(at_nodes[:-1], at_nodes[1:]), 1e-3 * float(at_nodes.max()))
+
+
+def acceleration_along(guess: Guess) -> FloatArray:
+    """(N,) pace times u = v.a/|v|^2 in the middle of each step [mm/s2]."""
+    own = pace(guess.state[:, 1])
+    v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
+    return own * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * own) ** 2)

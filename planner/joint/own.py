@@ -1,0 +1,323 @@
+"""The free optimum by an own solver: window by window along a run, each by the interior-point method of interior_point.py.
+
+A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. The first windows
+lie end to end; those of the second sweep each reach over one join, from inside one window to inside the next, where these have found
+their optimum. Windows of a sweep have no step in common: they are searched side by side, and what they find is the same for any number
+of threads. A window that does not converge, that breaks something when its steps are integrated and looked at exactly (checks.py) is
+divided; what is left of that keeps the motion that the search began with, and is said.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side
+from planner.feedrate.solution import Status
+from planner.joint.checks import Keeps, normal_shares, switches_kept, worst_shares
+from planner.joint.guess import Guess
+from planner.joint.interior_point import Tuning, solve_window
+from planner.joint.legs import LegFormulas
+from planner.joint.motion import Steps, closed_at_nodes
+from planner.joint.nlp import PULL, SMOOTH
+from planner.joint.outcome import TubeSolution
+from planner.joint.price import columns, step_prices
+from planner.joint.problem import NARROWED, StepWindow, window_of
+from planner.joint.run import TubeRun
+
+# Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
+# divided into.
+WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.searched_least
+# A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
+JOIN_WITHIN = SIZES.searched_join
+# What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the
+# first do with the second (pentagon on mill), and the other way round. By how much rows may be missed at the end [-]: on some windows
+# with arcs they keep trembling by 1e-5. Where a plan is made otherwise if one window fails there is one try: of 130 random jobs
+# (benchmarks/campaign_jobs.py, effort quick and normal) two were 1.9e-3 and 2.8e-3 slower for it, all took 0.78 of the CPU seconds.
+TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
+# The most that rows may be missed by [-].
+MISSED_MOST = max(missed for _, missed in TRIES)
+# Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
+USUAL, NEARLY = 25.0, 0.9
+QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
+# Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
+# steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
+# and 0.01 693 and 364.
+FAR, NEAR = (0.3, 0.05), (0.01, 0.01)
+# Normal acceleration is watched in two places of a step only. Where it is above its limit between them, the limit is lowered by what it
+# was above, and a little more [-], at most so many times.
+TIGHTENED, TIGHTER = 3, 1.002
+# Rounding of limits, as a share of them [-].
+ROUNDING = 1e-9
+Tries = tuple[tuple[float, float], ...]
+KEPT = "no faster motion was found there"
+FOUND = "the best motion near its start, geometry and feed together"
+
+
+@dataclass(frozen=True)
+class TubeOwn:
+    """Settings of the search.
+
+    gap      : complementarity at its end, share of the time [-]
+    divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess need not keep the limits
+               and no part of it is kept: windows may end slower than it, and the search ends at the first one that fails
+    progress : called with the share of the steps that are done [-]
+    least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: 31
+               runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times the iterations
+    near     : whether the guess is an optimum of longer steps (refine.py)
+    """
+
+    gap: float = 1e-5
+    divide: bool = True
+    progress: Callable[[float], None] | None = None
+    least: float = 1.0
+    near: bool = False
+    legs_max: ClassVar[float] = np.inf
+
+    def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
+        """The best motion near the guess, never slower than it. Where no faster one is found its steps are `kept`."""
+        began, search = time.perf_counter(), _Search(self, run, guess)
+        search.sweep()
+        took = time.perf_counter() - began
+        if search.kept.all():
+            return TubeSolution(
+                status=Status.ITERATION_LIMIT,
+                sentence="the search did not end faster than its start",
+                iterations=search.iterations,
+                solve_time=took,
+                windows=search.windows,
+                solved=search.solved,
+            )
+        share = float(guess.h[search.kept].sum() / guess.h.sum())
+        sentence = FOUND if not share else f"{FOUND}; on {share:.2g} of the time {KEPT}"
+        return TubeSolution(
+            status=Status.ACCEPTABLE if share else Status.OPTIMAL,
+            sentence=sentence,
+            iterations=search.iterations,
+            solve_time=took,
+            windows=search.windows,
+            solved=search.solved,
+            steps=search.steps(),
+            place=search.places(),
+            kept=search.kept,
+            price=search.price,
+        )
+
+
+class _Count:
+    """Of a window: its steps, whether it was solved at once, iterations so far, that of the present solve, and whether all is over."""
+
+    def __init__(self, steps: int):
+        self.steps, self.solved, self.iterations, self.at, self.over = steps, False, 0, np.zeros(1), False
+
+    def share(self) -> float:
+        """Of its work that is done, about [-]."""
+        return 1.0 if self.over else min(float(self.at[0]) / USUAL, NEARLY)
+
+
+class _Cut:
+    """The steps of a guess (guess.py) while they are searched: arrays that windows write into, each its own steps."""
+
+    def __init__(self, guess: Guess):
+        self.leg, self.h, self.state, self.place = (
+            guess.leg,
+            guess.h.copy(),
+            guess.state.copy(),
+            guess.place.copy(),
+        )
+
+    def __len__(self) -> int:
+        return len(self.h)
+
+
+class _Search:
+    """A run on its way from a guess to the optimum near it."""
+
+    def __init__(self, settings: TubeOwn, run: TubeRun, guess: Guess):
+        self.settings, self.run, self.guess = settings, run, _Cut(guess)
+        self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
+        self.kept = np.ones(len(guess), dtype=bool)
+        self.price = np.zeros((len(guess), columns(len(run.axis))))
+        self.iterations, self.windows, self.solved = 0, 0, 0
+        self._keeps = keeps_of(run)
+        self._strain = _strain(run, guess)
+        self._stopped = False
+        self._done, self._all = 0, len(guess)  # steps of all windows
+
+    def sweep(self) -> None:
+        """All windows, and then all joins."""
+        steps = len(self.guess)
+        even = np.linspace(0, steps, max(int(np.ceil(steps / WINDOW)), 1) + 1).astype(int)
+        joins = [self._join(int(near)) for near in even[1:-1]]
+        if not self.settings.divide:  # no step of the guess is kept
+            self._slow(joins)
+        self._all = steps + 2 * OVERLAP * len(joins)
+        self._side_by_side([0, *joins], [*joins, steps], self.settings.divide)
+        if self._stopped:
+            return
+        self._side_by_side(
+            [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
+        )
+
+    def _slow(self, nodes: list[int]) -> None:
+        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as narrowed as they may be: no
+        motion keeps them there."""
+        run, at = self.run, np.array(nodes, dtype=int)
+        state, leg, h = self.guess.state, self.guess.leg, self.guess.h
+        v, a = state[at, 1], state[at, 2]
+        feed = np.minimum(run.feed[leg[at]], run.feed[leg[at - 1]])
+        beside = np.stack([v, v - a * h[at - 1, None] / 2, v + a * h[at, None] / 2])  # of the Bezier velocity
+        shares = (
+            (np.abs(beside) / run.velocity).max(axis=(0, 2)),
+            np.linalg.norm(beside, axis=2).max(axis=0) / feed,
+            np.sqrt((np.abs(a) / run.acceleration).max(axis=1)),
+        )
+        by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
+        state[at, 1] /= by
+        state[at, 2] /= by**2
+
+    def steps(self) -> Steps:
+        """The steps; those that are kept as they were guessed."""
+        p, v, a = (self.guess.state[:-1, k] for k in range(3))
+        return Steps(h=self.guess.h, position=p, velocity=v, acceleration=a, jerk=self.jerk)
+
+    def places(self) -> FloatArray:
+        """(N+1,) of the nodes along the run [mm]."""
+        return np.append(self.guess.place[:, 0], self.run.offset[-1])
+
+    def _side_by_side(self, begin: list[int], end: list[int], parts: bool = True) -> None:
+        """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are of no use, the first one
+        that fails ends the search."""
+
+        def improve(lo: int, hi: int, count: _Count) -> None:
+            count.solved = self._improve(lo, hi, count, TRIES if parts else TRIES[:1])
+            self._stopped |= not (parts or count.solved)
+            count.over = True
+
+        counts = [_Count(hi - lo) for lo, hi in zip(begin, end, strict=True)]
+        work = [partial(improve, *one) for one in zip(begin, end, counts, strict=True)]
+        if sum(count.steps for count in counts) > QUIET:
+            side_by_side(work, self._stop, lambda: self._tell(counts))
+        else:
+            for one in work:
+                one()
+        self._done += sum(count.steps for count in counts)
+        self._tell([])
+        self.windows += len(counts)
+        self.solved += sum(count.solved for count in counts)
+        self.iterations += sum(count.iterations for count in counts)
+
+    def _tell(self, running: list[_Count]) -> None:
+        if self.settings.progress is not None:
+            done = self._done + sum(count.steps * count.share() for count in running)
+            self.settings.progress(min(done / self._all, 1.0))
+
+    def _stop(self) -> None:
+        """Begin no other window."""
+        self._stopped = True
+
+    def _join(self, near: int) -> int:
+        """A node to join windows at."""
+        begin = max(near - JOIN_WITHIN, 0)
+        return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
+
+    def _improve(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
+        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found.
+        Whether it did not fail; `count` takes the iterations."""
+        if self._improved(lo, hi, count, tries):
+            return True
+        if hi - lo < 2 * LEAST or not self.settings.divide:
+            return False
+        middle = (lo + hi) // 2
+        reach = min(JOIN_WITHIN, (hi - lo) // 4)
+        middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
+        before = float(self.guess.h[lo:hi].sum())
+        self._improve(lo, middle, count, TRIES[:1])
+        self._improve(middle, hi, count, TRIES[:1])
+        if self.guess.h[lo:hi].sum() < before:
+            self._improved(lo, hi, count, tries)
+        return False
+
+    def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
+        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
+        first = NEAR if self.settings.near else FAR
+        watched = bool(np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any())
+        for prox, missed in tries:
+            tight = np.ones(hi - lo)
+            for _ in range(TIGHTENED if watched else 1):
+                if self._stopped:
+                    return False
+                window = window_of(self.run, self.guess, lo, hi, missed, tight)
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least, *first)
+                done, iterations, z = solve_window(
+                    window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
+                )
+                count.iterations += iterations
+                if not done:
+                    break
+                if self._taken(lo, hi, window, tight):
+                    self.price[lo:hi] = step_prices(window, z)
+                    return True
+                if not (tight > 1.0).any():
+                    break
+        return False
+
+    def _taken(self, lo: int, hi: int, window: StepWindow, tight: FloatArray) -> bool:
+        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place.
+        Where their normal acceleration is above its limit, `tight` (hi - lo,) grows."""
+        run, axes, guess = self.run, len(self.run.axis), self.guess
+        h = window.u[:, axes] * window.second
+        state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
+        nodes = window.nodes()
+        nodes[[0, -1]] = state[[0, -1]]
+        found, jerk = closed_at_nodes(nodes, h, window.u[:, :axes] * (window.length / window.second**3))
+        place = window.place * window.length
+        limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
+        if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
+            across = normal_shares(self._keeps, leg, h, found, jerk)
+            tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
+            return False
+        if not switches_kept(run, leg, found):
+            return False
+        if not self.settings.divide or h.sum() < guess.h[lo:hi].sum():
+            guess.place[lo:hi, :3] = place + run.offset[leg][:, None]
+            guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
+            self.kept[lo:hi] = False
+        return True
+
+
+def keeps_of(run: TubeRun) -> Keeps:
+    """What the run has to keep, for the kernel."""
+    names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
+    return Keeps(
+        legs=LegFormulas(**{name: getattr(run, name) for name in names}),
+        velocity=run.velocity,
+        acceleration=run.acceleration,
+        jerk=run.jerk,
+        feed=run.feed,
+        normal=run.across_max,
+        budget=run.budget,
+        curvature=run.curvature,
+        vertex_budget=run.vertex_budget,
+    )
+
+
+def _strain(run: TubeRun, guess: Guess) -> FloatArray:
+    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each step."""
+    leg: Array = guess.leg
+    p, v, a = (guess.state[:-1, k] for k in range(3))
+    far = np.linalg.norm(p - run.points(leg, guess.place[:, 0] - run.offset[leg]), axis=1) / run.room[leg]
+    shares = (
+        far,
+        (np.abs(v) / run.velocity).max(axis=1),
+        np.linalg.norm(v, axis=1) / run.feed[leg],
+        (np.abs(a) / run.acceleration).max(axis=1),
+    )
+    return np.max(shares, axis=0)

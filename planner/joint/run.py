@@ -1,0 +1,242 @@
+"""What the free optimum has to follow: a run, the legs of the programmed path between two full stops, with their budgets and limits.
+
+A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length] on it both are
+
+    P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
+
+with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
+chord error of the interpolation period and for the filters that follow (corners/allocation.py, eq. (18)-(20)), with the largest
+normal acceleration that the axes can give in any direction.
+
+A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that meets P(x(t)) at both ends
+with its velocity has the control points
+
+    P(s0),   P(s0) + (s1 - s0) P'(s0),   P(s3) - (s3 - s2) P'(s3),   P(s3)
+
+and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx. So these are the points that
+the control points of a step belong to; on a line they are the places themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import InputError
+from planner.corners.allocation import allocate
+from planner.corners.budget import error_rate, normal_anywhere, normal_within_budget
+from planner.geometry.build import path_per_length
+from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+
+# Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
+# turns by meanwhile [rad], within which tangents tell where a control point belongs.
+ARC_FRACTION, TURN_MAX = 0.005, 0.5
+ROUNDING = 1e-9  # of the length in all axes over that of F [-]
+
+
+class Budgets(NamedTuple):
+    """What R legs and the R+1 vertices around them may use of the tolerance, eps_ap, and what the rest of it allows."""
+
+    leg: FloatArray  # (R,) [mm]
+    vertex: FloatArray  # (R+1,) 0 at both ends [mm]
+    across: FloatArray  # (R,) normal acceleration [mm/s2]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TubeRun:
+    """R legs from rest to rest over the A axes that move on them, and the R+1 vertices around them.
+
+    axis                         : (A,) their indices among the axes of the toolpath
+    first                        : (R+1,) leg r holds the toolpath's segments first[r] : first[r+1]
+    length                       : (R,) [mm]
+    base, drift, e1, e2          : (R, A) the formula in the module's text [mm], [-]
+    radius, rate                 : (R,) [mm], [rad/mm]
+    curvature                    : (R,) bound of it on the leg [1/mm]
+    budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
+    across_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
+                                   where the axes cannot exceed it
+    vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
+    velocity, acceleration, jerk : (A,) limits of the axes
+    left                         : why the search cannot look for a motion here, "" if it can
+    """
+
+    axis: Array
+    first: Array
+    length: FloatArray
+    base: FloatArray
+    drift: FloatArray
+    e1: FloatArray
+    e2: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+    curvature: FloatArray
+    budget: FloatArray
+    feed: FloatArray
+    across_max: FloatArray
+    vertex: FloatArray
+    vertex_budget: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    left: str = ""
+
+    def __post_init__(self) -> None:
+        legs, axes = len(self.length), len(self.axis)
+        freeze(self, "axis", np.int64, (axes,))
+        freeze(self, "first", np.int64, (legs + 1,))
+        for name in ("length", "radius", "rate", "curvature", "budget"):
+            freeze(self, name, np.float64, (legs,))
+        for name in ("feed", "across_max"):
+            freeze(self, name, np.float64, (legs,), finite=False)
+        for name in ("base", "drift", "e1", "e2"):
+            freeze(self, name, np.float64, (legs, axes))
+        freeze(self, "vertex", np.float64, (legs + 1, axes))
+        freeze(self, "vertex_budget", np.float64, (legs + 1,))
+        for name in ("velocity", "acceleration", "jerk"):
+            freeze(self, name, np.float64, (axes,))
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    @property
+    def step_max(self) -> FloatArray:
+        """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by `ARC_FRACTION` of the budget (module
+        text); inf on lines."""
+        with np.errstate(divide="ignore"):
+            fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
+            return np.minimum(fourth**0.25, TURN_MAX / np.abs(self.rate))
+
+    @property
+    def room(self) -> FloatArray:
+        """(R,) how far control points of a step may be from their places on the leg [mm]."""
+        return np.where(self.curvature > 0, 1.0 - ARC_FRACTION, 1.0) * self.budget
+
+    @property
+    def switch(self) -> FloatArray:
+        """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no motion is so fast."""
+        feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
+        return -np.sign(np.diff(feed, prepend=feed[0]))
+
+    @property
+    def offset(self) -> FloatArray:
+        """(R+1,) place of the vertices along the run [mm]."""
+        return np.append(0.0, np.cumsum(self.length))
+
+    def leg_at(self, place: FloatArray) -> Array:
+        """(n,) legs at the places `place` (n,) along the run [mm]."""
+        return np.clip(np.searchsorted(self.offset, place, side="right") - 1, 0, len(self) - 1)
+
+    def points(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
+        turned = (self.rate[leg] * x)[:, None]
+        circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
+        return self.base[leg] + self.drift[leg] * x[:, None] + self.radius[leg, None] * circle
+
+    def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
+        turned = (self.rate[leg] * x)[:, None]
+        across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
+        return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
+
+
+def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
+    """The runs between full stops, in order. Raises InputError for splines, and if the machine lacks an axis of the toolpath."""
+    curves = np.flatnonzero(toolpath.curve >= 0)
+    if len(curves):
+        raise InputError(
+            "method tube takes lines and arcs, not splines; plan with method optimal",
+            source=toolpath.source,
+            line=int(toolpath.line[curves[0]]),
+        )
+    limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
+    edges = _edges(toolpath)
+    stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
+    for begin, end in pairwise(stops):
+        first = edges[begin : end + 1]
+        row = first[:-1]  # the segment that stands for its leg
+        budgets = budgets_of(toolpath, machine, first)
+        vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
+        shape = _shapes(toolpath, row, vertex)
+        moves = (
+            np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
+        ).any(axis=0)
+        held = budgets.across < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
+        yield TubeRun(
+            axis=np.flatnonzero(moves),
+            left=_left(toolpath, slice(first[0], first[-1])),
+            first=first,
+            curvature=toolpath.curvature[row],
+            budget=budgets.leg,
+            feed=toolpath.feed[row],
+            across_max=np.where(held, budgets.across, np.inf),
+            vertex=vertex[:, moves],
+            vertex_budget=budgets.vertex,
+            **{name: limit[moves] for name, limit in limits.items()},
+            **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
+        )
+
+
+def _left(toolpath: Toolpath, part: slice) -> str:
+    """Why segments are left as they are. On a leg the feed is that along all axes: inside the tolerance x, y and z might take what the
+    rotary axes need not, and F with them be exceeded."""
+    if toolpath.exact[part].any():
+        return "G61 asks for the exact path"
+    per = path_per_length(toolpath.axes, toolpath.radius, toolpath)[part]
+    if (np.isfinite(toolpath.feed[part]) & (per > 1.0 + ROUNDING)).any():
+        return "F goes by some of the axes that move"
+    return ""
+
+
+def budgets_of(toolpath: Toolpath, machine: Machine, first: Array) -> Budgets:
+    """What eq. (18)-(20) leave for the legs that hold the segments first[r] : first[r+1], first (R+1,)."""
+    reachable = normal_anywhere(machine, toolpath.axes)
+    rate = error_rate(machine)
+    row = first[:-1]  # the segment that stands for its leg
+    tol_leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
+    most = np.full(len(tol_leg), reachable)
+    tol_ap = allocate(tol_leg, most, rate)
+    at_vertex = np.minimum(
+        toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
+    )
+    vertex_ap = allocate(at_vertex, np.full(len(first), reachable), rate)
+    vertex_ap[[0, -1]] = 0.0
+    return Budgets(tol_ap, vertex_ap, normal_within_budget(tol_leg, tol_ap, most, rate))
+
+
+def _edges(toolpath: Toolpath) -> Array:
+    """Joints between legs: those of geometry/legs.py, and where feed or budget, the larger one of its joints', change on a line."""
+    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
+    edge = np.zeros(len(toolpath) + 1, dtype=bool)
+    edge[legs_of(toolpath).first] = True
+    edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) | (np.diff(budget) != 0)
+    return np.flatnonzero(edge)
+
+
+def _shapes(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:
+    """The coefficients of the legs that begin with the segments `row`."""
+    arc, arcs = toolpath.arc[row], toolpath.arcs
+    chord = np.diff(vertex, axis=0)
+    length = np.where(arc < 0, np.linalg.norm(chord, axis=1), toolpath.length[row])
+    shape = {
+        "length": length,
+        "base": vertex[:-1].copy(),
+        "drift": chord / length[:, None],
+        "e1": np.zeros_like(chord),
+        "e2": np.zeros_like(chord),
+        "radius": np.zeros(len(row)),
+        "rate": np.zeros(len(row)),
+    }
+    curved = arc >= 0
+    for name, source in (
+        ("base", "center"),
+        *((same, same) for same in ("drift", "e1", "e2", "radius", "rate")),
+    ):
+        shape[name][curved] = getattr(arcs, source)[arc[curved]]
+    return shape

@@ -1,0 +1,36 @@
+"""The solvers of the free optimum by name: the own one, and ipopt and fatrop on the same problem."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from planner.joint.guess import Guess
+from planner.joint.nlp import TubeNLP
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
+from planner.joint.run import TubeRun
+
+
+class TubeSolver(Protocol):
+    """Finds the best motion near a guess."""
+
+    @property
+    def legs_max(self) -> float:
+        """Legs, and steps on arcs, that a job may have."""
+        ...
+
+    def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
+        """The best motion near the guess, never slower than it."""
+        ...
+
+
+SOLVERS: dict[str, TubeSolver] = {
+    "own": TubeOwn(),
+    "ipopt": TubeNLP(),
+    "fatrop": TubeNLP(solver="fatrop"),
+}
+
+
+def tube_solver(solver: str | TubeSolver) -> TubeSolver:
+    """The solver of that name (base/names.py), or the one that is given."""
+    return SOLVERS[solver] if isinstance(solver, str) else solver

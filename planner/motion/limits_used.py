@@ -1,0 +1,65 @@
+"""How much of the limits that are no axis' own a motion uses at its samples: for the planner, which slows a motion down where it must.
+
+The judge has code of its own for each of them (verifier/limits.py, verifier/own.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.machine import LINEAR_AXES, Machine
+from planner.machine.user_limit import OwnLimit, Place, along_path, bounds_at, limit_derivatives
+from planner.motion.trajectory import Trajectory
+
+NORMAL_ORDER = 2  # slower by lam, the normal acceleration is less by lam^2
+REST = 1e-6  # [mm/s] below this, the direction of a velocity is rounding
+
+
+def normal_ratios(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """The limit's order and the motion's ratio to it at its T samples (T,), 0 at rest; nothing on machines that name none."""
+    if machine.normal_acceleration is None:
+        return
+    v, a = _linear(motion)
+    square, along = np.sum(v * v, axis=1), np.sum(v * a, axis=1)
+    moving = square > REST**2
+    share = np.divide(along, square, out=np.zeros(len(v)), where=moving)
+    across = np.where(moving, np.linalg.norm(a - share[:, None] * v, axis=1), 0.0)
+    yield NORMAL_ORDER, across / machine.normal_acceleration
+
+
+def slowest(motion: Trajectory) -> FloatArray:
+    """(n,) times between samples at which the motion is slowest, as far as its acceleration is constant [s]: there it turns most
+    quickly, and its normal acceleration can have peaks that are over before the next sample."""
+    v, a = _linear(motion)
+    square = np.sum(a * a, axis=1)
+    step = np.divide(-np.sum(v * a, axis=1), square, out=np.full(len(v), np.inf), where=square > 0.0)
+    before, after = np.diff(motion.t, prepend=motion.t[0]), np.diff(motion.t, append=motion.t[-1])
+    inside = (step > -before) & (step < after) & (step != 0.0)
+    return motion.t[inside] + step[inside]
+
+
+def _linear(motion: Trajectory) -> tuple[FloatArray, FloatArray]:
+    """(T, n) velocities and accelerations of the linear axes x, y and z."""
+    of = np.isin(motion.axes, LINEAR_AXES)
+    return motion.velocity[:, of], motion.acceleration[:, of]
+
+
+def user_ratios(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """For every quantity of every limit its order, 1 to 3, and the motion's ratio to it (n,)."""
+    columns = (motion.velocity, motion.acceleration, motion.jerk)
+    if not limits:
+        return
+    path, direction = along_path(*columns)
+    place = Place(motion.axes, list(motion.position.T), direction, motion.block)
+    for limit in limits:
+        bounds = bounds_at(limit, place, len(motion.t))
+        values = (
+            path
+            if limit.value(place) is None
+            else limit_derivatives(limit, motion.axes, (motion.position, *columns))
+        )
+        for k in range(3):
+            yield k + 1, np.abs(values[k]) / bounds[:, k]

@@ -1,0 +1,155 @@
+"""Jobs of the tool's tip: planned through the kinematics, delivered as setpoints of the joints, judged there and at the tip."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.machine.kinematics import Chain, at_tip, kinematics_of
+from planner.machine.kinematics.along_path import in_rad
+from planner.machine.kinematics.limits import WIDE, LinearJoint
+from planner.motion.chain_setpoints import joint_setpoints
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Program
+from planner.nc.set_limits import limited
+from planner.planning.job.plan import Plan
+from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """What delivered setpoints are judged by.
+
+    program, toolpath, machine : as `verify` has them
+    given       : which columns were delivered, and with how many digits
+    not_limited : quantities that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
+    """
+
+    program: Program
+    toolpath: Toolpath
+    machine: Machine
+    given: Given = WHOLE
+    not_limited: tuple[str, ...] = ()
+    progress: Callable[[float], None] | None = None
+
+
+def chain_of(program: Program, machine: Machine) -> Chain | None:
+    """The kinematics that a program is planned through: those of the machine with the program's tool, if its tool centre point is on;
+    None where x, y and z are joints, and for a machine that is planned for at the tip already (`at_tip`)."""
+    if program.tool_point is None or any(isinstance(limit, LinearJoint) for limit in machine.own):
+        return None
+    return kinematics_of(machine, program.tool_point.length)
+
+
+def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:
+    """What makes setpoints of the joints of any samples of the plan's trajectory; None where that is one of the axes."""
+    chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
+    return None if chain is None else lambda samples: joint_setpoints(samples, chain)
+
+
+def of_axes(plan: Plan, samples: Trajectory) -> Trajectory:
+    """Samples of the plan's trajectory as the axes get them."""
+    made = joints_of(plan)
+    return samples if made is None else made(samples)
+
+
+def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
+    """(n, 3) unit vectors along the tool, from its tip to the spindle as seen from the workpiece, at samples of the plan's trajectory;
+    None where that is one of the axes."""
+    chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
+    if chain is None:
+        return None
+    columns = dict(zip(samples.axes, samples.position.T, strict=True))
+    return np.stack(np.broadcast_arrays(*chain.direction(in_rad(columns, samples.radius))), axis=1)
+
+
+def judged(setpoints: Trajectory, job: Judged) -> Verdict:
+    """The verdict on setpoints of the axes: in the joints and at the tip for a program with the tool centre point on.
+
+    Raises InputError as `verify` does.
+    """
+    chain = chain_of(job.program, job.machine)
+    how = {"given": job.given, "not_limited": job.not_limited, "progress": job.progress}
+    if chain is None:
+        return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
+    return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how).verdict()  # type: ignore[arg-type]
+
+
+def planned(
+    program: Program, machine: Machine, plan_on: Callable[[Program, Machine], Plan], *, joints: bool = True
+) -> Plan:
+    """The plan of a program by `plan_on`, through the kinematics where its tool centre point is on.
+
+    joints : whether `plan_on` keeps limits of joints; otherwise it is given those of the axes for the tip's coordinates
+    """
+    machine = limited(machine, program.limits)
+    chain = chain_of(program, machine)
+    if chain is None:
+        return plan_on(program, machine)
+    return in_joints(plan_on(program, at_tip(machine, chain, wide=WIDE if joints else None)), machine, chain)
+
+
+def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
+    """A plan of the tip with its setpoints of the joints, judged by them too: the verdict fails where one of both does."""
+    if plan.trajectory is None or plan.verdict is None:
+        return dataclasses.replace(plan, machine=machine)
+    began = time.perf_counter()
+    joints = joint_setpoints(plan.trajectory, chain)
+    found = verify_joints(
+        joints,
+        plan.toolpath,
+        machine,
+        tool_length=chain.length,
+        not_limited=_not_limited(plan.verdict),
+    ).verdict()
+    spent = plan.timings.get("verify", 0.0) + time.perf_counter() - began
+    return dataclasses.replace(
+        plan,
+        machine=machine,
+        joints=joints,
+        verdict=_both(plan.verdict, found),
+        timings={**plan.timings, "verify": spent},
+    )
+
+
+def _both(tip: Verdict, joints: Verdict) -> Verdict:
+    """The verdict on the motion of the tip, between its samples too, with the limits of the joints in place of those of its
+    coordinates, and with what the judgement of the setpoints found."""
+    limits = dict(joints.limits)
+    faults = {fault.sentence: fault for fault in (*tip.faults, *joints.faults)}
+    for name, check in tip.limits.items():
+        quantity, _, what = name.partition(".")
+        own = f"{quantity}.{what.removeprefix('joint ')}" if what else name
+        if what in ("x", "y", "z"):
+            continue  # the tip's own coordinates have no limits
+        if own not in limits or check.ratio > limits[own].ratio:
+            limits[own] = dataclasses.replace(check, name=own)
+    return dataclasses.replace(
+        tip,
+        passed=tip.passed and joints.passed,
+        limits=limits,
+        contour=max(tip.contour, joints.contour, key=lambda check: check.ratio),
+        contour_error_mm=_larger(tip.contour_error_mm, joints.contour_error_mm),
+        linear_error_mm=_larger(tip.linear_error_mm, joints.linear_error_mm),
+        angle_error_deg=_larger(tip.angle_error_deg, joints.angle_error_deg),
+        faults=tuple(faults.values()),
+        notes=tuple(dict.fromkeys((*tip.notes, *joints.notes))),
+    )
+
+
+def _larger(one: float | None, other: float | None) -> float | None:
+    return None if one is None or other is None else max(one, other)
+
+
+def _not_limited(verdict: Verdict) -> tuple[str, ...]:
+    return tuple(
+        dict.fromkeys(n.partition(".")[0] for n, check in verdict.limits.items() if not check.limited)
+    )

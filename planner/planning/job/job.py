@@ -1,0 +1,301 @@
+"""A job on its way to a plan: its stages, its notes, sampling and verification, and the plan at the end."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from planner.base.names import OPTIMAL, SECOND_ORDER
+from planner.baselines.lookahead.stop_moves import stop_time
+from planner.corners.budget import filter_rate, with_less_normal
+from planner.delivery import mending, periods
+from planner.delivery.filters import kept
+from planner.delivery.pacing import TimedT
+from planner.feedrate.solution import Status
+from planner.geometry.point_matching import SegmentsInOrder
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion.extruding import Extruding
+from planner.motion.on_demand import TrajectoryOnDemand
+from planner.motion.shaping import ShapedMotion
+from planner.motion.timing import MotionInTime, sample_motion
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Program
+from planner.planning.job.notes import job_notes
+from planner.planning.job.plan import Plan
+from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Tell
+from planner.sensitivity.records import NO_TABLES, Delivered, GridHistory, Making, Tables
+from planner.verifier import OF_CHORDS, verify
+
+FILTERS = "filters"
+# A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this share of its time [-].
+CHEAP = 1e-4
+# A motion that turns in less time than the filters are long is nearer to its path than the closed form says. Twice its acceleration is
+# as fast as 3 and 4 times for less processor time, and faster than once (40 jobs with filters, the first ones of the campaign behind
+# seed 70000).
+BOLDER = 2.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """A program on its way to a plan.
+
+    program   : the blocks as they were read
+    machine   : limits, interpolation period, filters
+    toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones (`with_share`,
+                delivery/periods.py)
+    stages    : the clock
+    noted     : what the method has noted so far (`note`)
+    judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
+    most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
+    slowed_by : what made one of the motions slower than its limits did, noted as it happens: `FILTERS` or nothing
+    """
+
+    program: Program
+    machine: Machine
+    toolpath: Toolpath
+    stages: Stages
+    noted: list[str] = field(default_factory=list)
+    judged: tuple[Machine, Toolpath] | None = None
+    most: float = np.inf
+    slowed_by: set[str] = field(default_factory=set)
+
+    @property
+    def real(self) -> tuple[Machine, Toolpath]:
+        """Machine and toolpath by which the motion is judged."""
+        return self.judged or (self.machine, self.toolpath)
+
+    def with_share(self, share: float, seen: float, *, curved: bool) -> Job:
+        """The job with smaller tolerances, so that the rest is left to the filters behind the setpoints.
+
+        share  : of the tolerances, 0 < share <= 1 [-]
+        seen   : of the lengths of the filters, as far as closed forms use them [-]
+        curved : whether the normal acceleration is limited to `BOLDER` times that by which filters take the rest
+
+        Only for machines with filters.
+        """
+        machine, toolpath = self.real
+        assert machine.fir is not None
+        by = seen * float(np.sqrt(share))  # T^2 over tolerance stays
+        lag = machine.fir.phase_lag_max
+        filters = {
+            "time_constants": tuple(by * T for T in machine.fir.time_constants),
+            "phase_lag_max": None if lag is None else by * lag,
+        }
+        planned = machine.model_copy(update={"fir": machine.fir.model_copy(update=filters)})
+        if curved:
+            # of the largest tolerance: where it is smaller, the filters' error is measured
+            rest = (1.0 - share) * float(toolpath.tolerance.max())
+            planned = with_less_normal(planned, BOLDER * rest / filter_rate(machine))
+        return dataclasses.replace(
+            self,
+            machine=planned,
+            toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
+            judged=(machine, toolpath),
+            noted=[],
+        )
+
+    def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
+        """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
+        return self.stages.stage(name)
+
+    @property
+    def tell(self) -> Tell:
+        """Tell of a step (planning/job/trace.py)."""
+        return self.stages.tell
+
+    def note(self, *sentences: str) -> None:
+        """Add sentences to the notes of the plan: what was given up, with the first line and a count. Repeated ones are dropped."""
+        for sentence in sentences:
+            if sentence not in self.noted:
+                self.noted.append(sentence)
+                self.tell("given up", what=sentence)
+
+    def afresh(self) -> Job:
+        """The same job with no notes, for another plan of it."""
+        return dataclasses.replace(self, noted=[])
+
+    @cached_property
+    def stop_time(self) -> float:
+        """Cycle time if every block ran from rest to rest [s], dwells included: the baseline of the plan."""
+        machine, toolpath = self.real
+        return stop_time(toolpath, machine)
+
+    @cached_property
+    def line_stop_time(self) -> float:
+        """The same with no stops between lines that go straight on [s]."""
+        machine, toolpath = self.real
+        return stop_time(toolpath, machine, join_lines=True)
+
+    def behind_filters(self, motion: TimedT) -> TimedT:
+        """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
+        with self.stage("filters"):
+            machine, toolpath = self.real
+            made = kept(motion, toolpath, machine)
+            if made.end > motion.end:
+                self.slowed_by.add(FILTERS)
+            return made
+
+    def deliver_in_time(self, motion: TimedT, *, as_it_is: bool = False) -> Delivered | None:
+        """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer than `most`."""
+        if motion.end <= self.most:
+            motion = self.behind_filters(motion)
+        return self.deliver(motion, as_it_is=as_it_is) if motion.end <= self.most else None
+
+    def deliver(
+        self, motion: MotionInTime, not_limited: tuple[str, ...] = (), *, as_it_is: bool = False
+    ) -> Delivered:
+        """Sample a motion at the interpolation period and have it judged, between the samples too.
+
+        not_limited : quantities that are reported and not judged, "jerk" for example
+        as_it_is    : whatever the verdict finds; else the motion is run slower where that mends it (delivery/mending.py). If only the
+                      chords between samples are in the way, and that costs more than `CHEAP`, a motion planned with less tolerance may
+                      be faster: then the motion is delivered as it is, with the slower one.
+
+        Standstills are added where the chords between samples would cut off a full stop (delivery/periods.py).
+        """
+        made, stands = self._delivered(motion, not_limited, 0)
+        if as_it_is or made.verdict.passed:
+            return made
+        slower, mended = motion, made
+        for again in range(mending.ROUNDS):
+            found = mending.mended(slower, stands, mended.verdict, self.real[0].dt, again)
+            if found is None:
+                return made
+            places = len(mended.verdict.excesses)
+            self.tell("slower in places", found=found.end, before=slower.end, places=places)
+            slower = found
+            mended, stands = self._delivered(slower, not_limited, again + 1)
+            if mended.verdict.passed:
+                break
+        if not mended.verdict.passed:
+            return made
+        if made.verdict.kinds & OF_CHORDS and slower.end > (1.0 + CHEAP) * motion.end:
+            return made._replace(slower=mended)
+        return mended
+
+    def _delivered(
+        self, motion: MotionInTime, not_limited: tuple[str, ...], seed: int
+    ) -> tuple[Delivered, periods.Standing]:
+        """Trajectory and verdict, and where the motion was made to stand longer.
+
+        seed : of the times at which the verifier looks; another one if a verdict was fed back into the motion
+        """
+        machine, toolpath = self.real
+        with self.stage("sample"):
+            stands = periods.standing(motion, toolpath, machine, "jerk" not in not_limited)
+            motion = periods.with_standstills(motion, stands)
+            whole = motion if toolpath.extrusion is None else Extruding(motion, toolpath, machine.dt)
+            trajectory = sample_motion(whole, machine.dt)
+            places = SegmentsInOrder(toolpath)
+
+            def take(chunk: Trajectory) -> None:
+                places.take(chunk.position, chunk.feed)
+
+            if isinstance(trajectory, TrajectoryOnDemand):
+                judged: Trajectory = trajectory.heard_by(take)
+            else:
+                take(trajectory)
+                judged = trajectory
+        with self.stage("verify") as progress:
+            verdict = verify(
+                judged,
+                toolpath,
+                machine,
+                motion=whole,
+                seed=seed,
+                not_limited=not_limited,
+                progress=progress,
+            )
+        return Delivered(self._named(trajectory, places), verdict, motion), stands
+
+    def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
+        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
+        method's own blocks and a note."""
+        toolpath, runs = self.real[1], places.runs()
+        if runs is None:
+            self.note(
+                "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
+            )
+            return trajectory
+        first, segment = runs
+        if isinstance(trajectory, TrajectoryOnDemand):
+            return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
+        segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))
+        return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
+
+    def plan(
+        self,
+        made: Delivered | None,
+        *,
+        method: str,
+        corner: str | None,
+        solver: str,
+        status: Status,
+        sentence: str,
+        grid_points: int,
+        tables: Tables = NO_TABLES,
+    ) -> Plan:
+        """The plan of the job.
+
+        made : None if the job could not be solved
+
+        The other arguments are fields of `Plan`.
+        """
+        trajectory, verdict = (None, None) if made is None else (made.trajectory, made.verdict)
+        held: dict[str, Any] = {} if tables.grid is None else {"held_by": _largest_shares(tables.grid)}
+        self.tell(
+            "plan",
+            found=np.nan if trajectory is None else trajectory.cycle_time,
+            method=method,
+            corner=corner or "none",
+            points=grid_points,
+            passed=verdict is not None and verdict.passed,
+            **held,
+        )
+        self._note_ringing(made, method)
+        return Plan(
+            method=method,
+            corner=corner,
+            solver=solver,
+            program=self.program,
+            machine=self.real[0],
+            toolpath=self.real[1],
+            status=status,
+            sentence=sentence,
+            trajectory=trajectory,
+            verdict=verdict,
+            rounded=tables.rounded,
+            grid=tables.grid,
+            stop_time=self.stop_time,
+            grid_points=grid_points,
+            prices=tables.prices,
+            making=None if made is None else Making(made.motion, made.slower, tables.pricing),
+            notes=(*job_notes(self.program, *self.real), *self.noted),
+            timings=self.stages.timings,
+        )
+
+    def _note_ringing(self, made: Delivered | None, method: str) -> None:
+        """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
+        shaped = made is None or isinstance(made.motion, ShapedMotion)
+        if self.machine.modes and not shaped and method != "fir":
+            can = (
+                "give --shaped"
+                if method in (OPTIMAL, SECOND_ORDER)
+                else f"{OPTIMAL} and {SECOND_ORDER} do with --shaped"
+            )
+            self.note(
+                f"method {method} does not shape its setpoints for the machine's vibration modes; {can}"
+            )
+
+
+def _largest_shares(grid: GridHistory) -> str:
+    """The three limits that hold a motion longest."""
+    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents()[:3])

@@ -1,0 +1,102 @@
+"""What a plan assumed and what it gave up: short sentences, each with its first line and a count.
+
+The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the method.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
+from planner.geometry.curves import CHORD_SHARE
+from planner.geometry.toolpath import Toolpath
+from planner.machine import ROTARY_AXES, Machine
+from planner.nc.program import Kind, Program
+from planner.planning.job.plausible import short_block_notes, unit_notes
+
+# A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is rounded by more has
+# little left of its shape.
+TOLERANCE_OF_PART = 0.02
+
+
+def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
+    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a tolerance that is large beside
+    the part."""
+    return [
+        *program.notes,
+        *unit_notes(machine),
+        *_feed_notes(program, machine),
+        *_spline_notes(program, toolpath),
+        *_extruder_notes(toolpath),
+        *_radius_notes(toolpath, machine),
+        *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
+    ]
+
+
+def _feed_notes(program: Program, machine: Machine) -> list[str]:
+    if machine.feed_max is None:
+        return []
+    above = np.flatnonzero(np.isfinite(program.feed) & (program.feed > machine.feed_max))
+    if not len(above):
+        return []
+    highest = float(program.feed[above].max()) * SECONDS_PER_MINUTE
+    return [
+        f"line {program.line[above[0]]}: F above the machine's feed_max is planned at "
+        f"{machine.feed_max * SECONDS_PER_MINUTE:g} mm/min ({len(above):,} blocks, up to F{highest:g})"
+    ]
+
+
+def _spline_notes(program: Program, toolpath: Toolpath) -> list[str]:
+    if not len(program.splines):
+        return []
+    chords = np.flatnonzero(toolpath.straight & (program.kind[toolpath.block] == Kind.SPLINE))
+    if not len(chords):
+        return []
+    return [
+        f"line {toolpath.line[chords[0]]}: the spline all but stands still, at a control point on its end or at a cusp, where its "
+        f"curvature has no bound; a chord of {toolpath.length[chords[0]]:.3g} mm stands for it there, within {CHORD_SHARE:.0%} of the "
+        f"tolerance ({len(chords):,} chords)"
+    ]
+
+
+def _extruder_notes(toolpath: Toolpath) -> list[str]:
+    fed = toolpath.extrusion
+    if fed is None or not len(fed.at):
+        return []
+    at = np.unique(fed.at)
+    line = int(toolpath.line[max(int(fed.at[0]) - 1, 0)])
+    return [
+        f"line {line}: the extruder moves alone behind it while the axes wait ({len(fed.at):,} such moves; with dwells beside them "
+        f"{float(toolpath.dwell[at].sum()):.4g} s)"
+    ]
+
+
+def _radius_notes(toolpath: Toolpath, machine: Machine) -> list[str]:
+    if machine.rotary_radius is not None or not set(toolpath.axes) & set(ROTARY_AXES) or not len(toolpath):
+        return []
+    angle = float(toolpath.tolerance.min()) / (machine.radius * RAD_PER_DEG)
+    return [
+        f"rotary axes are measured at {machine.radius:g} mm, so that their tolerance is {angle:.3g} degrees; rotary_radius or "
+        "tolerance_angle in the machine file says another"
+    ]
+
+
+def _tolerance_notes(toolpath: Toolpath) -> list[str]:
+    if not len(toolpath):
+        return []
+    moved = ~toolpath.rapid if not toolpath.rapid.all() else np.ones(len(toolpath), bool)
+    arc = toolpath.arc[moved & (toolpath.arc >= 0)]
+    points = np.vstack(
+        [toolpath.start[moved], toolpath.end[moved], toolpath.curves.points.reshape(-1, len(toolpath.axes))]
+    )
+    swept = np.minimum(2.0 * toolpath.arcs.radius[arc], toolpath.length[moved & (toolpath.arc >= 0)])
+    part = float(max(np.ptp(points, axis=0).max(), swept.max(initial=0.0)))
+    joint = int(toolpath.tolerance.argmax())
+    tolerance = float(toolpath.tolerance[joint])
+    if tolerance <= TOLERANCE_OF_PART * part:
+        return []
+    line = int(toolpath.line[max(joint - 1, 0)])
+    return [
+        f"line {line}: the tolerance of {tolerance:g} mm is {tolerance / part:.3g} times the part's largest extent, {part:.4g} mm: "
+        "little may be left of its shape"
+    ]

@@ -1,0 +1,116 @@
+"""The record of a finished job: what was asked, what was found, and the verdict on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from planner.base.errors import NotSolvedError
+from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
+from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Program
+from planner.planning.job.beside import Beside, beside_motion
+from planner.planning.job.shown import Shown
+from planner.sensitivity.records import CornerTable, Delivered, GridHistory, Making, PriceList
+from planner.verifier import CornerCheck, Verdict
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Plan(Shown):
+    """A planned job: its records, and how it shows itself in Python and notebooks (shown.py).
+
+    method, solver      : names of what was used
+    corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where no corner is rounded
+    program, machine    : what was planned, and for which machine
+    toolpath            : the exact programmed path with its tolerances
+    status, sentence    : how the solution ended
+    trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless solved
+    joints              : of a program with the tool centre point on: the same motion as setpoints of the joints; `trajectory` is that
+                          of the tip
+    rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
+    grid                : the profile at the grid points, or None
+    prices              : cycle time saved per limit, or None where the solver gives no multipliers
+    making              : of a plan on its way what only planning needs; None in a finished one, and unless solved
+    stop_time           : cycle time if every block ran from rest to rest [s], dwells included
+    grid_points         : number of grid points of the problem that was solved
+    notes               : what was assumed and what was given up, each with its first line and a count
+    timings             : computing time by stage [s]
+    """
+
+    method: str
+    corner: str | None
+    solver: str
+    program: Program
+    machine: Machine
+    toolpath: Toolpath
+    status: Status
+    sentence: str
+    trajectory: Trajectory | None
+    verdict: Verdict | None
+    rounded: CornerTable | None
+    grid: GridHistory | None
+    stop_time: float
+    grid_points: int
+    joints: Trajectory | None = None
+    prices: PriceList | None = None
+    making: Making | None = None
+    notes: tuple[str, ...] = ()
+    timings: dict[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Program, machine, method, cycle time and verdict, in a line."""
+        verdict = "not solved" if self.verdict is None else "passed" if self.verdict.passed else "failed"
+        time = "" if self.trajectory is None else f"{self.trajectory.cycle_time:.4f} s, "
+        source = self.program.source.replace("\\", "/").rpartition("/")[2]
+        return f"<Plan of {source} on {self.machine.name} by {self.method}: {time}{verdict}>"
+
+    @property
+    def cycle_time(self) -> float:
+        """Duration of the motion [s]. Raises NotSolvedError if there is none."""
+        if self.trajectory is None:
+            raise NotSolvedError(self.sentence)
+        return self.trajectory.cycle_time
+
+    @property
+    def setpoints(self) -> Trajectory | None:
+        """What the axes get: the joints' motion where the tool centre point is on, else the trajectory."""
+        return self.trajectory if self.joints is None else self.joints
+
+    @property
+    def geometry(self) -> str | None:
+        """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself; None where no corner is
+        rounded."""
+        if self.corner is None:
+            return None
+        return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
+
+    @property
+    def beside(self) -> tuple[Beside, ...]:
+        """What happens while the axes stand still, tool changes for example, and how long it takes; no part of the cycle time."""
+        return beside_motion(self.program, self.machine)
+
+    def delivering(self, made: Delivered, **changes: Any) -> Plan:
+        """The plan with another motion, which has its prices, and with other `changes` of its fields."""
+        pricing = self.making.pricing if self.making is not None else None
+        making = Making(made.motion, made.slower, pricing)
+        motion: dict[str, Any] = {"trajectory": made.trajectory, "verdict": made.verdict, "making": making}
+        return replace(self, **motion | changes)
+
+    @property
+    def solved(self) -> bool:
+        """True if there is a trajectory."""
+        return self.trajectory is not None
+
+    @property
+    def corners(self) -> CornerCheck | None:
+        """Eq. 18-20 at every programmed corner, as the verdict found them; None unless solved."""
+        return self.verdict.corners if self.verdict is not None else None
+
+    def require(self) -> Plan:
+        """Return the plan itself. Raises NotSolvedError with `sentence` if there is no trajectory."""
+        if not self.solved:
+            raise NotSolvedError(self.sentence)
+        return self

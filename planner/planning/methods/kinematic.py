@@ -1,0 +1,247 @@
+"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their speeds.
+
+1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where that is faster; curves are
+   always cut.
+2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry acceleration, entry
+   deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
+3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
+   is fastest (baselines/lookahead/look_ahead.py).
+4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the motion itself, nothing is
+sampled.
+
+A run between full stops that is not faster than stopping at every block is made as method `stop` makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.point_to_point import rest_to_rest_times
+from planner.baselines.lookahead.corner_pieces import along_axes, corner_pieces
+from planner.baselines.lookahead.kinematic_corners import corner_passages, fitted, leg_limits
+from planner.baselines.lookahead.look_ahead import look_ahead
+from planner.baselines.lookahead.passage import LegLimits, Passage
+from planner.baselines.lookahead.ramps import JointKind
+from planner.baselines.lookahead.rest_to_rest import block_limits
+from planner.corners import kinematic as corner
+from planner.corners.budget import error_rate, normal_at_corners, normal_within_budget
+from planner.feedrate.solution import Status
+from planner.geometry.build import COLLINEAR_ANGLE
+from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
+from planner.geometry.legs import Legs, legs_of
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.motion.axis_motion import AxisMotion
+from planner.nc.program import PathControl
+from planner.planning.job.job import Job
+from planner.planning.job.method import CLOSED_FORM_WAYS, Method
+from planner.planning.job.plan import Plan
+from planner.sensitivity.records import CornerTable, Tables
+
+# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill
+# their chords: those leave the vertex by 2/3 to 1 of the sagitta.
+CHORD_FRACTION = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class KinematicMethod(Method):
+    """Kinematic corners with look-ahead.
+
+    start_stop    : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at
+                    the vertex where no axis steps by more. Such a step breaks the limits of acceleration and jerk, and the verdict
+                    says so
+    short_segment : paper 003's factor k, 0 < k <= 1, on the speed that a leg can reach; 1 uses short legs completely
+    """
+
+    start_stop: float = 0.0
+    short_segment: float = 1.0
+
+    ways = CLOSED_FORM_WAYS
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start_stop < np.inf:
+            raise InputError(f"start_stop = {self.start_stop} mm/s; it must be finite and not negative")
+        if not 0 < self.short_segment <= 1:
+            raise InputError(f"short_segment = {self.short_segment}; allowed are 0 < k <= 1")
+
+    def plan_job(self, job: Job) -> Plan:
+        exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
+        job.note(*_curve_notes(job.toolpath, exact))
+        with job.stage("solve"):
+            chain = self._chain(job.toolpath, job.machine, exact)
+            motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
+        made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)
+        with job.stage("report"):
+            rounded = _corner_table(chain, job.machine)
+        return job.plan(
+            made,
+            method="kinematic",
+            corner="kinematic",
+            solver="look-ahead",
+            status=Status.OPTIMAL,
+            sentence=_sentence(chain),
+            grid_points=len(chain.path) + 1,
+            tables=Tables(rounded=rounded),
+        )
+
+    def _chain(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Chain:
+        """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the path."""
+        curved = toolpath.arc >= 0
+        whole = curved & (exact | _faster_whole(toolpath, machine))
+        while True:
+            chain = self._look_ahead(toolpath, machine, whole)
+            slow = curved & ~whole & _slower_than_stops(chain, toolpath, machine)
+            if not slow.any():
+                return chain
+            whole |= slow
+
+    def _look_ahead(self, toolpath: Toolpath, machine: Machine, whole: Array) -> _Chain:
+        """The chain with the arcs `whole` (M,) as they are, and all others as chords."""
+        lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
+        path = legs_of(lines)
+        legs = leg_limits(path, lines, machine)
+        free = corner_passages(path, lines, legs, machine, self.start_stop)
+        fitting = [fitted(way, legs) for way in free]
+        passage, time = look_ahead(legs, fitting, self.short_segment)
+        return _Chain(
+            lines=lines, path=path, legs=legs, free=free, fitting=fitting, passage=passage, time=time
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Chain:
+    """A program as a chain of n legs with n+1 joints, and how the look-ahead passes them.
+
+    lines   : the toolpath with its arcs as chords
+    path    : its legs
+    legs    : what they allow
+    free    : the candidates by themselves
+    fitting : the candidates that fit on their legs
+    passage : what was chosen
+    time    : (n+1,) when each joint's corner is over, standstills not counted [s]
+    """
+
+    lines: Toolpath
+    path: Legs
+    legs: LegLimits
+    free: list[Passage]
+    fitting: list[Passage]
+    passage: Passage
+    time: FloatArray
+
+    @property
+    def turns(self) -> Array:
+        """(n+1,) True where there is a corner to be taken."""
+        at = self.path.first
+        return (self.lines.joint[at] == Joint.CORNER) & (self.lines.theta[at] >= COLLINEAR_ANGLE)
+
+
+def _curve_notes(toolpath: Toolpath, exact: Array) -> list[str]:
+    """What is to be said of splines whose blocks are among the `exact` (M,) ones."""
+    found = np.flatnonzero((toolpath.curve >= 0) & exact)
+    if not len(found):
+        return []
+    blocks = len(np.unique(toolpath.block[found]))
+    return [
+        f"line {toolpath.line[found[0]]}: G61 asks for the exact path; method kinematic runs splines as chords within the tolerance "
+        f"({blocks} blocks)"
+    ]
+
+
+def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
+    """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners between these."""
+    arc = np.flatnonzero(toolpath.arc >= 0)
+    whole = np.zeros(len(toolpath), bool)
+    count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
+    chord = toolpath.length[arc] / count[arc]
+    bend = np.minimum(toolpath.curvature[arc] * chord, np.pi)
+    a, j = (machine.limits(q, toolpath.axes).max() / bend for q in ("acceleration", "jerk"))
+    speed = np.minimum(corner.speed_from_approach(chord / 2, a, j), toolpath.feed[arc])
+    limits = (limit[arc] for limit in block_limits(toolpath, machine))
+    whole[arc] = toolpath.length[arc] / speed > rest_to_rest_times(toolpath.length[arc], *limits)
+    return whole
+
+
+def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> Array:
+    """(M,) True for the segments between two full stops that take longer than if every block ran from rest to rest."""
+    lines, at = chain.lines, chain.path.first
+    stop = np.flatnonzero(lines.joint[at] == Joint.STOP)
+    lasting = np.diff(chain.time[stop])
+    first = np.searchsorted(toolpath.block, lines.block[np.minimum(at[stop], len(lines) - 1)])
+    first[-1] = len(toolpath)
+    times = rest_to_rest_times(toolpath.length, *block_limits(toolpath, machine))
+    return np.repeat(lasting > np.add.reduceat(times, first[:-1]), np.diff(first))
+
+
+def _motion(chain: _Chain, axes: tuple[str, ...], radius: float) -> AxisMotion:
+    """The pieces of legs and corners, along the axes."""
+    pieces = corner_pieces(chain.passage, chain.legs, chain.path, chain.lines.dwell[chain.path.first])
+    position, velocity, acceleration, jerk = along_axes(pieces, chain.path, chain.lines)
+    end = np.cumsum(pieces.rows.duration)
+    return AxisMotion(
+        axes=axes,
+        radius=radius,
+        t=np.insert(end[:-1], 0, 0.0),
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        block=chain.lines.block[pieces.segment],
+        line=chain.lines.line[pieces.segment],
+        end=float(end[-1]),
+    )
+
+
+def _corner_table(chain: _Chain, machine: Machine) -> CornerTable:
+    """The corners that are run through, at their apexes."""
+    kind, V, p, q = (getattr(chain.passage, name) for name in ("kind", "V", "p", "q"))
+    k = np.flatnonzero((kind == JointKind.ZERO) | (kind == JointKind.ENTRY))
+    lines, at, u = chain.lines, chain.path.first[k], chain.path.table["direction"]
+    V, p, q, zero = V[k], p[k], q[k], kind[k] == JointKind.ZERO
+    theta, tol = lines.theta[at], lines.tolerance[at]
+    s, c = np.sin(theta / 2), np.cos(theta / 2)
+    T1, _ = corner.phase_times(V, p, q)
+    length = np.where(zero, corner.approach(V, p, q), corner.entry_length(V, p, q))
+    middle = np.where(zero, corner.middle(V, p, q), length / 8)
+    normal = np.where(zero, 2 * s * V / T1, s * corner.entry_acceleration(V, p, q))
+    speed = c * V * np.where(zero, 1.0, 0.5)
+    reachable = normal_at_corners(machine, lines.axes, u[k - 1], u[k])
+    largest = normal_within_budget(tol, 2 * s * middle, reachable, error_rate(machine))
+    return CornerTable(
+        line=lines.line[at - 1],
+        theta=theta,
+        d_in=length,
+        d_out=length,
+        tol_ap=2 * s * middle,
+        kappa_max=normal / speed**2,
+        feed_closed_form=speed * np.sqrt(largest / normal),
+        feed_planned=speed,
+        limited_by=_limited_by(chain, k),
+    )
+
+
+def _limited_by(chain: _Chain, k: Array) -> Array:
+    """What keeps each of the corners k from being taken faster."""
+    V, kind = chain.passage.V[k], chain.passage.kind[k]
+    said = np.full(len(k), "look-ahead", dtype=object)
+    for free, fitting in zip(chain.free, chain.fitting, strict=True):
+        mine = free.kind[k] == kind
+        said[mine & (fitting.V[k] == V)] = "leg length"
+        said[mine & (free.V[k] == V)] = "tolerance"
+    said[np.minimum(chain.legs.v[k - 1], chain.legs.v[k]) == V] = "feed"
+    return said.astype(str)
+
+
+def _sentence(chain: _Chain) -> str:
+    """What the plan says of its corners."""
+    turns, kind = chain.turns, chain.passage.kind
+    if not turns.any():
+        return "there is no corner between full stops; every run takes the shortest time"
+    stops, steps = (int((turns & (kind == which)).sum()) for which in (JointKind.STOP, JointKind.PASS))
+    text = f"{int(turns.sum()) - stops} corners are run through"
+    text += f", {steps} of them with a step of velocity, which breaks acceleration and jerk" if steps else ""
+    return text + (f", {stops} are full stops because that is faster" if stops else "")

@@ -1,0 +1,59 @@
+"""`planner.methods`: the names of the methods. Printed, it says what each is; `planner.methods["kinematic"]` is one to be planned
+with."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from planner.base.names import METHODS
+
+if TYPE_CHECKING:
+    from planner.planning.job.method import Method
+
+
+class MethodNames:
+    """The names of the methods, in the order of the documentation; each with a sentence, and the method by its name."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(METHODS)
+
+    def __len__(self) -> int:
+        return len(METHODS)
+
+    def __contains__(self, name: object) -> bool:
+        return name in METHODS
+
+    def __getitem__(self, name: str) -> Method:
+        """The method of a name, with its usual settings. Raises InputError for an unknown name."""
+        made: Method = import_module("planner.planning.methods.registry").make_method(name)
+        return made
+
+    def about(self) -> dict[str, str]:
+        """What each method is, in a sentence, by its name."""
+        return {
+            name: _sentence(entry.home, plain="plain" in entry.settings) for name, entry in METHODS.items()
+        }
+
+    def __repr__(self) -> str:
+        width = max(map(len, METHODS))
+        return "\n".join(f"{name:{width}}  {said}" for name, said in self.about().items())
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td><b>{name}</b></td><td>{said}</td></tr>" for name, said in self.about().items()
+        )
+        return f"<table>{rows}</table>"
+
+
+def _sentence(home: str, plain: bool) -> str:
+    """The first sentence of the docstring of the class at `home`."""
+    module, _, name = home.partition(":")
+    said = (inspect.getdoc(getattr(import_module(module), name)) or "").partition("\n\n")[0]
+    first = " ".join(said.split()).rstrip(".")
+    return f"{first}: the paper's rules as they are" if plain else first
+
+
+methods = MethodNames()

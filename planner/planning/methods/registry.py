@@ -1,0 +1,195 @@
+"""The methods by their names (`planner.base.names`), and `plan`, the one call that does a whole job."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Sequence
+from importlib import import_module
+from numbers import Integral
+from pathlib import Path
+from typing import Any, TypedDict, Unpack, cast
+
+from planner.base.errors import InputError
+from planner.base.names import (
+    BEZIER,
+    METHODS,
+    SINGLE_CORNERS,
+    effort_name,
+    method_name,
+    smoothing,
+    solver_name,
+    users_of,
+)
+from planner.corners.smooth import CornerShape
+from planner.machine import Machine, load_machine
+from planner.machine.user_limit import OwnLimit
+from planner.nc.program import Program
+from planner.nc.reader import read_program
+from planner.nc.reading import AS_USUAL, Reading
+from planner.planning.job.at_tip import planned
+from planner.planning.job.method import Method
+from planner.planning.job.plan import Plan
+from planner.planning.job.stages import Progress, Stages
+from planner.planning.job.trace import Log
+
+DEFAULT_MACHINE = "mill"
+
+
+class MethodSettings(TypedDict, total=False):
+    """Settings of methods "optimal" and "second-order"; None, or left out, for the method's own.
+
+    geometry : how the path is smoothed: "spline" (one spline from stop to stop), "corners" (each corner by itself) or "auto" (splines,
+               or corners where they take less time); None for "auto", or for "corners" where `corner` is given
+    corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
+    solver   : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
+               the first of them
+    effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped; None for "normal"
+    rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for those of
+               the effort, fewer where they gain nothing
+    shaped   : deliver setpoints that leave the machine's vibration modes at rest
+    """
+
+    geometry: str | None
+    corner: str | CornerShape | None
+    solver: str | None
+    effort: str | None
+    rounds: int | None
+    shaped: bool | None
+
+
+def plan(
+    program: Program | str | Path,
+    machine: Machine | str | Path | None = None,
+    *,
+    method: str | Method = "optimal",
+    limits: OwnLimit | Sequence[OwnLimit] = (),
+    tolerance: float | None = None,
+    reading: Reading = AS_USUAL,
+    progress: Progress | None = None,
+    log: Log | None = None,
+    **settings: Unpack[MethodSettings],
+) -> Plan:
+    """Plan, sample and verify the motion of an NC program.
+
+    program   : a file, or a program read before
+    machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
+    method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
+    settings  : geometry, corner, solver, effort, rounds, shaped: `MethodSettings`
+    limits    : of your own, one or several, beside the machine's (docs/extending.md): "optimal" and "second-order"
+                keep them, the verdict judges every method by them
+    tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
+    reading   : what is refused, left out and assumed in a program file
+    progress  : called with the stage's name and the fraction done (0 to 1)
+    log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
+
+    Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
+    NotSolvedError.
+
+    Raises InputError for a program or machine that cannot be read, naming file, line and column, for a machine with a value that no
+    machine file may have, for an unknown name, and for a setting that the method does not use.
+    """
+    if not isinstance(method, str | Method):
+        raise InputError(f"method = {method}: give a name, {', '.join(METHODS)}, or a method")
+    given = check_settings(method, **settings)
+    joints = not isinstance(method, str) or METHODS[method_name(method)].joints
+    if isinstance(method, str):
+        method = make_method(method, **given)
+    if not isinstance(machine, Machine):
+        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    machine.check()
+    if not isinstance(limits, Sequence):
+        limits = (limits,)
+    if limits:
+        machine = machine.with_own((*machine.own, *limits))
+
+    def on(read: Program, used: Machine) -> Plan:
+        return method.plan(read, used, tolerance, progress, log)
+
+    if isinstance(program, Program):
+        if reading != AS_USUAL:
+            raise InputError("reading: the program is read already; give the settings to read_program")
+        return planned(program, machine, on, joints=joints)
+    stages = Stages(progress)
+    with stages.stage("read"):
+        program = read_program(program, machine, reading)
+    made = planned(program, machine, on, joints=joints)
+    return dataclasses.replace(made, timings=stages.timings | made.timings)
+
+
+def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
+    """The method of that name with these settings.
+
+    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a negative number of rounds.
+    """
+    given = _given(settings)
+    entry = METHODS[method_name(name)]
+    made: dict[str, Any] = dict(entry.settings)
+    if entry.shapes:
+        kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
+        made |= {"corner": shape or kind, "rounds": given.get("rounds"), "shaped": bool(given.get("shaped"))}
+        if (effort := given.get("effort")) is not None:
+            made["effort"] = effort_name(effort)
+    if entry.solvers and (solver := given.get("solver")) is not None:
+        made["solver"] = solver_name(solver)
+    module, _, class_name = entry.home.partition(":")
+    method = getattr(import_module(module), class_name)(**made)
+    assert isinstance(method, Method)
+    return method
+
+
+def check_settings(method: str | Method = "optimal", **settings: Unpack[MethodSettings]) -> MethodSettings:
+    """The settings that are set. Raises InputError for an unknown name and for a setting that the method does not use."""
+    given = _given(settings)
+    _check_used(method_name(method) if isinstance(method, str) else method, given)
+    return given
+
+
+def _given(settings: MethodSettings) -> MethodSettings:
+    """The settings that are set. Raises TypeError for others than those of `MethodSettings`, and InputError for values that are none of
+    theirs, in as far as names do not say it."""
+    unknown = settings.keys() - MethodSettings.__annotations__.keys()
+    if unknown:
+        wrong, allowed = min(unknown), (*MethodSettings.__annotations__, "tolerance", "limits", "reading")
+        near = difflib.get_close_matches(wrong, allowed, n=1, cutoff=0.4)
+        hint = f" (did you mean '{near[0]}'?)" if near else ""
+        raise TypeError(f"unexpected keyword argument '{wrong}'; settings are {', '.join(allowed)}{hint}")
+    given = {name: value for name, value in settings.items() if value is not None and value is not False}
+    rounds, corner, shaped = (given.get(name) for name in ("rounds", "corner", "shaped"))
+    if "rounds" in given and not (isinstance(rounds, Integral) and int(rounds) >= 0):
+        raise InputError(f"{rounds} rounds; it must be 0 or more, a whole number")
+    if "corner" in given and not (isinstance(corner, str) or hasattr(corner, "at")):
+        raise InputError(f"corner = {corner}: give the name of a shape, or a shape of your own")
+    if "shaped" in given and shaped is not True:
+        raise InputError(f"shaped = {shaped!r}: it is True or False")
+    return cast(MethodSettings, given)
+
+
+def _check_used(method: str | Method, given: MethodSettings) -> None:
+    """Raise InputError for a setting that the method would ignore."""
+    for setting, value in given.items():
+        if isinstance(method, Method):
+            raise InputError(
+                f"{setting} = {value} beside a method with settings of its own: {method!r}; set it there"
+            )
+        if method not in users_of(setting):
+            raise InputError(
+                f"{setting} = {value}: method {method} does not use it; it is for {' and '.join(users_of(setting))}"
+            )
+        if setting == "solver" and value not in METHODS[method].solvers:
+            raise InputError(
+                f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
+            )
+    if "rounds" in given:
+        kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
+        if kind == SINGLE_CORNERS:
+            raise InputError(f"rounds = {given['rounds']}: they reshape splines; {shape} corners have none")
+
+
+def _smoothing(
+    geometry: str | None, corner: str | CornerShape | None
+) -> tuple[str, str | CornerShape | None]:
+    """The geometry and the corner shape that are meant. Raises InputError for names that do not go together."""
+    if corner is None or isinstance(corner, str):
+        return smoothing(geometry, corner)
+    return smoothing(geometry, BEZIER)[0], corner  # a shape of one's own goes where the usual one goes

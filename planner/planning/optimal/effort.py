@@ -1,0 +1,144 @@
+"""How much work a plan is worth: grids and rounds of reshaping for `--effort quick`, `normal` and `best`.
+
+Splines are reshaped on a coarse grid, on which motions take up to 1e-2 longer than on a fine one; which of two shapes is faster it
+tells better than that. The last shape is solved again on the final grid, that of the plan. The error of a grid goes with the
+square of its intervals, and so do its points with the root of its resolution: 16 times finer are about 4 times as many points.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from planner.base.names import BEST, NORMAL, QUICK
+from planner.base.sizes import SIZES
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import CornerShape
+from planner.joint.guess import Cut
+from planner.planning.optimal.order import Order
+
+# Interpolation error of the axis accelerations on the coarsest grid [share of the limit] (feedrate/sampling/samples.py). Rounds of
+# reshaping on a quarter of it end 2e-3 faster on the bracket and take 1.6 times as long.
+COARSE = 3.2e-2
+
+
+# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral, 2,000 chords and a relief
+# of 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to 1.34 times the time.
+FIRST_CUT, SECOND_CUT = Cut(per_unit=1.0, of_leg=1.0), Cut(per_unit=4.0, of_leg=1.0)
+FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
+# For the best of efforts: on those jobs 1.2e-5 to 2e-5 more.
+BEST_CUT, BEST_GAP = Cut(per_unit=8.0, of_leg=2.0), 1e-6
+
+
+class Grids(NamedTuple):
+    """Resolutions for a job that has `points` points at most on a grid of the resolution `COARSE`."""
+
+    points: float
+    rounds: float  # of the grid on which splines are reshaped
+    final: float  # of the grid of the plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How a motion is searched for geometry and feed together (planning/methods/free.py).
+
+    steps_max : of constant jerk that it may have
+    kept      : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
+    cut       : how finely the first motion is cut into steps
+    gap       : complementarity at the end, share of the time [-]
+    finer     : how finely what is found is cut once more, and the gap of the search from there, one after the other
+    again     : begin with a plan where that leaves something
+    small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a step is at least
+                an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the time for 2e-3 less motion
+    """
+
+    steps_max: float
+    kept: float = 0.05
+    cut: Cut = FIRST_CUT
+    gap: float = FIRST_GAP
+    finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
+    again: bool = True
+    small: float = float("inf")
+
+    def of(self, steps: int) -> Search:
+        """That of a motion of so many steps."""
+        return self if steps <= self.small else dataclasses.replace(self, finer=(), again=False)
+
+
+# Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two processors. Steps of a small one.
+STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
+THOROUGH = Search(steps_max=float("inf"), kept=-1.0, finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """What a plan is worth.
+
+    work   : grid points, counted over all rounds of reshaping
+    rounds : of reshaping at most
+    left   : no more of them where one promises less than this share of the time [-]
+    sizes  : grids by the size of the job, ascending
+    search : for geometry and feed together
+    """
+
+    work: int
+    rounds: int
+    left: float
+    sizes: tuple[Grids, ...]
+    search: Search
+
+    def grids(self, points: int) -> Grids:
+        """The grids for a job that has so many points on a grid of the resolution `COARSE`."""
+        return next(size for size in self.sizes if points <= size.points)
+
+
+# Rounds: on the bracket the first two gain 2.5e-2 of the time, the next four 5e-3, and the next four 5e-4. Final grids: motions on
+# 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
+# on 2e-4 (zig-zag on mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the
+# coarse grid leave small jobs 1e-3 slower.
+_TINY, _FEW, _MANY = SIZES.small_grids
+_LARGE = Grids(float("inf"), COARSE, 8e-3)
+EFFORTS = {
+    QUICK: Effort(
+        work=25_000,
+        rounds=2,
+        left=1e-3,
+        search=Search(steps_max=SMALL, finer=(), again=False),
+        sizes=(_LARGE,),
+    ),
+    NORMAL: Effort(
+        work=150_000,
+        rounds=40,
+        left=1e-5,
+        search=Search(steps_max=STEPS_MAX, small=SMALL),
+        sizes=(Grids(_TINY, 2e-3, 2e-4), Grids(_FEW, 8e-3, 5e-4), Grids(_MANY, COARSE, 2e-3), _LARGE),
+    ),
+    BEST: Effort(
+        work=5_000_000,
+        rounds=100,
+        left=1e-6,
+        search=THOROUGH,
+        sizes=(Grids(_FEW, 2e-3, 2e-4), Grids(_MANY, 8e-3, 5e-4), Grids(10.0 * _MANY, COARSE, 2e-3), _LARGE),
+    ),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a job is planned on a smooth path.
+
+    method : what the plan is called
+    corner : "auto", "spline", the name of a corner shape, or a shape
+    order  : which limits are kept, and the solver for them
+    bezier : the corner of "bezier", and where there is no spline
+    effort : grids and rounds of reshaping
+    rounds : of reshaping; None for those of the effort
+    """
+
+    method: str
+    corner: str | CornerShape
+    order: Order
+    bezier: CornerShape = field(default_factory=BezierCorner)
+    effort: Effort = EFFORTS[NORMAL]
+    rounds: int | None = None

@@ -1,0 +1,61 @@
+"""The time-optimal motion on a path: what the stages of the loop (planning/optimal/loop.py) hand to each other."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.constraints import normal_limit
+from planner.feedrate.constraints.limits import FILTER_ERROR
+from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.solution import FeedrateSolution
+from planner.motion.time_law import law_of_solution
+from planner.motion.timing import Motion
+from planner.smoothing.spline_path import SplineShape
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OnPath:
+    """A smooth path and the time-optimal motion on it.
+
+    path     : rounded corners or splines
+    samples  : its grid
+    problem  : the feedrate problem on the grid
+    solution : the motion, or the status of a failure
+    shape    : what the path's splines are made of, if it has some that may be reshaped
+    notes    : sentences on what was given up
+    """
+
+    path: SmoothPath
+    samples: PathSamples
+    problem: FeedrateProblem
+    solution: FeedrateSolution
+    shape: SplineShape | None = None
+    notes: tuple[str, ...] = ()
+
+    def faster_than(self, other: OnPath) -> bool:
+        """True if this motion was found and takes less time than another that was found."""
+        return self.solution.solved and self.solution.cycle_time < other.solution.cycle_time
+
+    def held_by_filters(self) -> OnPath:
+        """The same, if the normal acceleration is limited for what is behind the setpoints: then no limit of the machine holds it."""
+        problem = self.problem
+        names = tuple(
+            FILTER_ERROR.name if name == normal_limit.NAME else name for name in problem.bound_names
+        )
+        first = np.array([names.index(name) for name in names])
+        problem = dataclasses.replace(problem, bound_names=names, feed_sq_bound=first[problem.feed_sq_bound])
+        return dataclasses.replace(self, problem=problem)
+
+    def motion(self) -> Motion:
+        """The motion in time; the problem must be solved."""
+        return Motion(samples=self.samples, law=law_of_solution(self.samples, self.solution))
+
+    def stop_to_stop(self) -> FloatArray:
+        """(G,) time between full stops [s]."""
+        return np.add.reduceat(self.solution.duration, self.samples.piece[:-1])

@@ -1,0 +1,169 @@
+"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a grid of its own.
+
+The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says where straight legs need
+points (feedrate/grid.py). Without jerk limits the points where the profile switches on straight legs are added and the problem is
+solved once more, so that every switch falls on a point.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from planner.corners.smooth import SmoothPath
+from planner.feedrate.changed import Known, solve_changed
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.feedrate.costates import second_order_multipliers
+from planner.feedrate.grid import add_switching_points, refine_for_jerk
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import sample_path
+from planner.feedrate.solution import FeedrateSolver
+from planner.feedrate.solvers import ThirdOrderSolver
+from planner.machine import Machine
+from planner.planning.job.job import Job
+from planner.planning.optimal.on_path import OnPath
+
+
+class Order(Protocol):
+    """Which limits a motion keeps, and the solver for them."""
+
+    jerk_limited: ClassVar[bool]
+
+    @property
+    def solver(self) -> FeedrateSolver:
+        """What finds the feed along a path."""
+        ...
+
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
+        """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py), which may be given;
+        pieces between full stops that a known motion has too are taken over from it."""
+        ...
+
+
+@dataclass(frozen=True)
+class ThirdOrder:
+    """All limits with jerk; multipliers come with the solution.
+
+    Limits are kept at the grid points. What the motion exceeds between them is measured afterwards, and made good where it is
+    (tighten.py): to leave a margin for it everywhere costs 3e-4 of the time on the usual grid and 4e-3 on the coarse one.
+    """
+
+    solver: ThirdOrderSolver
+
+    jerk_limited: ClassVar[bool] = True
+
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
+        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as of `Order`."""
+        samples = _sampled(self, path, job, resolution, samples)
+        with job.stage("solve") as progress:
+            samples = refine_for_jerk(samples, job.machine)
+            problem = feedrate_problem(samples, job.machine, measured=True)
+            problem = dataclasses.replace(problem, margin=np.zeros(len(samples)))
+            solution = solve_changed(problem, _known(known), lambda part: self.solver.solve(part, progress))
+        planned = OnPath(path=path, samples=samples, problem=problem, solution=solution)
+        _tell(job, planned, resolution)
+        return planned
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """All limits but jerk; multipliers are found from the profile (feedrate/costates.py).
+
+    to_tighten : limits will be tightened in places, on straight elements too, which then need points inside
+    """
+
+    solver: FeedrateSolver
+    to_tighten: bool = False
+
+    jerk_limited: ClassVar[bool] = False
+
+    def solve(
+        self,
+        path: SmoothPath,
+        job: Job,
+        resolution: float,
+        known: Sequence[OnPath] = (),
+        samples: PathSamples | None = None,
+    ) -> OnPath:
+        """The time-optimal motion without jerk limits, on a grid with points where the profile switches; arguments as of `Order`."""
+        samples = _sampled(self, path, job, resolution, samples)
+        with job.stage("solve"):
+            if self.to_tighten:
+                samples = refine_for_jerk(samples, job.machine)
+            planned = second_order(path, samples, job.machine, self.solver)
+            _tell(job, planned, resolution)
+            if not planned.solution.solved:
+                return planned
+            multipliers = second_order_multipliers(planned.problem, planned.solution)
+            solution = dataclasses.replace(planned.solution, multipliers=multipliers)
+        return dataclasses.replace(planned, solution=solution)
+
+
+def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
+    """The motion of another problem on the same grid: where some of its limits are a little tighter, solved again around them only."""
+    if isinstance(solver, JerkLimited) and _tighter_only(planned.problem, problem):
+        found = solver.again(planned.problem, planned.solution, problem)
+        if found is not None:
+            return dataclasses.replace(planned, problem=found[0], solution=found[1])
+    solution = solve_changed(problem, _known([planned]), solver.solve)
+    return dataclasses.replace(planned, problem=problem, solution=solution)
+
+
+def _tighter_only(problem: FeedrateProblem, other: FeedrateProblem) -> bool:
+    """Whether two problems are the same but for the scale of their limits."""
+    names = [field.name for field in dataclasses.fields(problem) if field.name != "limit_scale"]
+    return all(getattr(problem, name) is getattr(other, name) for name in names)
+
+
+def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
+    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is the solution's status."""
+    problem = feedrate_problem(samples, machine, measured=True)
+    solution = solver.solve(problem)
+    if solution.solved:
+        samples = add_switching_points(samples, problem, solution, machine)
+        problem = feedrate_problem(samples, machine, measured=True)
+        solution = solver.solve(problem)
+    return OnPath(path=path, samples=samples, problem=problem, solution=solution)
+
+
+def _sampled(
+    order: Order, path: SmoothPath, job: Job, resolution: float, given: PathSamples | None
+) -> PathSamples:
+    """The samples that are given, or new ones."""
+    if given is not None:
+        return given
+    with job.stage("geometry"):
+        return sample_path(path, job.machine, resolution, third_order=order.jerk_limited)
+
+
+def _known(motions: Sequence[OnPath]) -> list[Known]:
+    return [Known(one.problem, one.solution) for one in motions]
+
+
+def _tell(job: Job, planned: OnPath, resolution: float) -> None:
+    facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
+    facts["resolution"] = resolution
+    if planned.solution.iterations:
+        facts["iterations"] = planned.solution.iterations
+    facts |= {name: count for name, count in planned.solution.effort.items() if count}
+    job.tell("solve", found=planned.solution.cycle_time, **facts)

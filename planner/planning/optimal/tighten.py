@@ -1,0 +1,222 @@
+"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less speed.
+
+A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than 0.5 %. Slowing down by
+lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says by which lam the motion has to be slower there.
+
+`tightened` scales the limits around every excess (`limit_scale` of the problem) and solves again: the new motion is slower in these
+places only. Each run between full stops is then slowed down uniformly by the excess that remains, which always ends.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side
+from planner.delivery.pacing import runs_of, slower_runs
+from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion import limits_used
+from planner.motion.time_law import TimeLaw
+from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
+from planner.motion.trajectory import Trajectory
+from planner.planning.job.trace import Tell, tell_nobody
+from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.order import Order, solve_again
+
+# The excess of a parabola through these counts so many times [-]: jerks are parabolas to about 10 %.
+PEAK_MORE = 1.2
+# Tightening pays while a run is slowed down by more than this [-], and not for long.
+TIGHTENED_EXCESS = 1e-5
+TIGHTENING_ROUNDS = 2
+# Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more than the first of `WORTH` [-]
+# at first, where nearly all has to be solved again anyway, and then of more than the second, while there is one: of a relief of
+# 100,000 blocks 0.35 is solved again in the second round, with the first everywhere 0.82. Few places are left to the later rounds.
+TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
+SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps, by 5e-9 a round on SheepTile
+# What is slowed down is slowed down by this much more [-]; less is rounding.
+SLOWING_MORE = 1e-5
+EXCESS_ROUNDING = 1e-9
+# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
+# of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
+SEEN_BEFORE = 1.0 + 2e-5
+
+
+def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
+    middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
+    them."""
+    axes = toolpath.axes
+    limits = np.array([machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")])
+    programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
+    programmed[toolpath.block] = toolpath.feed
+    factor = np.zeros(len(motion.law.t))
+    pieces, inside = inside_pieces(motion)
+    smooth = _on_one_interval(motion)
+
+    def look(first: int) -> None:
+        part = slice(first, first + CHUNK // len(WATCHED))
+        shown, times = pieces[part], inside[part]
+        seen = motion.at(times.ravel(), machine.dt)
+        worst = np.empty(len(shown))
+        motions = (seen.velocity, seen.acceleration, seen.jerk)
+        _worst(seen.feed / programmed[seen.block], motions, limits, smooth[shown], worst)
+        for order, ratio in beside_axes(machine, seen):
+            most = _with_peaks(ratio.reshape(times.shape), smooth[shown])
+            worst = np.maximum(worst, most ** (1.0 / order))
+        factor[shown] = worst
+
+    tasks = [functools.partial(look, first) for first in range(0, len(pieces), CHUNK // len(WATCHED))]
+    if len(tasks) > 1:
+        motion.at(motion.t[:1], machine.dt)  # makes what all looks share
+        side_by_side(tasks, lambda: None, lambda: None)
+    else:
+        for task in tasks:
+            task()
+    for chunk in in_chunks(motion, machine.dt, fastest_inside(motion.law)):
+        worst = np.maximum(
+            chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
+        )
+        for order, ratio in beside_axes(machine, chunk):
+            worst = np.maximum(worst, ratio ** (1.0 / order))
+        at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
+        np.maximum.at(factor, np.maximum(at, 0), worst)
+    return factor
+
+
+def beside_axes(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """The order and the ratios (T,) of limits that are no axis' own."""
+    yield from limits_used.normal_ratios(machine, motion)
+    yield from limits_used.user_ratios(machine.own, motion)
+
+
+def _on_one_interval(motion: Motion) -> Array:
+    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not jump."""
+    s, grid = motion.law.s, motion.samples.s
+    interval = np.searchsorted(grid, s, side="right") - 1
+    beyond = np.append(s[1:], s[-1])
+    return np.asarray(beyond <= grid[np.minimum(interval + 1, len(grid) - 1)])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _worst(feed, motions, limits, smooth, out):
+    """The factor of each of n pieces, into out (n,), from what is seen of it at the shares `WATCHED`: feed (3 n,) over the programmed
+    one, and velocities, accelerations and jerks (3 n, A) with their limits (3, A); on smooth pieces (n,) of the parabolas through
+    them too."""
+    apart = WATCHED[2] - WATCHED[0]
+    for n in range(len(out)):
+        worst = max(feed[3 * n], feed[3 * n + 1], feed[3 * n + 2])
+        for order in range(3):
+            values, most = motions[order], 0.0
+            for k in range(values.shape[1]):
+                limit = limits[order, k]
+                y0, y1, y2 = (
+                    values[3 * n, k] / limit,
+                    values[3 * n + 1, k] / limit,
+                    values[3 * n + 2, k] / limit,
+                )
+                seen = max(abs(y0), abs(y1), abs(y2))
+                slope = (y2 - y0) / apart
+                bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+                peak = abs(y1)
+                if smooth[n] and abs(slope) < abs(bend):  # less than half of the piece from its middle
+                    peak = abs(y1 - slope * slope / (4.0 * bend))
+                known = max(seen, 1.0)
+                most = max(most, known + PEAK_MORE * (peak - known) if peak > known else max(seen, peak))
+            worst = max(worst, most ** (1.0 / (order + 1)))
+        out[n] = worst
+
+
+def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
+    """(n,) the largest of the ratios of n pieces (n, 3) at `WATCHED`, and on smooth pieces (n,) the peak of the parabola through them,
+    counted as in `_worst`."""
+    y0, y1, y2 = ratio.T
+    slope = (y2 - y0) / (WATCHED[2] - WATCHED[0])
+    bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
+    inside = smooth & (np.abs(slope) < np.abs(bend))
+    peak = np.where(inside, np.abs(y1 - slope**2 / (4.0 * np.where(inside, bend, 1.0))), y1)
+    seen = ratio.max(axis=1)
+    known = np.maximum(seen, 1.0)
+    return np.where(peak > known, known + PEAK_MORE * (peak - known), np.maximum(seen, peak))
+
+
+def fastest_inside(law: TimeLaw) -> FloatArray:
+    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    lasting = np.diff(np.append(law.t, law.end))
+    braking = np.flatnonzero(law.jerk_s < 0.0)
+    tau = -law.acc_s[braking] / law.jerk_s[braking]
+    inside = (tau > 0.0) & (tau < lasting[braking])
+    return law.t[braking[inside]] + tau[inside]
+
+
+def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
+    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of each point."""
+    lam = np.maximum(factor, 1.0)
+    lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
+    return dataclasses.replace(problem, limit_scale=problem.limit_scale * lam)
+
+
+def within_limits(
+    planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine, tell: Tell = tell_nobody
+) -> tuple[OnPath, Motion]:
+    """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
+    `planned` has a solution. Without jerk limits the motion is taken as it is: accelerations step at grid points, between which they
+    are close to straight lines."""
+    motion = planned.motion()
+    if not order.jerk_limited:
+        return planned, motion
+    factor = excess(motion, toolpath, machine)
+    best, least = (planned, factor), slowed(motion, toolpath, machine, factor).end
+    tell("between points", found=least, excess=float(factor.max() - 1.0))
+    large = len(planned.samples) > TIGHTENED_POINTS
+    tighter, ended = planned, least
+    del planned, motion  # half a kilobyte a point, which long jobs need for the next one
+    for number in range(LONG_ROUNDS if large else TIGHTENING_ROUNDS):
+        worth = 1.0 + (WORTH[min(number, 1)] if large else TIGHTENED_EXCESS)
+        if factor.max() <= worth:
+            break
+        problem = tightened(tighter.problem, np.where(factor > worth, factor, 1.0))
+        tighter = solve_again(tighter, problem, order.solver)
+        if not tighter.solution.solved:
+            break
+        motion = tighter.motion()
+        factor = excess(motion, toolpath, machine)
+        end = slowed(motion, toolpath, machine, factor).end
+        facts = {name: count for name, count in tighter.solution.effort.items() if name.endswith("again")}
+        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0), **facts)
+        settled, ended = abs(end - ended) < SETTLED * end, end
+        if end < least:
+            best, least = (tighter, factor), end
+        del motion
+        if settled:
+            break
+    planned, factor = best
+    motion = slowed(planned.motion(), toolpath, machine, factor)
+    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
+
+
+def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
+    """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion itself where none needs it.
+
+    factor : the excess, if it is known
+    """
+    of_run = _of_runs(motion, excess(motion, toolpath, machine) if factor is None else factor)
+    slow = of_run > 1.0 + EXCESS_ROUNDING
+    return slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0)) if slow.any() else motion
+
+
+def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
+    """(G,) the largest factor of each run."""
+    return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
+
+
+def slower(motion: Motion, factor: FloatArray) -> Motion:
+    """Every run (G,) slowed down by its factor."""
+    return slower_runs(motion, runs_of(motion), factor)

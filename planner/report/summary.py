@@ -1,0 +1,117 @@
+"""A plan, a verdict, a program in numbers, ready for JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.nc.info import PLACES_SHOWN
+from planner.nc.program import ToolPoint
+from planner.report.beside import beside_summary
+from planner.report.optimum import optimum_summary
+from planner.report.rows import plan_rows
+
+if TYPE_CHECKING:
+    from planner.nc.info import ProgramInfo
+    from planner.planning.job.plan import Plan
+    from planner.verifier import CornerCheck, Verdict
+
+NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
+PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
+
+
+def summary(plan: Plan) -> dict[str, Any]:
+    """The plan in numbers, ready for JSON: what `planner plan --json` prints."""
+    verdict = plan.verdict
+    return json_ready(
+        {
+            "program": plan.program.source,
+            "assumptions": plan.program.assumptions,
+            "machine": plan.machine.name,
+            "method": plan.method,
+            "geometry": plan.geometry,
+            "corner": plan.corner,
+            "solver": plan.solver,
+            "status": plan.status.name,
+            "sentence": plan.sentence,
+            "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
+            "beside_motion": beside_summary(plan),
+            "stop_time_s": plan.stop_time,
+            "tolerance_mm": uniform(plan.toolpath.tolerance),
+            "verdict": verdict_summary(verdict) if verdict is not None else None,
+            "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
+            **optimum_summary(plan.grid, plan.prices),
+            "reading": plan.program.reading.changed(),
+            "blocks": len(plan.program),
+            "tool_point": tool_point_summary(plan.program.tool_point),
+            "grid_points": plan.grid_points,
+            "notes": plan.notes,
+            "timings_s": plan.timings,
+            "versions": versions(),
+            "told": plan_rows(plan),
+        }
+    )
+
+
+def verdict_summary(verdict: Verdict) -> dict[str, Any]:
+    """A verdict in numbers: the largest ratio to each limit, errors, faults."""
+    return json_ready({**verdict.summary(), "not_limited": not_limited(verdict), "faults": verdict.sentences})
+
+
+def corner_summary(corners: CornerCheck) -> dict[str, Any]:
+    """Eq. 18-20 at the programmed corners in numbers."""
+    return json_ready(corners.summary())
+
+
+def not_limited(verdict: Verdict) -> list[str]:
+    """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
+    return sorted({name.partition(".")[0] for name, check in verdict.limits.items() if not check.limited})
+
+
+def info_summary(info: ProgramInfo) -> dict[str, Any]:
+    """The figures of a program, ready for JSON. Keys and units are those of the fields of `ProgramInfo`.
+
+    Of `unsupported` the first `PLACES_SHOWN` are listed; `unsupported_places` counts them all.
+    """
+    fields = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
+    fields["tool_point"] = tool_point_summary(info.tool_point)
+    fields["expansion"] = None if info.expansion is None else dataclasses.asdict(info.expansion)
+    fields["unsupported"] = [dataclasses.asdict(fault) for fault in info.unsupported[:PLACES_SHOWN]]
+    fields["unsupported_places"] = len(info.unsupported)
+    return json_ready(fields)
+
+
+def tool_point_summary(point: ToolPoint | None) -> dict[str, Any] | None:
+    """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the joints."""
+    return None if point is None else dataclasses.asdict(point)
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package, of Python, and of the packages that compute."""
+    found = {"planner": metadata.version("feedrate-planner"), "python": platform.python_version()}
+    return found | {name: metadata.version(name) for name in PACKAGES}
+
+
+def uniform(tolerance: FloatArray) -> float | None:
+    """The contour tolerance (n,) if it is the same at every joint; None where the program changes it (G64 P)."""
+    return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
+
+
+def json_ready(value: Any) -> Any:
+    """Numbers, strings, lists and dictionaries only; NaN and infinity, which JSON lacks, become None."""
+    if isinstance(value, Mapping):
+        return {str(key): json_ready(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [json_ready(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

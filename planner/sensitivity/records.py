@@ -1,0 +1,219 @@
+"""The records of a plan, the same for every method: tables of corners, the profile on the grid, prices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
+from planner.verifier import Verdict
+
+SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
+SHARE_DIGITS = 4  # of a share of the cycle time, in every output
+WORDS = {"none": "nothing", "rest": "dwells"}  # for what no limit holds
+PRICES_SHOWN = 4  # of a price list, in a line
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CornerTable:
+    """One row for each rounded corner, in the order of the path.
+
+    line             : (C,) NC line of the block that ends at the corner
+    theta            : (C,) turning angle [rad]
+    d_in, d_out      : (C,) tangent lengths before and after the vertex [mm]
+    tol_ap           : (C,) part of the tolerance that the rounding uses, eps_ap [mm]
+    kappa_max        : (C,) curvature at the apex [1/mm]
+    feed_closed_form : (C,) speed by error allocation, eq. 19 with the curvature of this corner [mm/s]
+    feed_planned     : (C,) planned speed at the apex [mm/s]
+    limited_by       : (C,) name of the constraint that is closest to its limit there
+    """
+
+    line: Array
+    theta: FloatArray
+    d_in: FloatArray
+    d_out: FloatArray
+    tol_ap: FloatArray
+    kappa_max: FloatArray
+    feed_closed_form: FloatArray
+    feed_planned: FloatArray
+    limited_by: Array
+
+    def __post_init__(self) -> None:
+        corners = len(self.line)
+        freeze(self, "line", np.int32, (corners,))
+        for name in ("theta", "d_in", "d_out", "tol_ap", "kappa_max", "feed_closed_form", "feed_planned"):
+            freeze(self, name, np.float64, (corners,))
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def worst_ratio(self) -> float:
+        """Largest planned over closed-form speed; 0 without corners."""
+        return float((self.feed_planned / self.feed_closed_form).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridHistory:
+    """The profile at the grid points of the solver, and the limits that are active at each of them (sensitivity/activity.py).
+
+    t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
+    active       : (P,) index in `active_names` of the limit that is shown for the interval to the right of each point: of those that
+                   are active there the one with the largest price, or the closest
+    reached      : (P, K) which of the K of `active_names` are active there
+    active_names : names of limits, then "none" and "rest"
+    share        : (K,) fraction of the cycle time in which each is active [-]; those that are active together count in full each
+    """
+
+    t: FloatArray
+    s: FloatArray
+    feed: FloatArray
+    active: Array
+    reached: Array
+    active_names: tuple[str, ...]
+    share: FloatArray
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """Names and fractions of the cycle time, to `SHARE_DIGITS`: the limits, largest fraction first, then "none" and "rest"."""
+        share = np.round(self.share, SHARE_DIGITS)
+        limits, others = np.flatnonzero(share[:-2]), len(share) - 2 + np.flatnonzero(share[-2:])
+        order = [*limits[np.argsort(-share[limits], kind="stable")], *others]
+        return [(self.active_names[k], float(share[k])) for k in order]
+
+    def percents(self) -> list[tuple[str, int]]:
+        """Those of `ranked` in whole per cent, halves up, from 1 % on; "nothing" and "dwells" for "none" and "rest"."""
+        found = [(WORDS.get(name, name), math.floor(100.0 * share + 0.5)) for name, share in self.ranked()]
+        return [(name, percent) for name, percent in found if percent]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DearCorners:
+    """The corners where more tolerance saves most, the largest saving first.
+
+    line     : (C,) NC line of the block that ends at the corner
+    position : (C, A) vertex [mm]
+    theta    : (C,) turning angle [rad]
+    price    : (C,) dT/d(tolerance at that corner alone) [s/mm]
+    saved    : (C,) time saved by `MORE_TOLERANCE` there [s]
+    """
+
+    line: Array
+    position: FloatArray
+    theta: FloatArray
+    price: FloatArray
+    saved: FloatArray
+
+    def __post_init__(self) -> None:
+        corners = len(self.line)
+        freeze(self, "line", np.int32, (corners,))
+        freeze(self, "position", np.float64, (corners, None))
+        for name in ("theta", "price", "saved"):
+            freeze(self, name, np.float64, (corners,))
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlacePrices:
+    """What more costs and saves by place: at the M segments of the programmed path and the M+1 joints between them.
+
+    feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
+    limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
+    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves time; None where it is not known
+    """
+
+    feed: FloatArray
+    limits: FloatArray
+    tolerance: FloatArray | None
+
+    def __post_init__(self) -> None:
+        segments = len(self.feed)
+        freeze(self, "feed", np.float64, (segments,))
+        freeze(self, "limits", np.float64, (segments,))
+        if self.tolerance is not None:
+            freeze(self, "tolerance", np.float64, (segments + 1,))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class PriceList:
+    """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
+
+    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of one's own
+                dT/d(least bound on the path), in their own units, with the bound elsewhere in proportion
+    feed      : dT/d(ln feed override) [s]
+    tolerance : dT/d(tolerance) [s/mm]; None where it is not known
+    saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE` more "tolerance" [s]
+    ranges    : least and most time that a new plan may save [s]
+    hints     : names whose saving is told by its range only; `saved` is its middle, and a hint only
+    corners   : the corners with the largest savings; None where they are not known
+    places    : the same by place, as straight lines foretell it; None where it is not known
+    """
+
+    limits: dict[str, float]
+    feed: float
+    tolerance: float | None
+    saved: dict[str, float]
+    corners: DearCorners | None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    hints: tuple[str, ...] = ()
+    places: PlacePrices | None = None
+
+    def __repr__(self) -> str:
+        """What would save most, in a line."""
+        most = ", ".join(f"{name} {saved:.3g} s" for name, saved in self.ranked()[:PRICES_SHOWN])
+        return f"<PriceList: more would save {most or 'nothing'}>"
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""
+        worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
+        return sorted(worth, key=lambda entry: -entry[1])
+
+
+Pricing = Callable[[], PriceList | None]  # finds a plan's prices, once the plan is the one that is taken
+
+
+class Delivered(NamedTuple):
+    """A motion that was sampled and judged.
+
+    trajectory : its samples
+    verdict    : on them and on the motion
+    motion     : with the standstills that the samples need
+    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that costs time; else None
+    """
+
+    trajectory: Trajectory
+    verdict: Verdict
+    motion: MotionInTime
+    slower: Delivered | None = None
+
+
+class Making(NamedTuple):
+    """What is known of a plan on its way, which may not be the one that is taken.
+
+    motion  : that of its trajectory
+    slower  : as in `Delivered`
+    pricing : finds its prices; None where they are there, or not to be had
+    """
+
+    motion: MotionInTime
+    slower: Delivered | None = None
+    pricing: Pricing | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tables:
+    """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
+
+    rounded: CornerTable | None = None
+    grid: GridHistory | None = None
+    prices: PriceList | None = None
+    pricing: Pricing | None = None
+
+
+NO_TABLES = Tables()

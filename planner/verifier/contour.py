@@ -1,0 +1,193 @@
+"""How far the motion and the path are apart, in numbers that are true or None.
+
+The matching (`matching`) decides at the tolerance. A motion that fits is measured by it. Of one that does not it knows less: where
+it went on by a vertex passed too late, a sample may be nearer to the next piece than to those it could be on, and where it was lost
+nothing is known. Such a motion is read again with 4, 16 and 64 times the tolerance, until it fits: among all pieces that can be
+reached in order within that, the nearest to every sample is found, and the checks compare with the tolerance as it is. A motion that
+does not fit then has no distance from the path: None. To fit into a widened tolerance means to use half of it: a detour of all of it
+would leave only its tip to pass the vertex at. What fits there by less than the tolerance as it is came near to two vertices in the
+wrong order, which is a fault (findings.out_of_order).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.verifier.excess import Excess, Fault, Kind, and_more
+from planner.verifier.findings import FAULTS_OF_A_KIND, Look, line_of
+from planner.verifier.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
+from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
+from planner.verifier.verdict import LimitCheck
+
+WIDER = (4.0, 16.0, 64.0)  # times the budget
+VISITS_MAX = 3e8  # samples times pieces within reach that are looked at for a number of a motion that failed: half a minute
+
+
+@dataclass(frozen=True)
+class Apart:
+    """The readings that measure the distance of motion and path.
+
+    looks   : the readings
+    pieces  : the path with its own budgets
+    widened : their budgets were so many times those of `pieces`
+    """
+
+    looks: list[Look]
+    pieces: ProgramPieces
+    widened: float = 1.0
+
+    @property
+    def fits(self) -> bool:
+        """The motion stays within these budgets, or half of those that were widened, as far as it goes."""
+        share = self.widened if self.widened == 1.0 else 0.5 * self.widened
+        return all(
+            look.seen.match.tally[LOST_AFTER] == NOT_LOST
+            and not look.seen.match.tally[JUMPS]
+            and look.seen.match.worst[0] <= share / self.widened * (1.0 + 2.0 * RATIO_ROUNDING)
+            and not (look.seen.match.passed["near"] > share * self._allowed)[
+                : look.seen.match.tally[LAST] + 1
+            ].any()
+            for look in self.looks
+        )
+
+    @property
+    def _allowed(self) -> FloatArray:
+        allowed: FloatArray = self.pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+        return allowed
+
+    # ---- the motion from the path ------------------------------------------------------------------------------------
+
+    def contour_error(self) -> float | None:
+        """Largest distance of the motion from the path [mm]."""
+        return None if not self.fits else max(float(look.seen.match.worst[5]) for look in self.looks)
+
+    def contour_check(self, toolpath: Toolpath) -> LimitCheck:
+        """The motion's worst distance from the path, as far as it could be followed, against the budget there."""
+        look = max(self.looks, key=lambda each: each.seen.match.worst[0])
+        ratio, distance, budget, time, piece, _ = look.seen.match.worst
+        ratio, budget = ratio * self.widened, budget / self.widened
+        if distance <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+            ratio = min(ratio, 1.0)  # within the rounding of the matching, which is absolute too
+        return LimitCheck(
+            name="contour",
+            unit="mm",
+            ratio=float(ratio),
+            value=float(distance),
+            limit=float(budget) if budget > 0 else float(self.pieces.piece["budget"].min()),
+            time=float(time),
+            position=look.seen.match.place[WORST_AT],
+            line=line_of(toolpath, self.pieces, int(piece)),
+            note=look.note,
+        )
+
+    # ---- the vertices from the motion --------------------------------------------------------------------------------
+
+    def near(self, look: Look) -> FloatArray:
+        """(N+1,) distance of each vertex from the motion [mm]; NaN where it is not known."""
+        near: FloatArray = look.seen.match.passed["near"].copy()
+        # those of a motion that does not fit are known as far as the matching stays in place
+        near[np.isinf(near) if self.fits else near > NEAR_MISS * self._allowed] = np.nan
+        return near
+
+    def vertex_error(self) -> float | None:
+        """Largest distance of a programmed vertex from the motion [mm]."""
+        near = np.concatenate([self.near(look)[self.pieces.joint["real"]] for look in self.looks])
+        return None if np.isnan(near).any() else float(near.max())
+
+    def vertex_check(self, toolpath: Toolpath) -> LimitCheck:
+        """The vertex that the motion misses by most of its budget, of those whose distance is known."""
+        budgets = self.pieces.joint["budget"]
+        known = [np.nan_to_num(self.near(each) / budgets, nan=-1.0) for each in self.looks]
+        look = self.looks[int(np.argmax([ratio.max() for ratio in known]))]
+        near = self.near(look)
+        i = int(np.nan_to_num(near / budgets, nan=-1.0).argmax())  # if none is known the first, with NaN
+        ratio = near[i] / budgets[i]
+        if near[i] <= self._allowed[i]:
+            ratio = min(ratio, 1.0)
+        return LimitCheck(
+            name="vertex",
+            unit="mm",
+            ratio=float(ratio),
+            value=float(near[i]),
+            limit=float(budgets[i]),
+            time=float(look.seen.match.passed["near_time"][i]),
+            position=self.pieces.vertex[i],
+            line=line_of(toolpath, self.pieces, i - 1),
+            note=look.note,
+        )
+
+    def vertex_faults(self, toolpath: Toolpath) -> list[Fault]:
+        """Vertices that the motion misses by more than their budget, and arcs cut short."""
+        said: list[Fault] = []
+        pieces, budgets = self.pieces, self.pieces.joint["budget"]
+        for look in self.looks:
+            near, seen = self.near(look), look.seen.match.passed["near"]
+            missed = np.flatnonzero((seen > self._allowed) & np.isfinite(seen))
+            here: list[Fault] = []
+            for i in missed[:FAULTS_OF_A_KIND]:
+                what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
+                where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
+                by = f"missed by more than {NEAR_MISS:g} times the budget {budgets[i]:.6g} mm"
+                if not np.isnan(near[i]):
+                    by = f"missed by {near[i]:.7g} mm, {near[i] / budgets[i]:.6g} of the budget {budgets[i]:.6g} mm"
+                line, time = line_of(toolpath, pieces, i - 1), float(look.seen.match.passed["near_time"][i])
+                text = f"{what} of line {line} at {where}: {look.noted(by)}, t = {time:.6g} s"
+                ratio = float(seen[i] / budgets[i])
+                here.append(
+                    Fault(kind=Kind.VERTEX, name="vertex", found=text, ratio=ratio, time=time, line=line)
+                )
+            said += and_more(here, len(missed), "vertices missed")
+        return said
+
+    def excesses(self) -> list[Excess]:
+        """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose distance is known. Of what the
+        chords between samples add a slower motion has less; what is between the samples is the path's own error."""
+        found = []
+        for k, look in enumerate(self.looks):
+            ratio, distance, budget, time, _, _ = look.seen.match.worst.tolist()
+            still = 1.0 if k else 0.0
+            if distance > budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
+                found.append(_excess(Kind.CONTOUR, time, ratio * self.widened, still))
+            near, times = self.near(look), look.seen.match.passed["near_time"]
+            for i in np.flatnonzero(np.nan_to_num(near) > self._allowed):
+                by = float(near[i] / self.pieces.joint["budget"][i])
+                own = float(self.near(self.looks[-1])[i] / self.pieces.joint["budget"][i])
+                still = own if len(self.looks) > 1 and np.isfinite(own) else 0.0
+                found.append(_excess(Kind.VERTEX, float(times[i]), by, still))
+        return found
+
+
+def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
+    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=2, still=still)
+
+
+def apart(looks: list[Look], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Look]]) -> Apart:
+    """The readings that measure the motion: `looks` if it fits in them, or those by `read` with wider budgets in which it does."""
+    found = Apart(looks, pieces)
+    if found.fits:
+        return found
+    samples = sum(look.seen.samples for look in looks)
+    length = float(np.linalg.norm(np.diff(pieces.vertex, axis=0), axis=1).mean())
+    for factor in WIDER:
+        within = 1.0 + 2.0 * factor * float(pieces.piece["budget"].mean()) / length
+        if samples * within > VISITS_MAX:
+            break
+        wide = Apart(read(widened(pieces, factor)), pieces, factor)
+        if wide.fits:
+            return wide
+    return found
+
+
+def lost_after(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, complete: bool) -> int | None:
+    """NC line of the last block that the motion could be followed along before it was lost, or ended too early; None if it ran
+    them all."""
+    tallies = [look.seen.match.tally for look in looks]
+    at = [tally[LOST_AFTER] for tally in tallies if tally[LOST_AFTER] != NOT_LOST]
+    if not at and not complete:
+        at = [tally[LAST] for tally in tallies]
+    return line_of(toolpath, pieces, int(min(at))) if at else None

@@ -1,0 +1,188 @@
+"""The record of eq. 18-20 at the programmed corners: what the motion does there, beside what the papers let it do.
+
+Checked are eq. 18, the corner's tolerance with the chord error in it, and eq. 19, the speed. Eq. 19 with the motion's own curvature
+follows from the limits of the axes' acceleration (error_allocation.py), so it does not fail without them, and says where they act.
+Eq. 20 is a comparison: a motion may be faster, and no verdict fails for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray, freeze
+from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
+
+# A corner passed at less than this fraction of what eq. 20 and the programmed feed allow counts as a stop [-]: samples 1 ms apart show
+# a motion that rests on a corner as up to 0.025 mm/s at 2e5 mm/s3, where eq. 20 allows 10 to 30 mm/s.
+STANDS = 0.01
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CornerCheck:
+    """One row per programmed corner in the program's order: a joint that turns and at which the program does not stop.
+
+    All of a row but line, position, theta, budget and feed_paper is NaN where the motion could not be looked at.
+
+    line             : (C,) source line of the block that ends there
+    position         : (C, A) the programmed vertex [mm]
+    theta            : (C,) turning angle [rad]
+    budget           : (C,) eps [mm]
+    time             : (C,) when the motion is nearest to the vertex [s]
+    feed_planned     : (C,) its speed there [mm/s]
+    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf where it runs straight or stands
+    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner: polynomial Bezier pair between long straight legs [mm/s]
+    feed_programmed  : (C,) the smaller one of the two blocks [mm/s]
+    speed_ratio      : (C,) largest feed_planned / feed_closed_form of all readings of the motion [-]
+    miss             : (C,) distance of the vertex from the motion [mm]; from the chords of its samples where there is nothing else
+    chord_error      : (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
+    budget_ratio     : (C,) the largest of miss + chord_error and the distance from the delivered chords, over eps [-]
+    delivered_speed, delivered_budget : (C,) both ratios as the samples and the chords between them show them, alone [-]
+    judged           : False if the limit behind eq. (19) is reported only
+    """
+
+    line: Array
+    position: FloatArray
+    theta: FloatArray
+    budget: FloatArray
+    time: FloatArray
+    feed_planned: FloatArray
+    feed_closed_form: FloatArray
+    feed_paper: FloatArray
+    feed_programmed: FloatArray
+    speed_ratio: FloatArray
+    miss: FloatArray
+    chord_error: FloatArray
+    budget_ratio: FloatArray
+    delivered_speed: FloatArray
+    delivered_budget: FloatArray
+    judged: bool = True
+
+    def __post_init__(self) -> None:
+        corners = len(self.line)
+        freeze(self, "line", np.int32, (corners,))
+        freeze(self, "position", np.float64, (corners, None))
+        for name, column in vars(self).items():
+            if name not in ("line", "position", "judged"):
+                freeze(self, name, np.float64, np.shape(column), finite=False)
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    @property
+    def looked(self) -> Array:
+        """(C,) True where the motion was looked at."""
+        return np.isfinite(self.time)
+
+    @property
+    def count(self) -> int:
+        """How many corners were looked at."""
+        return int(self.looked.sum())
+
+    @property
+    def not_looked_at(self) -> int:
+        """How many were not: the motion never comes there, or its samples are too far apart to tell."""
+        return len(self) - self.count
+
+    @property
+    def too_fast(self) -> Array:
+        """(C,) True where eq. (19) is broken."""
+        return self.speed_ratio > 1.0 + RATIO_ROUNDING
+
+    @property
+    def overdrawn(self) -> Array:
+        """(C,) True where eq. (18) is broken; distances are good to `CONTOUR_ROUNDING`."""
+        return self.budget_ratio > 1.0 + RATIO_ROUNDING + CONTOUR_ROUNDING / self.budget
+
+    @property
+    def held(self) -> int:
+        """How many of the corners looked at keep both."""
+        return int((self.looked & ~self.too_fast & ~self.overdrawn).sum())
+
+    @property
+    def stands(self) -> Array:
+        """(C,) True where the motion stops, or next to it (`STANDS`)."""
+        return self.looked & (self.feed_planned < STANDS * np.minimum(self.feed_paper, self.feed_programmed))
+
+    @property
+    def gain(self) -> FloatArray:
+        """(C,) speed over eq. (20)'s speed of the paper's own corner [-]."""
+        return self.feed_planned / self.feed_paper
+
+    @property
+    def compared(self) -> Array:
+        """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the programmed feed."""
+        return self.looked & ~self.stands & (self.feed_paper < self.feed_programmed)
+
+    def told(self) -> tuple[FloatArray, FloatArray]:
+        """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its file say the same; where a
+        corner is broken, the largest of all readings."""
+        return (
+            np.where(self.too_fast, self.speed_ratio, self.delivered_speed),
+            np.where(self.overdrawn, self.budget_ratio, self.delivered_budget),
+        )
+
+    @property
+    def worst_speed_ratio(self) -> float:
+        """Largest ratio of eq. (19) in `told`; NaN without corners that were looked at."""
+        return _largest(self.told()[0][self.looked])
+
+    @property
+    def worst_budget_ratio(self) -> float:
+        """Largest ratio of eq. (18) in `told`; NaN without corners that were looked at."""
+        return _largest(self.told()[1][self.looked])
+
+    @property
+    def worst_ratio(self) -> float:
+        """The larger of the two; NaN without corners that were looked at."""
+        return max(self.worst_speed_ratio, self.worst_budget_ratio)
+
+    def gains(self) -> tuple[float, float, float]:
+        """Median, least and largest gain of the corners `compared`; NaN without any."""
+        gain = self.gain[self.compared]
+        return (float(np.median(gain)), float(gain.min()), float(gain.max())) if len(gain) else (np.nan,) * 3
+
+    def summary(self) -> dict[str, Any]:
+        """The part of `summary.json` that is called `corners`."""
+        median, least, largest = self.gains()
+        return {
+            "count": self.count,
+            "not_looked_at": self.not_looked_at,
+            "held": self.held,
+            "worst_speed_ratio": self.worst_speed_ratio,
+            "worst_budget_ratio": self.worst_budget_ratio,
+            "stopped_at": int(self.stands.sum()),
+            "gain": median,
+            "gain_min": least,
+            "gain_max": largest,
+            "gain_count": int(self.compared.sum()),
+        }
+
+    def sentence(self) -> str:
+        """Both in one line: "eq. 18 and 19 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of eq. 20 (median)".
+
+        Eq. 20 is a comparison, not a check."""
+        if not len(self):
+            return "none: the program has no corner without a full stop"
+        said = f"eq. 18 and 19 hold at {self.held:,} of {len(self):,} corners"
+        if self.count:
+            said += f", at most {_ratio(self.worst_ratio)}"
+        stops, compared = int(self.stands.sum()), int(self.compared.sum())
+        if compared:
+            of = "" if compared == len(self) else f" of {compared:,} corners where eq. 20 is below the feed"
+            said += f"; {self.gains()[0]:.2f} times the speed of eq. 20 (median{of})"
+        elif stops < self.count:
+            said += "; eq. 20 is above the programmed feed at all corners without a stop"
+        said += f"; full stops at {stops:,}" if stops else ""
+        return said + (f"; {self.not_looked_at:,} could not be checked" if self.not_looked_at else "")
+
+
+def _ratio(value: float) -> str:
+    """0.9993, and where it is beyond 1 with the digits that show it: 1.000002."""
+    return f"{value:.6f}" if 1.0 + RATIO_ROUNDING < value < 1.001 else f"{value:.4f}"
+
+
+def _largest(values: FloatArray) -> float:
+    return float(values.max()) if len(values) else np.nan

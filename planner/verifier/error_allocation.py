@@ -1,0 +1,305 @@
+"""The papers' check at every programmed corner, whatever made the motion: eq. (18)-(20) of paper 002 on the motion's own curvature.
+
+At the motion's point nearest to the vertex, in the program's order (matching.py knows when), let v be the speed, t = v/|v|, a_n the
+part of the acceleration a across t, n = a_n/|a_n|, kappa = |a_n| / v^2 the motion's own curvature, all over the linear axes.
+
+**Eq. (19), the speed.** Paper 002 lets a corner be passed at sqrt(A/kappa). With A(n) the most that the machine leaves in the
+direction n,
+
+    A(n) = min( sum_k |n_k| a_k,  A_max ),       a_k the axes' acceleration limits, A_max the machine's normal acceleration,
+
+    feed / sqrt(A(n)/kappa) = sqrt( |a_n| / A(n) ) <= 1.
+
+Proof: n is a unit vector along a_n, so |a_n| = a_n.n = a.n (t.n = 0) = sum_k a_k(t) n_k <= sum_k a_k |n_k| for every acceleration
+within the axes' limits; and |a_n| <= A_max is the other limit itself. Nothing else was used: it holds for every method, corner,
+path and direction t, so that errors of the velocity cannot break it. The sum is attained where every axis gives all it has, so the
+bound cannot be smaller for all motions; and a motion that takes a corner of curvature kappa as if nothing limited the acceleration
+exceeds it as soon as kappa feed^2 > A(n).
+
+**Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are samples: over a period dt
+the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples fall, and from a cubic, where the machine runs
+these, by a quarter of that (between.py). Hence no chord passes the vertex at more
+than
+
+    miss + kappa feed^2 dt^2 / 8  <=  eps                            (to second order in dt, as in the paper)
+
+if the budget is kept for all phases of the samples. Where there are samples alone, the distance of the vertex from their chords has
+both errors in it. Both are judged: the sum, and the chords that were delivered. What filters behind the drives add is not in here.
+
+**Eq. (20), the gain.** The paper's own corner, the polynomial Bezier pair between straight legs that are long enough, has kappa =
+(2/3) tan^2(theta/2) / eps_ap, and with c = dt^2/8 + sum_i T_i^2/24 (filters of lengths T_i) its budget is used up best by
+
+    X = min(A, eps / (2c)),     eps_ap = eps - c X,     v20 = sqrt(1.5 X eps_ap) / tan(theta/2)
+
+(X (eps - c X) is a parabola with its top at eps/(2c)), A taken along the bisector u2 - u1. feed / v20 is what the motion gains over
+it. It is no bound: other shapes within eps may be faster, and dense programs need not turn at each of their corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import LINEAR_AXES, Machine
+from planner.motion.trajectory import Trajectory
+from planner.verifier.between import bow_share
+from planner.verifier.corners import CornerCheck
+from planner.verifier.excess import Excess, Fault, Kind, and_more
+from planner.verifier.findings import FAULTS_OF_A_KIND, Look
+from planner.verifier.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
+from planner.verifier.matching import NEAR_MISS
+from planner.verifier.pieces import ProgramPieces
+from planner.verifier.sample_block import Limits
+from planner.verifier.times import AnyMotion
+
+# Steps of Newton's method to the motion's nearest point, from at most a period away.
+NEAREST_STEPS = 3
+AT_ONCE = SIZES.corners_at_once
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Reading:
+    """The motion near each of C vertices: time [s], speed [mm/s], |a_n| and A(n) [mm/s2], distance from the vertex [mm]."""
+
+    time: FloatArray
+    feed: FloatArray
+    normal: FloatArray
+    allowed: FloatArray
+    distance: FloatArray
+
+    @property
+    def speed_ratio(self) -> FloatArray:
+        return np.sqrt(self.normal / self.allowed)
+
+
+def check_corners(
+    trajectory: Trajectory,
+    looks: list[Look],
+    pieces: ProgramPieces,
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    motion: AnyMotion | None,
+    limits: Limits,
+    judged: bool,
+) -> CornerCheck:
+    """Hold the motion against eq. (18)-(20) at every corner of the program.
+
+    looks  : the readings of the samples and, where there is a motion, of the motion between them; they know when each vertex is passed
+    motion : what the samples were taken from; None to look at the samples alone
+    limits : what accelerations that were derived from positions can be off by
+    judged : False if the limit of acceleration is reported only
+
+    A corner is not looked at where the motion misses it by so much that its place on the path is not known (`NEAR_MISS`; then `order`
+    or `vertex` says so), and where there are samples alone so far apart that the axes could bow by more than eps between them.
+    """
+    corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
+    at = np.flatnonzero(pieces.joint["real"])[corner]
+    vertex, eps = pieces.vertex[at], pieces.joint["budget"][at]
+    near = [look.seen.match.passed[at] for look in looks]
+    miss = near[0]["near"]
+    parts = [slice(first, first + AT_ONCE) for first in range(0, max(len(corner), 1), AT_ONCE)]
+    found = [_nearest_sample(trajectory, near[0]["near_time"][n], vertex[n], machine, limits) for n in parts]
+    reading, period = _joined([one[0] for one in found]), np.concatenate([one[1] for one in found])
+    chord, budget_ratio, speed_ratio = np.zeros(len(corner)), miss / eps, reading.speed_ratio
+    delivered = speed_ratio, budget_ratio
+    looked = miss <= NEAR_MISS * eps
+    if motion is None or not len(corner):
+        looked &= _bow(machine, toolpath.axes, period) <= eps
+    else:
+        looked &= near[1]["near"] <= NEAR_MISS * eps
+        when = near[1]["near_time"]
+        reading = _joined([_nearest_point(motion, when[n], trajectory.dt, vertex[n], machine) for n in parts])
+        speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
+        miss, chord = reading.distance, bow_share(machine) * reading.normal * trajectory.dt**2
+        budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.where(reading.normal > 0, reading.feed * np.sqrt(reading.allowed / reading.normal), np.inf)
+
+    def known(values: FloatArray) -> FloatArray:
+        return np.where(looked, values, np.nan)
+
+    return CornerCheck(
+        line=toolpath.line[corner - 1],
+        position=vertex,
+        theta=toolpath.theta[corner],
+        budget=eps,
+        time=known(reading.time),
+        feed_planned=known(reading.feed),
+        feed_closed_form=known(own),
+        feed_paper=_paper_speed(toolpath, corner, machine),
+        feed_programmed=np.minimum(toolpath.feed[corner - 1], toolpath.feed[corner]),
+        speed_ratio=known(speed_ratio),
+        miss=known(miss),
+        chord_error=known(chord),
+        budget_ratio=known(budget_ratio),
+        delivered_speed=known(delivered[0]),
+        delivered_budget=known(delivered[1]),
+        judged=judged,
+    )
+
+
+def too_fast_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
+    """Corners that are passed too fast."""
+    broken = check.too_fast & check.judged
+    return _faults(check, broken, check.speed_ratio, Kind.CORNER_SPEED, _too_fast, axes)
+
+
+def overdrawn_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
+    """Corners whose budget is overdrawn."""
+    return _faults(check, check.overdrawn, check.budget_ratio, Kind.CORNER_BUDGET, _overdrawn, axes)
+
+
+def excesses(check: CornerCheck) -> list[Excess]:
+    """Both, as data. A slower motion has less of a chord error, and misses the vertex by as much."""
+    found = []
+    for k in np.flatnonzero(check.too_fast & check.judged).tolist():
+        found.append(_excess(check, k, Kind.CORNER_SPEED, float(check.speed_ratio[k]), 1))
+    for k in np.flatnonzero(check.overdrawn).tolist():
+        still = float(check.miss[k] / check.budget[k])
+        found.append(_excess(check, k, Kind.CORNER_BUDGET, float(check.budget_ratio[k]), 2, still))
+    return found
+
+
+def _excess(check: CornerCheck, k: int, kind: Kind, ratio: float, power: int, still: float = 0.0) -> Excess:
+    time = float(check.time[k])
+    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=power, still=still)
+
+
+def _faults(
+    check: CornerCheck,
+    broken: Array,
+    values: FloatArray,
+    kind: Kind,
+    found: Callable[[CornerCheck, int], str],
+    axes: tuple[str, ...],
+) -> list[Fault]:
+    worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
+    said = []
+    for k in worst[:FAULTS_OF_A_KIND]:
+        where = " ".join(f"{name}{x:.6g}" for name, x in zip(axes, check.position[k], strict=True))
+        line, time = int(check.line[k]), float(check.time[k])
+        text = f"{found(check, k)}, at the end of line {line}, {where}, t = {time:.6g} s"
+        said.append(
+            Fault(kind=kind, name=kind.value, found=text, ratio=float(values[k]), time=time, line=line)
+        )
+    return and_more(said, len(worst), "corners")
+
+
+def _too_fast(check: CornerCheck, k: int) -> str:
+    return (
+        f"passed at {check.feed_planned[k]:.6g} mm/s, {check.speed_ratio[k]:.7g} of what the axes' acceleration leaves a "
+        "motion of its curvature"
+    )
+
+
+def _overdrawn(check: CornerCheck, k: int) -> str:
+    return (
+        f"missed by {check.budget_ratio[k] * check.budget[k]:.7g} mm with the chord error, {check.budget_ratio[k]:.7g} "
+        f"of the budget {check.budget[k]:.6g} mm"
+    )
+
+
+def _nearest_sample(
+    trajectory: Trajectory, near_time: FloatArray, vertex: FloatArray, machine: Machine, limits: Limits
+) -> tuple[_Reading, FloatArray]:
+    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the period between them [s].
+
+    Accelerations derived from the positions are means of the motion's, which keep its limits. What the positions' rounding r makes of
+    them over the period h, at most 4 r / h^2, is taken off.
+    """
+    after = np.clip(trajectory.first_not_before(near_time), 1, max(len(trajectory) - 1, 1))
+    after = np.minimum(after, len(trajectory) - 1)  # a single sample is both
+    before = np.maximum(after - 1, 0)
+    rows = np.unique(np.concatenate([before, after]))
+    near = trajectory.rows(rows)
+    before, after = np.searchsorted(rows, before), np.searchsorted(rows, after)
+    distance = [np.linalg.norm(near.position[k] - vertex, axis=1) for k in (before, after)]
+    k = np.where(distance[0] < distance[1], before, after)
+    there, period = _read(near, k, np.minimum(*distance), machine), near.t[after] - near.t[before]
+    if not limits.judged[ACCELERATION]:
+        ulp = ROUNDING_ULPS * 2.0**-52 * np.abs(near.position[k]).max(axis=1, initial=0.0)
+        rounding = np.linalg.norm(limits.rounding) + ulp + limits.time_rounding * there.feed
+        there = replace(there, normal=np.maximum(there.normal - 4.0 * rounding / period**2, 0.0))
+    return there, period
+
+
+def _nearest_point(
+    motion: AnyMotion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
+) -> _Reading:
+    """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method on (p - P).p' = 0."""
+    time, readings = start, []
+    for _ in range(NEAREST_STEPS + 1):
+        unique, row = np.unique(np.clip(time, 0.0, motion.end), return_inverse=True)
+        there = motion.at(unique, period)
+        off, velocity = there.position[row] - vertex, there.velocity[row]
+        readings.append(_read(there, row, np.linalg.norm(off, axis=1), machine))
+        slope = (velocity**2).sum(axis=1) + (off * there.acceleration[row]).sum(axis=1)
+        change = np.divide((off * velocity).sum(axis=1), slope, out=np.zeros_like(time), where=slope > 0)
+        time = np.clip(time - change, start - period, start + period)
+    return reduce(_nearer, readings)
+
+
+def _joined(readings: list[_Reading]) -> _Reading:
+    return _Reading(
+        **{name: np.concatenate([getattr(one, name) for one in readings]) for name in vars(readings[0])}
+    )
+
+
+def _nearer(a: _Reading, b: _Reading) -> _Reading:
+    first = a.distance < b.distance
+    return _Reading(**{name: np.where(first, getattr(a, name), getattr(b, name)) for name in vars(a)})
+
+
+def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machine) -> _Reading:
+    """What the motion does at its samples `rows` (C,)."""
+    linear = _linear(motion.axes)
+    velocity, acceleration = motion.velocity[rows][:, linear], motion.acceleration[rows][:, linear]
+    feed = np.linalg.norm(velocity, axis=1)
+    moves = feed > FEED_AT_REST
+    tangent = np.divide(velocity, feed[:, None], out=np.zeros_like(velocity), where=moves[:, None])
+    across = acceleration - (acceleration * tangent).sum(axis=1)[:, None] * tangent
+    normal = np.where(moves, np.linalg.norm(across, axis=1), 0.0)
+    return _Reading(
+        time=motion.t[rows],
+        feed=feed,
+        normal=normal,
+        allowed=allowed_across(across, motion.axes, machine),
+        distance=distance,
+    )
+
+
+def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
+    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least over all directions."""
+    limits = machine.limits("acceleration", axes)[_linear(axes)]
+    size = np.linalg.norm(direction, axis=1)
+    given = np.abs(direction) @ limits
+    support = np.divide(given, size, out=np.full(len(size), limits.min()), where=size > 0)
+    return np.minimum(support, normal_limit(machine))
+
+
+def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatArray:
+    """Eq. (20)'s speed of the paper's corner at the joints `corner` (C,) [mm/s]."""
+    linear = _linear(toolpath.axes)
+    across = (toolpath.tangent_start[corner] - toolpath.tangent_end[corner - 1])[:, linear]
+    eps, filters = toolpath.tolerance[corner], machine.fir.time_constants if machine.fir else ()
+    rate = bow_share(machine) * machine.dt**2 + sum(T * T for T in filters) / 24.0
+    X = np.minimum(allowed_across(across, toolpath.axes, machine), eps / (2.0 * rate))
+    speed: FloatArray = np.sqrt(1.5 * X * (eps - rate * X)) / np.tan(toolpath.theta[corner] / 2.0)
+    return speed
+
+
+def _bow(machine: Machine, axes: tuple[str, ...], period: FloatArray) -> FloatArray:
+    """The farthest that the axes can leave the chord of a period (C,) [mm]."""
+    bow: FloatArray = np.linalg.norm(machine.limits("acceleration", axes)) * period**2 / 8.0
+    return bow
+
+
+def _linear(axes: tuple[str, ...]) -> Array:
+    return np.array([letter in LINEAR_AXES for letter in axes])

@@ -1,0 +1,155 @@
+"""What is wrong with a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for who made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.verifier.pieces import RATIO_ROUNDING
+
+
+class Kind(StrEnum):
+    """What a fault is about."""
+
+    SAMPLES = "samples"  # periods, digits, columns, rest at both ends
+    LIMIT = "limit"  # of an axis, the feed, the normal acceleration, one's own, the extruder
+    CONTOUR = "contour"
+    VERTEX = "vertex"
+    ORDER = "order"  # blocks left out, in another order, or the ends elsewhere
+    STOP = "stop"  # full stops and dwells
+    EXACT = "exact path"
+    THREAD = "thread"
+    EXTRUDER = "extruder"
+    FILTERS = "after the filters"
+    CORNER_SPEED = "eq. 19"
+    CORNER_BUDGET = "eq. 18"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One thing that is wrong with a motion; as text its sentence.
+
+    kind  : what it is about
+    name  : the quantity or the rule: "jerk.x", "feed", "vertex", "stop", "eq. 19", ...
+    found : what was found there, what is allowed, and where, in words
+    ratio : value over what is allowed [-]; None where it is no matter of size
+    time  : of its place in the motion [s]; None where it has none
+    line  : NC line of its place; None where it has none
+    """
+
+    kind: Kind
+    name: str
+    found: str
+    ratio: float | None = None
+    time: float | None = None
+    line: int | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Name and finding: "jerk.x: 1200 mm/s3, 1.2 of the limit 1000 mm/s3 at t = 0.1 s, X1, line 3"."""
+        return f"{self.name}: {self.found}"
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def and_more(faults: list[Fault], count: int, of: str) -> list[Fault]:
+    """The faults, and one that tells how many there are in all, if these are not all `count`."""
+    if count == len(faults):
+        return faults
+    return [*faults, Fault(kind=faults[0].kind, name=faults[0].name, found=f"{count} {of} in all")]
+
+
+# What an error of the chords between samples alone can break.
+OF_CHORDS = frozenset({Kind.CONTOUR, Kind.VERTEX, Kind.CORNER_BUDGET})
+
+# The quantities of limits.py by `Spans.column`, and the power of how much slower a motion is by which each gets less.
+NAMES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
+POWERS = (1, 2, 3, 1, 2)
+APART = 3  # samples: those that are not further apart are of one span
+SPANS_MAX = 20_000  # of a reading; a motion with more is broken everywhere
+
+
+@dataclass(frozen=True, kw_only=True)
+class Excess:
+    """A span of time in which a motion exceeds a limit or the tolerance.
+
+    kind  : what the fault is about
+    name  : the quantity: "jerk", "feed", "contour", "eq. 18", ...; of limits of one's own "velocity.NAME"
+    begin : when it is first seen [s]
+    end   : when it is last seen [s]
+    ratio : the largest value over what is allowed [-], > 1
+    power : a motion that is f times slower there has 1/f^power of it
+    still : share of what is allowed that does not get less: the path's own error [-]
+    """
+
+    kind: Kind
+    name: str
+    begin: float
+    end: float
+    ratio: float
+    power: int
+    still: float = 0.0
+
+    @property
+    def slower(self) -> float:
+        """By how much slower the motion would have to be there to keep what is allowed [-]; inf where that does not help."""
+        if self.still >= 1.0:
+            return float("inf")
+        return float(((self.ratio - self.still) / (1.0 - self.still)) ** (1.0 / self.power))
+
+
+@dataclass
+class Spans:
+    """Spans of consecutive samples above a limit, as they are read.
+
+    column : which quantity each is of (`NAMES`)
+    """
+
+    column: list[int] = field(default_factory=list)
+    begin: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+    ratio: list[float] = field(default_factory=list)
+
+    def take(self, t: FloatArray, over: FloatArray) -> None:
+        """The spans of samples at the times t (n,) [s] with the ratios `over` (n, columns), 0 where nothing is exceeded."""
+        for column in np.flatnonzero(over.any(axis=0)).tolist():
+            self.add(column, t, over[:, column])
+
+    def add(self, column: int, t: FloatArray, over: FloatArray) -> None:
+        """The same of one quantity.
+
+        t    : (n,) [s]
+        over : (n,) the ratios, of which some are above 0 [-]
+        """
+        at = np.flatnonzero(over)
+        first = np.flatnonzero(np.diff(at, prepend=-APART - 1) > APART)
+        last = np.append(first[1:], len(at)) - 1
+        room = max(SPANS_MAX - len(self.begin), 0)
+        self.column += [column] * min(len(first), room)
+        self.begin += t[at[first]][:room].tolist()
+        self.end += t[at[last]][:room].tolist()
+        self.ratio += np.maximum.reduceat(over[at], first)[:room].tolist()
+
+    def excesses(self, not_limited: tuple[str, ...]) -> list[Excess]:
+        """All of them but those of quantities that are reported only."""
+        return [
+            Excess(kind=Kind.LIMIT, name=NAMES[c], begin=begin, end=end, ratio=ratio, power=POWERS[c])
+            for c, begin, end, ratio in zip(self.column, self.begin, self.end, self.ratio, strict=True)
+            if NAMES[c] not in not_limited
+        ]
+
+
+def above(ratio: FloatArray) -> FloatArray:
+    """(n,) of a `ratio` (n,) [-] what is above 1 by more than rounding, 0 elsewhere."""
+    return np.where(ratio > 1.0 + RATIO_ROUNDING, ratio, 0.0)
+
+
+def of_check(name: str, span: tuple[float, float], ratio: float) -> Excess:
+    """Of one place of which no more is known than the largest ratio of a quantity, "jerk.e" for example, and the `span` [s] that it is
+    of."""
+    power = POWERS[NAMES.index(name.partition(".")[0])]
+    return Excess(kind=Kind.LIMIT, name=name, begin=span[0], end=span[1], ratio=ratio, power=power)

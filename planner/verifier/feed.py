@@ -1,0 +1,165 @@
+"""Feed: never above the F word of the block on which the motion is (switches.py).
+
+Every chord of length c over a period h is cut at these places, and its parts c_i, each on a block with the feed F_i, take at least
+
+    sum c_i / F_i  <=  h,        the ratio of the check is  sum c_i / (F_i h).
+
+So a slow block is not hidden in a period in which others are run through too: what is run of it, c_i, takes c_i / F_i. Where the
+tolerance lets a motion cut a block off, nothing is run of it. Where speeds were delivered they are compared with the F at their places
+too.
+
+F is the speed in x, y and z alone where these move, in u, v and w where only those do, else in the rotary axes. Beside a corner the
+parts of a motion in these axes differ from those of its block, so the chord in them alone is compared with F, too.
+
+So far as sampling does not tell where a block begins and ends (`reach` in switches.py) a place belongs to both, and the larger F
+counts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.verifier.excess import NAMES, Spans
+from planner.verifier.kernel import kernel
+from planner.verifier.limits import COLUMN, DIFFERENCE
+from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
+from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
+
+
+class Feeds:
+    """Judges the feed of a motion, block of samples by block of samples.
+
+    row          : (4,) the worst, as a row of `limits.Worst`: ratio, value [mm/s], limit [mm/s], `COLUMN` or `DIFFERENCE`
+    time, at     : when [s] and where (A,) [mm]
+    piece        : on which piece
+
+    over : takes where the feed is exceeded
+    """
+
+    def __init__(self, pieces: ProgramPieces, bounds: Bounds, over: Spans, axes: tuple[str, ...] = ()):
+        groups = axis_groups(axes)
+        self._groups = groups if (groups > 0).any() else groups[:0]
+        self.row, self.time, self.at, self.piece = np.zeros(4), 0.0, np.zeros(pieces.vertex.shape[1]), 0
+        self._pieces, self._bounds, self._switches, self._over = (
+            pieces,
+            bounds,
+            Switches(pieces, bounds),
+            over,
+        )
+        self._block = np.zeros(1, dtype=np.int64)  # the first one that chords can still be on
+        self._left: Chords | None = None
+
+    def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
+        """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for `Switches.take`."""
+        self._switches.take(new, skip, first, last)
+        new = Chords(*(column[skip:].copy() for column in new))
+        if self._left is not None:
+            new = Chords(*(np.concatenate(pair) for pair in zip(self._left, new, strict=True)))
+        self._left = new
+        gap = float(np.diff(new.t).max(initial=0.0))
+        pace = float(np.linalg.norm(self._bounds.velocity))
+        push = self._bounds.acceleration * gap
+        room = 2.0 * gap * (pace + (push if np.isfinite(push) else pace))  # the longest reach of a vertex
+        self._judge(float(self._switches.along[SURE]) - room)
+
+    def finish(self) -> None:
+        """No more samples: judge what is left."""
+        self._switches.finish()
+        self._judge(np.inf)
+
+    def _judge(self, until: float) -> None:
+        chords = self._left
+        if chords is None or len(chords.t) < 2 or chords.place[1] > until:
+            return
+        worst, sample, over = self.row.copy(), np.full(1, -1, dtype=np.int64), np.zeros(len(chords.t))
+        known = int(self._switches.state[OPEN])
+        switch = self._switches.switch
+        done = _judged(
+            self._pieces, self._groups, switch, known, self._block, chords, until, worst, sample, over
+        )
+        if over.any():
+            self._over.add(NAMES.index("feed"), chords.t, over)
+        k = int(sample[0])
+        if k >= 0:
+            self.row, self.time, self.at, self.piece = (
+                worst,
+                float(chords.t[k]),
+                chords.position[k].copy(),
+                int(chords.piece[k]),
+            )
+        self._switches.along[JUDGED] = float(chords.place[done - 1])
+        self._left = Chords(*(column[done - 1 :].copy() for column in chords))
+
+
+@kernel()
+def _judged(
+    pieces: ProgramPieces,
+    groups: Array,
+    switch: Array,
+    known: int,
+    block: Array,
+    chords: Chords,
+    until: float,
+    worst: FloatArray,
+    sample: Array,
+    over: FloatArray,
+) -> int:
+    """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and `over` (n,); vertices before
+    `known` are settled. -> the first one that is left
+
+    groups : (A,) of the axes (`axis_groups`), (0,) where F counts all of them
+    """
+    n = len(chords.t)
+    for k in range(1, n):
+        begin, end = chords.place[k - 1], chords.place[k]
+        if end > until:
+            return k
+        while block[0] + 1 < known and switch[block[0] + 1]["end"] < begin:
+            block[0] += 1
+        lasts, at = 0.0, begin
+        feed = 0.0
+        while True:
+            feed, next_at = 0.0, end
+            for i in range(block[0], known):
+                if switch[i]["begin"] > at:
+                    next_at = min(next_at, switch[i]["begin"])
+                    break
+                to = switch[i + 1]["end"] if i + 1 < known else np.inf
+                if at < to or (at == end and at == to):
+                    feed, next_at = max(feed, pieces.piece[i]["feed"]), min(next_at, to)
+            if at >= end:
+                break
+            lasts += (next_at - at) / feed
+            at = next_at
+        step, h = end - begin, chords.t[k] - chords.t[k - 1]
+        if len(groups) and h > 0.0:
+            least, value, word = np.inf, 0.0, np.inf
+            for i in range(block[0], known):
+                if switch[i]["begin"] > end:
+                    break
+                square = 0.0
+                for a in range(len(groups)):
+                    if groups[a] == pieces.piece[i]["by"]:
+                        square += (chords.position[k, a] - chords.position[k - 1, a]) ** 2
+                part = max(np.sqrt(square) - chords.error[k] - chords.error[k - 1], 0.0) / h
+                if part < least * pieces.piece[i]["word"]:
+                    least, value, word = part / pieces.piece[i]["word"], part, pieces.piece[i]["word"]
+            if least > 1.0 + RATIO_ROUNDING and least < np.inf:
+                over[k] = least
+            if least > worst[0] and least < np.inf:
+                worst[0], worst[1], worst[2], worst[3] = least, value, word, DIFFERENCE
+                sample[0] = k
+        if step > 0.0 and lasts > 0.0:
+            value = max(step - chords.error[k] - chords.error[k - 1], 0.0) / h
+            if value * lasts > (1.0 + RATIO_ROUNDING) * step:
+                over[k] = max(over[k], value * lasts / step)
+            if value * lasts > worst[0] * step:
+                worst[0], worst[1], worst[2], worst[3] = value * lasts / step, value, step / lasts, DIFFERENCE
+                sample[0] = k
+        if chords.speed[k] > (1.0 + RATIO_ROUNDING) * feed:
+            over[k] = max(over[k], chords.speed[k] / feed)
+        if chords.speed[k] > worst[0] * feed:  # false where it is NaN
+            worst[0], worst[1], worst[2], worst[3] = chords.speed[k] / feed, chords.speed[k], feed, COLUMN
+            sample[0] = k
+    return n

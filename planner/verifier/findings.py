@@ -1,0 +1,328 @@
+"""From what the readings of a motion showed to checks and to faults in sentences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.machine import ROTARY_AXES, Machine
+from planner.motion.trajectory import in_degrees
+from planner.verifier import limits as rows
+from planner.verifier.excess import Excess, Fault, Kind, and_more, of_check
+from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
+from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
+from planner.verifier.sample_block import Limits
+from planner.verifier.stream import Observed
+from planner.verifier.verdict import LimitCheck
+
+QUANTITIES = ("velocity", "acceleration", "jerk")
+UNITS = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
+FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
+
+# A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a motion times are good to
+# 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop exceeds it by far more.
+STOP_ROUNDING = 1e-3
+
+
+@dataclass(frozen=True)
+class Look:
+    """One reading of the motion: the delivered samples (note "") or the dense ones."""
+
+    seen: Observed
+    note: str
+
+    def noted(self, text: str) -> str:
+        """A text with the note of this reading behind it."""
+        return ", ".join(part for part in (text, self.note) if part)
+
+
+def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is nearest, and no earlier than the
+    joint before. That of a joint that is not reached is that of the last one before that is: its own is 0.
+
+    A late time hides no fault: a joint is compared with the chords run while the piece before it is possible, so that its time reaches
+    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it delays were passed within
+    it. An error of the tolerance is allowed there anyway.
+    """
+    near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    return np.maximum.accumulate(near)
+
+
+def measured(looks: list[Look], group: int) -> FloatArray:
+    """Largest ratio per axis (A,) of a group of rows, over all readings."""
+    axes = looks[0].seen.at.shape[1]
+    return np.array([look.seen.worst[group * axes : (group + 1) * axes, 0] for look in looks]).max(axis=0)
+
+
+def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]) -> list[Excess]:
+    """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are of, at the worst place."""
+    found = [
+        each
+        for look in looks
+        for seen in (look.seen.over, look.seen.own.over)
+        for each in seen.excesses(not_limited)
+    ]
+    shown = {each.name for each in found}
+    broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
+    back = rows.BACK * looks[0].seen.gap_max  # a difference of positions is of what lies so far behind it
+    return found + [of_check(check.name, (check.time - back, check.time), check.ratio) for check in broken]
+
+
+# ---- limits and columns ----------------------------------------------------------------------------------------------
+
+
+def limit_checks(
+    looks: list[Look],
+    toolpath: Toolpath,
+    machine: Machine,
+    pieces: ProgramPieces,
+    not_limited: tuple[str, ...],
+) -> dict[str, LimitCheck]:
+    """The worst of every limit, by name."""
+    axes = toolpath.axes
+    table = [
+        (f"{quantity}.{letter}", ("deg" if letter in ROTARY_AXES else "mm") + UNITS[quantity], row, limit)
+        for group, quantity in enumerate(QUANTITIES)
+        for row, (letter, limit) in enumerate(
+            zip(axes, machine.limits(quantity, axes), strict=True),  # type: ignore[arg-type]
+            start=group * len(axes),
+        )
+    ]
+    table.append(("feed", "mm/s", rows.GROUPS * len(axes) + rows.FEED, np.inf))
+    across = rows.normal_limit(machine)
+    if np.isfinite(across):
+        table.append((rows.NORMAL_NAME, "mm/s2", rows.GROUPS * len(axes) + rows.NORMAL, across))
+    checks = {
+        name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
+        for name, unit, row, limit in table
+    }
+    return checks | _own_checks(looks, toolpath, pieces, not_limited)
+
+
+def _own_checks(
+    looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, not_limited: tuple[str, ...]
+) -> dict[str, LimitCheck]:
+    """The worst of every limit of one's own that bounds anything (own.py)."""
+    checks = {}
+    for row in range(len(looks[0].seen.own.worst)):
+        if not any(look.seen.own.bounded[row] for look in looks):
+            continue
+        look = looks[int(np.argmax([each.seen.own.worst[row, 0] for each in looks]))]
+        own = look.seen.own
+        (ratio, value, limit_there, how), (name, unit) = own.worst[row], own.name(row)
+        checks[name] = LimitCheck(
+            name=name,
+            unit=unit,
+            ratio=float(ratio),
+            value=float(value),
+            limit=float(limit_there if ratio > 0 else own.least[row]),
+            time=float(own.time[row]),
+            position=own.at[row],
+            line=line_of(toolpath, pieces, own.piece[row]),
+            limited=name.split(".")[0] not in not_limited,
+            note=look.noted("differences of position" if how == rows.DIFFERENCE else "column")
+            if ratio > 0
+            else "",
+        )
+    return checks
+
+
+def _limit_check(
+    name: str,
+    unit: str,
+    row: int,
+    limit: float,
+    looks: list[Look],
+    toolpath: Toolpath,
+    pieces: ProgramPieces,
+    not_limited: tuple[str, ...],
+) -> LimitCheck:
+    look = max(looks, key=lambda each: each.seen.worst[row, 0])
+    ratio, value, limit_there, how = look.seen.worst[row]
+    text = "differences of position" if how == rows.DIFFERENCE else "column"
+    degrees = in_degrees(toolpath.axes, toolpath.radius)
+    letter = name.rpartition(".")[2]
+    per = float(degrees[toolpath.axes.index(letter)]) if letter in toolpath.axes else 1.0
+    return LimitCheck(
+        name=name,
+        unit=unit,
+        ratio=float(ratio),
+        value=float(value) * per,
+        limit=float(limit_there if ratio > 0 else limit) * per,
+        time=float(look.seen.time[row]),
+        position=look.seen.at[row] * degrees,
+        line=line_of(toolpath, pieces, look.seen.piece[row]),
+        limited=name.split(".")[0] not in not_limited,
+        note=look.noted(text) if ratio > 0 else "",
+    )
+
+
+def column_faults(
+    looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces
+) -> list[Fault]:
+    """Columns that do not belong to the positions (formulas in `limits`)."""
+    acceleration = np.maximum(1.0, measured(looks, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
+    jerk = np.maximum(1.0, measured(looks, rows.JERK)) * (1.0 + RATIO_ROUNDING)
+    tests = [("velocity", "the positions", rows.GAP_BY_ACCELERATION, acceleration)]
+    if limits.jerk_limited:
+        tests.append(("velocity", "the positions", rows.GAP_BY_JERK, jerk))
+        tests.append(("acceleration", "the velocity column", rows.GAP_OF_ACCELERATION, jerk))
+    said = []
+    for look in looks:
+        for column, against, group, bound in tests:
+            for axis, letter in enumerate(toolpath.axes):
+                row = group * len(toolpath.axes) + axis
+                if (ratio := float(look.seen.worst[row, 0])) > bound[axis]:
+                    time, line = float(look.seen.time[row]), line_of(toolpath, pieces, look.seen.piece[row])
+                    text = (
+                        f"{column}.{letter} does not agree with {against} at t = {time:.6g} s, line {line}: "
+                    )
+                    text += look.noted(f"{ratio:.6g} of the difference that the limits allow")
+                    fault = Fault(
+                        kind=Kind.SAMPLES, name="columns", found=text, ratio=ratio, time=time, line=line
+                    )
+                    said.append(fault)
+    return said
+
+
+def largest_chord_error(looks: list[Look]) -> float:
+    """Largest bow over one delivered period [mm]."""
+    return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
+
+
+# ---- ends, order, stops -----------------------------------------------------------------------------------------------
+
+
+def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tuple[float, list[Fault]]:
+    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it.
+
+    rounding : (A,) largest error of a position by its digits [mm]
+    """
+    worst, said = 0.0, []
+    allowed = CONTOUR_ROUNDING + float(np.linalg.norm(rounding))
+    for look in looks:
+        for name, place, wanted, time, line in (
+            ("start", look.seen.first, toolpath.start[0], look.seen.t_first, toolpath.line[0]),
+            ("end", look.seen.last, toolpath.end[-1], look.seen.t_last, toolpath.line[-1]),
+        ):
+            distance = float(np.linalg.norm(place - wanted))
+            worst = max(worst, distance)
+            if distance > allowed:
+                text = f"the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
+                text += look.noted(f"{allowed:.2g} mm allowed, line {line}")
+                said.append(
+                    Fault(
+                        kind=Kind.ORDER,
+                        name=name,
+                        found=text,
+                        ratio=distance / allowed,
+                        time=time,
+                        line=int(line),
+                    )
+                )
+    return worst, said
+
+
+def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[Fault]]:
+    """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it."""
+    lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
+    in_order, said = True, []
+    for look in looks:
+        match = look.seen.match
+        end_reached = (
+            match.passed["near"][-1] <= pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+        )
+        left_out = match.track["lost"].copy()
+        left_out[match.tally[LAST] + 1 :] = True
+        left_out[-1] |= not end_reached
+        lost |= left_out
+        here = np.unique(pieces.piece["segment"][left_out])
+        if len(here):
+            lines = list(dict.fromkeys(toolpath.line[here].tolist()))
+            shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
+                " ..." if len(lines) > FAULTS_OF_A_KIND else ""
+            )
+            said.append(
+                _order(look.noted(f"{len(here)} blocks are not run to their end, line {shown}"), lines[0])
+            )
+        if match.tally[HELD]:
+            line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
+            held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
+            said.append(_order(look.noted(held), line))
+        in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
+    return np.unique(pieces.piece["segment"][lost]), in_order, said
+
+
+def _order(found: str, line: int) -> Fault:
+    return Fault(kind=Kind.ORDER, name="order", found=found, line=line)
+
+
+def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
+    """What is wrong with a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
+    been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
+    for look in looks:
+        at = int(look.seen.match.tally[STUCK_AT])
+        if at != NOT_LOST:
+            line = line_of(toolpath, pieces, at - 1)
+            said = f"near enough to all of the path, but not in its order, at the end of line {line}"
+            return [_order("the motion is " + look.noted(said), line)]
+    return []
+
+
+def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits) -> list[Fault]:
+    """Full stops that are run through, and dwells cut short."""
+    joint = np.flatnonzero(pieces.joint["real"])
+    # A motion above its limits leaves a rest faster than they say: it is not called short by that, too.
+    over = np.sqrt(measured(looks, rows.ACCELERATION).max())
+    if limits.jerk_limited:
+        over = max(over, np.cbrt(measured(looks, rows.JERK).max()))
+    hurry = 2.0 * (1.0 - (1.0 - STOP_ROUNDING) / max(over, 1.0))
+    said = []
+    for look in looks:
+        match = look.seen.match
+        stop_ratio = match.passed["stop_ratio"][joint]
+        visited = np.isfinite(stop_ratio)  # the others belong to blocks that are not run, which `order` names
+        through = np.flatnonzero(
+            (pieces.joint["stop"][joint] == 1) & visited & (stop_ratio > 1.0 + STOP_ROUNDING)
+        )
+        # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
+        unknown = RATIO_ROUNDING * toolpath.dwell + hurry * look.seen.gap_max + 2.0 * limits.time_rounding
+        short = toolpath.dwell - match.passed["rest"][joint] > unknown
+        of_kind: dict[str, list[Fault]] = {"stop": [], "dwell": []}
+        for i in through[:FAULTS_OF_A_KIND]:
+            seen = f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
+            text = f"no full stop at {_joint_name(toolpath, i)}: {look.noted(seen)}"
+            of_kind["stop"].append(_stop("stop", text, toolpath, i, float(stop_ratio[i])))
+        for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
+            seen = f"{match.passed['rest'][joint[i]]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
+            text = f"too short at {_joint_name(toolpath, i)}: {look.noted(seen)}"
+            of_kind["dwell"].append(_stop("dwell", text, toolpath, i))
+        said += of_kind["stop"] + of_kind["dwell"]
+        for name, count in (("stop", len(through)), ("dwell", int(short.sum()))):
+            said += and_more(of_kind[name], count, "such places")[len(of_kind[name]) :]
+    return said
+
+
+def _stop(name: str, found: str, toolpath: Toolpath, i: int, ratio: float | None = None) -> Fault:
+    return Fault(kind=Kind.STOP, name=name, found=found, ratio=ratio, line=int(toolpath.line[max(i - 1, 0)]))
+
+
+def _joint_name(toolpath: Toolpath, i: int) -> str:
+    where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, _joint_point(toolpath, i), strict=True))
+    return (
+        f"the start of line {toolpath.line[0]}, {where}"
+        if i == 0
+        else f"the end of line {toolpath.line[i - 1]}, {where}"
+    )
+
+
+def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
+    return toolpath.start[i] if i < len(toolpath) else toolpath.end[-1]
+
+
+def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:
+    """The source line of a piece of the program; for a negative one that of the first piece."""
+    return int(toolpath.line[pieces.piece["segment"][max(piece, 0)]])

@@ -1,0 +1,261 @@
+"""Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry along the program.
+
+    joints   the limits of x, y, z as those of limits.py: on the delivered columns, and on divided differences of the positions
+    tip      brought back by the chain of kinematics.py, positions alone, and judged like any motion: rotary limits, feed, contour,
+             vertices, order
+    between  the joints run straight from setpoint to setpoint, and so the tip does not: how far its middle leaves the middle of the
+             tips at both ends is added to the contour error
+
+A program's path has tip and angles in one norm, angles at a radius. The tool's direction turns by no more than the norm of what the
+angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the tolerance of the angles is one of the direction, too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, Machine
+from planner.motion.trajectory import Trajectory, joined
+from planner.verifier.excess import Fault, Kind
+from planner.verifier.findings import QUANTITIES
+from planner.verifier.given import DERIVATIVES, Given
+from planner.verifier.judge import verify
+from planner.verifier.kinematics import tip_and_direction
+from planner.verifier.limits import COLUMN, NORMAL_NAME
+from planner.verifier.own import OwnSeen
+from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
+from planner.verifier.sample_block import Limits, SampleBlock
+from planner.verifier.stream import CARRIED
+from planner.verifier.verdict import LimitCheck, Verdict
+
+# Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints [-].
+NOT_JUDGED = 100.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointVerdict:
+    """The findings of `verify_joints`.
+
+    passed       : True if every check holds
+    limits       : of the linear joints, "velocity.x" and so on
+    tip          : the verdict of the tip's motion
+    tip_error_mm : largest distance of tip and angles from the path, with what lies between setpoints [mm]; inf where it was lost
+    faults       : each failure
+    """
+
+    passed: bool
+    limits: dict[str, LimitCheck]
+    tip: Verdict
+    tip_error_mm: float
+    faults: tuple[Fault, ...]
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Of the linear joints, and of rotary joints, feed and tip: value / limit [-]."""
+        return {name: check.ratio for name, check in self._of_joints_and_tip().items()}
+
+    def verdict(self) -> Verdict:
+        """All of it as one verdict: limits of the joints in place of those of the tip's coordinates."""
+        known = np.isfinite(self.tip_error_mm)
+        contour = self.tip.contour
+        more = self.tip_error_mm - (self.tip.contour_error_mm or 0.0) if known else 0.0
+        value = contour.value + more
+        linear = self.tip.linear_error_mm
+        return dataclasses.replace(
+            self.tip,
+            passed=self.passed,
+            limits=self._of_joints_and_tip(),
+            contour=dataclasses.replace(contour, value=value, ratio=contour.ratio + more / contour.limit),
+            contour_error_mm=self.tip_error_mm if known else None,
+            linear_error_mm=None if linear is None else linear + more,
+            faults=self.faults,
+        )
+
+    def _of_joints_and_tip(self) -> dict[str, LimitCheck]:
+        of_tip = {n: c for n, c in self.tip.limits.items() if n.rpartition(".")[2] not in LINEAR_AXES}
+        found = self.limits | of_tip
+        order = {quantity: k for k, quantity in enumerate(QUANTITIES)}
+        return dict(sorted(found.items(), key=lambda pair: order.get(pair[0].partition(".")[0], len(order))))
+
+
+def verify_joints(
+    setpoints: Trajectory,
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    tool_length: float | None = None,
+    given: Given | None = None,
+    not_limited: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> JointVerdict:
+    """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics].
+
+    tool_length : [mm]; None for that of the machine file
+    given       : which columns were delivered; None for all
+    not_limited : quantities that are not judged, such as "jerk"
+    progress    : called now and then with the fraction done (0 to 1)
+
+    Raises InputError for a machine without kinematics, and as `verify` does.
+    """
+    if machine.kinematics is None:
+        raise InputError(f"machine '{machine.name}' has no table [kinematics]")
+    carried = _Carried(
+        machine, setpoints, machine.kinematics.tool_length if tool_length is None else tool_length
+    )
+    given = Given() if given is None else given
+    # of machines with a limit of the normal acceleration that limit is not one of the tip: it moves with the workpiece
+    tip = verify(
+        carried.motion(setpoints),
+        toolpath,
+        _of_tip(machine),
+        given=dataclasses.replace(given, columns=()),
+        not_limited=(*not_limited, NORMAL_NAME),
+        progress=progress,
+    )
+    gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
+    limits = _joint_checks(setpoints, machine, given, not_limited)
+    broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
+    faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
+    error = (np.inf if tip.contour_error_mm is None else tip.contour_error_mm) + gap
+    tolerance = tip.contour.limit
+    if error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING and not tip.contour.broken:
+        found = (
+            f"up to {gap:.4g} mm beside its chord between setpoints of the joints: {error:.6g} mm from the path, "
+            f"with {tolerance:.6g} mm allowed"
+        )
+        faults.append(Fault(kind=Kind.CONTOUR, name="tip", found=found, ratio=error / tolerance))
+    faults += tip.faults
+    return JointVerdict(passed=not faults, limits=limits, tip=tip, tip_error_mm=error, faults=tuple(faults))
+
+
+class _Carried:
+    """The tip that joints carry, by the chain of frames of kinematics.py."""
+
+    def __init__(self, machine: Machine, setpoints: Trajectory, length: float):
+        axes, radius = setpoints.axes, setpoints.radius
+        self.data, self.length, self.axes = machine.kinematics, length, axes
+        self.per_length = np.array([1.0 / radius if letter in ROTARY_AXES else 1.0 for letter in axes])
+        self.linear = [axes.index(letter) for letter in LINEAR_AXES]
+
+    def tips(self, position: FloatArray) -> FloatArray:
+        """(n, A) places with x, y, z of the tip for those of the joints."""
+        assert self.data is not None
+        found = position.copy()
+        found[:, self.linear], _ = tip_and_direction(
+            self.data, self.length, self.axes, position * self.per_length
+        )
+        return found
+
+    def motion(self, setpoints: Trajectory) -> Trajectory:
+        """The motion of the tip, positions alone."""
+
+        def of(samples: Trajectory) -> Trajectory:
+            nothing = np.zeros_like(samples.position)
+            return dataclasses.replace(
+                samples,
+                position=self.tips(samples.position),
+                velocity=nothing,
+                acceleration=nothing,
+                jerk=nothing,
+            )
+
+        return setpoints.through(of)
+
+    def gap(self, samples: Trajectory) -> float:
+        """How far the middle of the tip's way between two setpoints leaves the middle of both tips [mm]."""
+        q = samples.position
+        at, middle = self.tips(q), self.tips(0.5 * (q[1:] + q[:-1]))
+        return float(np.linalg.norm(middle - 0.5 * (at[1:] + at[:-1]), axis=1).max(initial=0.0))
+
+
+def _overlapping(setpoints: Trajectory, carried: int) -> Iterator[Trajectory]:
+    """The samples chunk by chunk, each after the first with the last `carried` ones before it."""
+    before: Trajectory | None = None
+    for chunk in setpoints.chunks():
+        whole = chunk if before is None else joined([before, chunk])
+        yield whole
+        before = whole.rows(np.arange(max(len(whole) - carried, 0), len(whole)))
+
+
+def _of_tip(machine: Machine) -> Machine:
+    """The machine without limits of the tip's own coordinates."""
+    linear = [machine.axes[letter] for letter in LINEAR_AXES]
+    free = Axis(**{name: NOT_JUDGED * max(getattr(axis, name) for axis in linear) for name in DERIVATIVES})
+    axes = {letter: free if letter in LINEAR_AXES else axis for letter, axis in machine.axes.items()}
+    # cubics of the joints are not cubics of the tip: it is taken along its chord, and `gap` is added
+    way = "linear" if machine.interpolation == "cubic" else machine.interpolation
+    return machine.model_copy(update={"axes": axes, "interpolation": way}).with_own(())
+
+
+def _joint_checks(
+    setpoints: Trajectory, machine: Machine, given: Given, not_limited: tuple[str, ...]
+) -> dict[str, LimitCheck]:
+    """The worst of each limit of the linear joints, by name."""
+    axes = setpoints.axes
+    seen = OwnSeen(tuple(_Joint(letter, machine.axes[letter]) for letter in LINEAR_AXES), axes)
+    limits = _limits(machine, axes, given, not_limited)
+    travelled, skip = 0.0, 0
+    for part in _overlapping(setpoints, CARRIED):
+        seen.take(
+            SampleBlock(
+                **{name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)},
+                piece=np.asarray(part.line, dtype=np.int64),
+                skip=skip,
+                travelled=travelled,
+            ),
+            limits,
+        )
+        travelled += float(np.linalg.norm(np.diff(part.position, axis=0), axis=1).sum())
+        skip = min(CARRIED, len(part))
+    checks = {}
+    for row, (ratio, value, limit, how) in enumerate(seen.worst):
+        name, unit = seen.name(row)
+        checks[name] = LimitCheck(
+            name=name,
+            unit=unit,
+            ratio=float(ratio),
+            value=float(value),
+            limit=float(limit if ratio > 0 else seen.least[row]),
+            time=float(seen.time[row]),
+            position=seen.at[row],
+            line=int(seen.piece[row]),
+            limited=name.partition(".")[0] not in not_limited,
+            note="column" if how == COLUMN else "differences of position",
+        )
+    return checks
+
+
+def _limits(machine: Machine, axes: tuple[str, ...], given: Given, not_limited: tuple[str, ...]) -> Limits:
+    rounding = np.zeros(len(axes)) if not len(given.position_rounding) else np.array(given.position_rounding)
+    return Limits(
+        per_axis=np.array([machine.limits(name, axes) for name in DERIVATIVES]),  # type: ignore[arg-type]
+        linear=np.array([letter in LINEAR_AXES for letter in axes]),
+        judged=np.array([name in given.columns for name in DERIVATIVES]),
+        rounding=rounding,
+        time_rounding=given.time_rounding,
+        normal=np.inf,
+        acceleration_at_stop=np.full(len(axes), np.inf),
+        jerk_limited="jerk" not in not_limited,
+    )
+
+
+class _Joint(SimpleNamespace):
+    """A joint as `OwnSeen` asks for it: itself, with its limits."""
+
+    def __init__(self, letter: str, axis: Axis):
+        super().__init__(name=letter, unit="mm", turn=None, axis=axis)
+
+    def bounds(self, at: Any) -> tuple[float, float, float]:
+        return self.axis.velocity, self.axis.acceleration, self.axis.jerk
+
+    def value(self, at: Any) -> Any:
+        return getattr(at, self.name)

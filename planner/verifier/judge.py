@@ -1,0 +1,202 @@
+"""`verify`: from a delivered motion to a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
+from planner.motion.trajectory import Trajectory
+from planner.verifier import contour, error_allocation, findings, samples
+from planner.verifier.between import bow_share
+from planner.verifier.exact import exact_faults
+from planner.verifier.excess import Kind
+from planner.verifier.extruder import extruder_seen
+from planner.verifier.filtered import after_filters
+from planner.verifier.findings import QUANTITIES
+from planner.verifier.given import DERIVATIVES, WHOLE, Given
+from planner.verifier.held import thread_checks, thread_faults
+from planner.verifier.limits import NORMAL_NAME, normal_limit
+from planner.verifier.pieces import program_pieces, widened
+from planner.verifier.reading import CHORDS, Reader
+from planner.verifier.ringing import ringing_of
+from planner.verifier.sample_block import Limits
+from planner.verifier.times import AnyMotion, cells_per_period
+from planner.verifier.verdict import Verdict
+
+NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
+READING = 0.9  # share of a verdict's time that the first reading takes, about [-]
+
+
+def verify(
+    trajectory: Trajectory,
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    motion: AnyMotion | None = None,
+    seed: int = 0,
+    given: Given = WHOLE,
+    not_limited: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Verdict:
+    """Judge a delivered motion against the programmed path and the machine.
+
+    trajectory  : the delivered samples at dt; only its times, positions and their derivatives are used
+    toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
+    motion      : what the samples were taken from, to be judged between them too, at times chosen here (times.py); None to judge the
+                  samples alone
+    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another seed
+    given       : which columns of the trajectory were delivered, and with how many digits
+    not_limited : quantities of `NOT_LIMITED_NAMES` that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
+
+    Raises InputError if the axes differ, if the trajectory has no samples, or if its times can only be milliseconds. Raises ValueError
+    for an unknown name in `not_limited`, and for a toolpath that contradicts itself.
+    """
+    _check_input(trajectory, toolpath, not_limited)
+    if motion is None:
+        samples.check_unit_of_time(trajectory, toolpath, machine)
+    pieces = program_pieces(toolpath)
+    limits = _limits(machine, trajectory, given, not_limited)
+    if limits.rounding.any():
+        pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
+    acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
+    cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
+    between = (cells, True) if machine.interpolation == "cubic" else CHORDS
+    reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed, between=between)
+    looks = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
+    apart = contour.apart(looks, pieces, reader.read)
+    contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
+    checks = findings.limit_checks(looks, toolpath, machine, pieces, not_limited)
+    contour_check = apart.contour_check(toolpath)
+    end_error, end_faults = findings.end_error(looks, toolpath, limits.rounding)
+    lost, order, order_faults = findings.order(looks, toolpath, pieces)
+    vertex_faults = apart.vertex_faults(toolpath)
+    if not (contour_check.broken or vertex_faults or order_faults):
+        order_faults = findings.out_of_order(looks, toolpath, pieces)
+        order = not order_faults
+    coarse, notes = samples.digits(trajectory, limits, given, not_limited)
+    if motion is None:
+        seen = max(contour_error or 0.0, vertex_error or 0.0)
+        sparse = samples.density(trajectory, machine, limits, float(toolpath.tolerance.min()), seen)
+        coarse, notes = sparse[0] + coarse, sparse[1] + notes
+    of_samples = coarse + reader.delivered.period_faults()
+    of_samples += reader.comparison.faults(limits, looks) if reader.comparison is not None else []
+    of_samples += findings.column_faults(looks, limits, toolpath, pieces)
+    of_samples += samples.rest_faults(reader.delivered, looks, limits)
+    threads = thread_checks(trajectory, looks, toolpath, pieces, machine)
+    extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
+    if toolpath.extrusion is not None:
+        checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
+    notes += extruder.notes
+    after = after_filters(trajectory, toolpath, machine, pieces)
+    linear_error, angle_error = _both_errors(apart, toolpath)
+    corners = error_allocation.check_corners(
+        trajectory,
+        looks,
+        pieces,
+        toolpath,
+        machine,
+        motion=motion if len(looks) > 1 else None,
+        limits=limits,
+        judged="acceleration" not in not_limited,
+    )
+    faults = (
+        *of_samples,
+        *(check.fault(Kind.LIMIT, toolpath.axes) for check in checks.values() if check.broken),
+        *end_faults,
+        *([contour_check.fault(Kind.CONTOUR, toolpath.axes)] if contour_check.broken else []),
+        *vertex_faults,
+        *order_faults,
+        *findings.stop_faults(looks, toolpath, pieces, limits),
+        *exact_faults(trajectory, looks, toolpath, limits),
+        *thread_faults(threads),
+        *extruder.faults,
+        *(after.faults if after is not None else ()),
+        *error_allocation.too_fast_faults(corners, toolpath.axes),
+        *error_allocation.overdrawn_faults(corners, toolpath.axes),
+    )
+    excesses = findings.excesses(looks, checks, not_limited)
+    excesses += apart.excesses() + error_allocation.excesses(corners)
+    excesses += () if after is None else after.excesses
+    if progress is not None:
+        progress(1.0)
+    return Verdict(
+        passed=not faults,
+        excesses=tuple(sorted(excesses, key=lambda each: each.begin)),
+        limits=checks,
+        contour=contour_check,
+        corners=corners,
+        vertex=apart.vertex_check(toolpath),
+        contour_error_mm=contour_error,
+        linear_error_mm=linear_error,
+        angle_error_deg=angle_error,
+        vertex_error_mm=vertex_error,
+        end_error_mm=end_error,
+        chord_error_mm=bow_share(machine) / bow_share() * findings.largest_chord_error(looks),
+        order=order,
+        lost=tuple(int(toolpath.block[k]) for k in lost),
+        lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
+        lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
+        threads=threads,
+        faults=faults,
+        ringing=ringing_of(trajectory, machine),
+        notes=tuple(notes),
+        after_filters=after,
+    )
+
+
+def _both_errors(apart: contour.Apart, toolpath: Toolpath) -> tuple[float | None, float | None]:
+    """The parts of the contour error in linear axes [mm] and in rotary ones [deg]; None without rotary axes, and where it is not
+    known."""
+    if not apart.fits or not set(toolpath.axes) & set(ROTARY_AXES):
+        return None, None
+    linear, rotary = np.max([look.seen.apart for look in apart.looks], axis=0)
+    return float(linear), float(np.rad2deg(rotary / toolpath.radius))
+
+
+def _check_input(trajectory: Trajectory, toolpath: Toolpath, not_limited: tuple[str, ...]) -> None:
+    if trajectory.axes != toolpath.axes:
+        raise InputError(
+            f"the trajectory has the axes {' '.join(trajectory.axes)}, the program {' '.join(toolpath.axes)}; "
+            "they must be the same in the same order"
+        )
+    if not len(trajectory):
+        raise InputError("the trajectory has no samples")
+    for name in not_limited:
+        if name not in NOT_LIMITED_NAMES:
+            raise ValueError(
+                f"not_limited: '{name}' is not known; allowed are {', '.join(NOT_LIMITED_NAMES)}"
+            )
+
+
+def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
+    per_axis = np.array([machine.limits(name, trajectory.axes) for name in DERIVATIVES])  # type: ignore[arg-type]
+    return Limits(
+        per_axis=per_axis,
+        linear=np.array([letter in LINEAR_AXES for letter in trajectory.axes]),
+        judged=np.array([name in given.columns for name in DERIVATIVES]),
+        rounding=_rounding(trajectory, given, per_axis[1]),
+        time_rounding=given.time_rounding,
+        normal=normal_limit(machine),
+        acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
+        jerk_limited="jerk" not in not_limited,
+        axes=trajectory.axes,
+        own=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
+    )
+
+
+def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
+    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion can have there [mm]."""
+    rounding = np.zeros(len(acceleration))
+    if len(given.position_rounding):
+        rounding = rounding + given.position_rounding
+    if given.end_rounding and len(trajectory) > 1:
+        h = float(trajectory.t[-1] - trajectory.t[-2])
+        speed = np.abs(trajectory.position[-1] - trajectory.position[-2]) / h + acceleration * h
+        rounding = rounding + given.end_rounding * speed
+    return rounding

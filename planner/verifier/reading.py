@@ -1,0 +1,139 @@
+"""One reading of a motion: its delivered samples and, in step with them, what lies between."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator
+
+from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side, threads
+from planner.motion.trajectory import Trajectory
+from planner.verifier.dense import Comparison
+from planner.verifier.findings import Look
+from planner.verifier.given import Given
+from planner.verifier.pieces import PERIOD_ROUNDING, ProgramPieces
+from planner.verifier.sample_block import Limits
+from planner.verifier.samples import Delivered
+from planner.verifier.stream import Watch
+from planner.verifier.times import AnyMotion, look
+
+SIDE_BY_SIDE = SIZES.read_shared
+
+CHORDS = 2, False  # a chord is matched with its middle
+
+
+class Reader:
+    """Reads a trajectory, and the motion it was taken from, from start to end, as often as it is asked to.
+
+    trajectory : the delivered samples, which are looked at chunk by chunk
+    motion     : what they were taken from; None to read the samples alone
+    dt, cells  : the machine's period [s], and into how many cells it is divided (times.py)
+    delivered  : what is kept of the samples of the last reading
+    comparison : of samples and motion; None without a motion
+    between    : into how many parts the machine's way from sample to sample is divided, and whether it is a cubic
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        motion: AnyMotion | None,
+        limits: Limits,
+        given: Given,
+        *,
+        dt: float,
+        cells: int,
+        seed: int,
+        between: tuple[int, bool] = CHORDS,
+    ):
+        self.trajectory, self.motion, self.limits, self.given = trajectory, motion, limits, given
+        self._times, self._way = (dt, seed, cells), between
+        self.delivered = self._delivered()
+        self.comparison = None if motion is None else Comparison(trajectory.axes, motion.end)
+
+    def _delivered(self) -> Delivered:
+        dt = self.trajectory.dt
+        return Delivered(dt, self.given, max(dt, self._times[0]) if self.motion is None else None)
+
+    def read(
+        self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
+    ) -> list[Look]:
+        """What both show beside a path; `progress` is called with the fraction done."""
+        self.delivered = self._delivered()
+        parts, cubic = self._way
+        seen = Watch(pieces, self.limits, parts=parts, cubic=cubic)
+        samples = self.trajectory.chunks()
+        between = None if self.motion is None else self._between(pieces, seen, samples, progress)
+        for chunk in samples:
+            self._take(seen, chunk)
+            progress(seen.seen.samples / len(self.trajectory))
+        seen.finish()
+        looks = [Look(seen.seen, "")]
+        if between is not None:
+            between.finish()
+        if between is not None and between.seen.samples:
+            looks.append(Look(between.seen, "between the samples"))
+        return looks
+
+    def _between(
+        self,
+        pieces: ProgramPieces,
+        seen: Watch,
+        samples: Iterator[Trajectory],
+        progress: Callable[[float], None],
+    ) -> Watch:
+        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the motion is evaluated, the
+        one before is read, and the samples of the one before that, which are then compared. What is seen does not depend on the
+        number of threads."""
+        assert self.motion is not None
+        assert self.comparison is not None
+        between = Watch(pieces, self.limits, parts=1)
+        self.comparison.begin()
+        parts = look(self.motion, *self._times)
+        evaluated, taken = next(parts, None), None  # not read yet; read, but not compared yet
+        while evaluated is not None or taken is not None:
+            found: list[Trajectory] = []
+            tasks = [
+                functools.partial(_evaluate, parts, found),
+                functools.partial(_read, between, evaluated),
+                functools.partial(self._catch_up, seen, samples, taken),
+            ]
+            if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
+                side_by_side(tasks, lambda: None, lambda: None)
+            else:
+                for task in tasks:
+                    task()
+            if taken is not None:
+                self.comparison.compare(taken)
+            end = max(self.motion.end, PERIOD_ROUNDING)
+            evaluated_to, read_to, compared_to = (
+                end if part is None else float(part.t[-1])
+                for part in (next(iter(found), None), evaluated, taken)
+            )
+            begun = taken is not None or evaluated is None
+            progress(min(1.0, (evaluated_to + read_to + begun * compared_to) / (3.0 * end)))
+            evaluated, taken = next(iter(found), None), evaluated
+        return between
+
+    def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory | None) -> None:
+        """Read the samples as far as a part of the motion goes."""
+        while part is not None and seen.seen.t_last < part.t[-1]:
+            chunk = next(samples, None)
+            if chunk is None:
+                break
+            self._take(seen, chunk)
+
+    def _take(self, seen: Watch, chunk: Trajectory) -> None:
+        seen.take(chunk)
+        self.delivered.take(chunk)
+        if self.comparison is not None:
+            self.comparison.deliver(chunk)
+
+
+def _evaluate(parts: Iterator[Trajectory], found: list[Trajectory]) -> None:
+    found.extend(itertools.islice(parts, 1))
+
+
+def _read(watch: Watch, part: Trajectory | None) -> None:
+    if part is not None:
+        watch.take(part)

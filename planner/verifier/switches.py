@@ -1,0 +1,343 @@
+"""On which block the motion is: where it goes over from one to the next.
+
+The motion is on the blocks in their order, and goes over from one to the next where it is nearest to the vertex between them; on a
+straight line that is the vertex. Of several vertices that are within reach of each other those places T_i, in order, count that are
+together nearest to them:
+
+    least  sum_i |x(T_i) - V_i|^2,    T_1 <= T_2 <= ...
+
+over the chords of the motion, by dynamic programming over the vertices that each chord can be at (matching.py). A vertex is settled
+once the motion cannot be on the block before it any more. A full stop is passed where the motion rests.
+
+What sampling cannot tell: between two samples a motion with |acceleration| <= a is within b = a h^2 / 8 of its chord, and its direction
+within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the farthest that the nearest place of the motion and that
+of the chords can be apart, since the samples next to it are exact). A place nearest to a vertex at the distance d has its direction
+across that to the vertex, so that it is at most
+
+    reach  =  min( (d + b) r / (1 - r),  2 h (w + a h) )  +  rounding
+
+away along the motion from where the chords have it; of vertices that are nearest out of order the place together is known to two
+chords. So far from the switch a place belongs to both blocks, and the larger F counts. On a straight line d = 0, and at 100 mm/s,
+4,000 mm/s2 and 1 ms that is 3e-5 mm.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.verifier.kernel import kernel
+from planner.verifier.limits import ROUNDING_ULPS
+from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, reach_chord
+
+# cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked at [mm2]; place: where
+# it is passed along the chords from the start [mm]; begin, end: from where the block after it may have begun, and to where the one
+# before it may last; weight, group: of the vertices that are passed together
+SWITCH = np.dtype(
+    [("cost", "f8"), ("place", "f8"), ("begin", "f8"), ("end", "f8"), ("weight", "f8"), ("group", "i8")]
+)
+# first, count, offset: the vertices that were looked at, and where the marks of those that came nearer begin; begin: place of the
+# chord's start [mm]; step, h, error: its length [mm], duration [s], rounding [mm]
+CHORD = np.dtype(
+    [
+        ("first", "i8"),
+        ("count", "i8"),
+        ("offset", "i8"),
+        ("begin", "f8"),
+        ("step", "f8"),
+        ("h", "f8"),
+        ("error", "f8"),
+    ]
+)
+# In `state`: the first vertex that is not settled; first and behind the last of the chords that are kept; marks used.
+OPEN, HEAD, TAIL, USED = range(4)
+SURE, TRAVELLED, JUDGED = range(
+    3
+)  # in `along`: to where the open vertex is not passed for sure, length run, judged to [mm]
+# Price of a full stop passed where the motion does not rest [budgets]: more than that of all vertices around it.
+RUN_THROUGH = 1e3
+# How much more firmly the place of a full stop is held than that of other vertices that are passed together with it [-].
+FIRM = 1e9
+ROOM = 4096  # chords and marks there is room for at first
+
+
+class Bounds(NamedTuple):
+    """velocity (A,) and digits (A+1,), as in limits.py, and the norm of the largest accelerations [mm/s2], inf where not judged."""
+
+    velocity: FloatArray
+    digits: FloatArray
+    acceleration: float
+
+
+class Chords(NamedTuple):
+    """Samples whose feed is still to be judged, the first one as the beginning of a chord.
+
+    t, place, error : (n,) [s]; length of the chords from the start [mm]; largest error of the position by rounding and digits [mm]
+    speed           : (n,) as delivered [mm/s], NaN where it was not
+    piece, position : (n,), (n, A) where each is, to be told
+    """
+
+    t: FloatArray
+    place: FloatArray
+    error: FloatArray
+    speed: FloatArray
+    piece: Array
+    position: FloatArray
+
+
+class Kept(NamedTuple):
+    """Chords since the last vertex that was settled: `CHORD` (C,), their ends (C, 2, A) [mm], and marks."""
+
+    chord: Array
+    ends: FloatArray
+    mark: Array
+
+
+class Switches:
+    """Where a motion passes the vertices, as far as its samples tell.
+
+    switch  : (N+1,) `SWITCH`
+    state   : (4,) as named above
+    along   : (3,) likewise; its last number is for who judges, and what is judged stays
+    """
+
+    def __init__(self, pieces: ProgramPieces, bounds: Bounds):
+        vertices, axes = pieces.vertex.shape
+        self.switch = np.zeros(vertices, dtype=SWITCH)
+        self.switch["cost"][1:] = np.inf
+        self.state, self.along = np.array([1, 0, 0, 0], dtype=np.int64), np.zeros(3)
+        self._pieces, self._bounds = pieces, bounds
+        self._kept = Kept(np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, axes)), np.zeros(ROOM, np.bool_))
+
+    def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
+        """The next samples, from `skip` on; those before were given already. first, last: (n,) the pieces each can be on (matching.py).
+        place and error of `new` are written here."""
+        k = skip
+        while k < len(new.t):
+            k = _passed(
+                self._pieces,
+                self.switch,
+                self.state,
+                self.along,
+                self._kept,
+                new,
+                k,
+                (first, last),
+                self._bounds,
+            )
+            if k < len(new.t):
+                self._make_room()
+
+    def finish(self) -> None:
+        """No more samples: settle what was looked at."""
+        seen = np.flatnonzero(np.isfinite(self.switch["cost"][:-1]))
+        if len(seen) and seen[-1] >= self.state[OPEN]:
+            last = int(seen[-1])
+            _settle(self._pieces, self.switch, self.state, self.along, self._kept, last, self._bounds)
+
+    def _make_room(self) -> None:
+        """Leave out chords and marks that are not needed any more; twice the room where they are not half of them."""
+        head, tail = int(self.state[HEAD]), int(self.state[TAIL])
+        begin = int(self._kept.chord["offset"][head]) if tail > head else int(self.state[USED])
+        used = int(self.state[USED]) - begin
+        full = (
+            not (head or begin)
+            or 2 * (tail - head) > len(self._kept.chord)
+            or 2 * used > len(self._kept.mark)
+        )
+        chord, ends, mark = (np.zeros(((1 + full) * len(c), *c.shape[1:]), c.dtype) for c in self._kept)
+        chord[: tail - head], ends[: tail - head] = self._kept.chord[head:tail], self._kept.ends[head:tail]
+        mark[:used] = self._kept.mark[begin : begin + used]
+        chord["offset"][: tail - head] -= begin
+        self._kept = Kept(chord, ends, mark)
+        self.state[HEAD], self.state[TAIL], self.state[USED] = 0, tail - head, used
+
+
+@kernel()
+def _passed(
+    pieces: ProgramPieces,
+    switch: Array,
+    state: Array,
+    along: FloatArray,
+    kept: Kept,
+    new: Chords,
+    skip: int,
+    can: tuple[Array, Array],
+    bounds: Bounds,
+) -> int:
+    """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind; places and errors into `new`.
+    -> the first sample there was no room for, or their number"""
+    n, axes = new.position.shape
+    ulp = ROUNDING_ULPS * 2.0**-52
+    for k in range(skip, n):
+        h = new.t[k] - new.t[k - 1] if k else 0.0
+        push = bounds.acceleration * h if math.isfinite(bounds.acceleration) else 0.0
+        step_sq, error_sq, begin = 0.0, 0.0, along[TRAVELLED]
+        for axis in range(axes):
+            move = abs(new.position[k, axis] - new.position[k - 1, axis]) if k else 0.0
+            step_sq += move * move
+            error = ulp * (abs(new.position[k, axis]) + begin + bounds.velocity[axis] * new.t[k])
+            error += bounds.digits[axis] + (bounds.digits[axes] * (move / h + push) if k else 0.0)
+            error_sq += error * error
+        step, rounding = math.sqrt(step_sq), math.sqrt(error_sq)
+        last = min(can[1][k] + 1, len(switch) - 2)
+        if state[TAIL] == len(kept.chord) or state[USED] + max(last + 1 - state[OPEN], 0) > len(kept.mark):
+            return k
+        along[TRAVELLED] += step
+        new.place[k], new.error[k] = along[TRAVELLED], rounding
+        if step > 0.0:
+            _look(pieces, switch, state, along, kept, new, k, last, (begin, step, h, rounding), bounds)
+        if k and can[0][k] >= state[OPEN]:
+            _settle(pieces, switch, state, along, kept, min(can[0][k], len(switch) - 2), bounds)
+    return n
+
+
+@kernel()
+def _look(
+    pieces: ProgramPieces,
+    switch: Array,
+    state: Array,
+    along: FloatArray,
+    kept: Kept,
+    new: Chords,
+    k: int,
+    last: int,
+    chord: tuple[float, float, float, float],
+    bounds: Bounds,
+) -> None:
+    """Which vertices, from the open one to `last`, the chord to sample k is a better place for."""
+    first, axes = state[OPEN], new.position.shape[1]
+    if last < first:
+        return
+    at, before = state[TAIL], 0.0
+    _, step, h, rounding = chord
+    bow = bounds.acceleration * h * h / 8.0
+    for i in range(first, last + 1):
+        _, _, apart = reach_chord(new.position[k - 1], new.position[k], pieces, i, 0.0)
+        cost = before + apart * apart
+        if pieces.joint[i]["stop"] and (
+            step > 4.0 * bow + 2.0 * rounding or apart > bow + rounding + PLACE_ROUNDING
+        ):
+            cost += (RUN_THROUGH * pieces.joint[i]["budget"]) ** 2
+        better = cost < switch[i]["cost"]
+        if better:
+            switch[i]["cost"] = cost
+        kept.mark[state[USED] + i - first] = better
+        before = switch[i]["cost"]
+    if (
+        last == first and kept.mark[state[USED]]
+    ):  # nearer than ever, and no other vertex: what was before does not matter
+        at = state[HEAD] = 0
+        kept.mark[0], state[USED], along[SURE] = True, 0, chord[0]
+    row = kept.chord[at]
+    row["first"], row["count"], row["offset"] = first, last + 1 - first, state[USED]
+    row["begin"], row["step"], row["h"], row["error"] = chord
+    for axis in range(axes):
+        kept.ends[at, 0, axis], kept.ends[at, 1, axis] = new.position[k - 1, axis], new.position[k, axis]
+    state[TAIL] = at + 1
+    state[USED] += last + 1 - first
+
+
+@kernel()
+def _settle(
+    pieces: ProgramPieces,
+    switch: Array,
+    state: Array,
+    along: FloatArray,
+    kept: Kept,
+    last: int,
+    bounds: Bounds,
+) -> None:
+    """The vertices up to `last` are passed where the chords so far have them, with those behind that were looked at; what has been
+    judged stays."""
+    first, at, head = state[OPEN], state[TAIL] - 1, state[HEAD]
+    top = last
+    while top + 1 < len(switch) - 1 and switch[top + 1]["cost"] < np.inf:
+        top += 1
+    for i in range(top, first - 1, -1):
+        here = at
+        while here >= state[HEAD]:
+            row = kept.chord[here]
+            behind = i - row["first"]
+            if 0 <= behind < row["count"] and kept.mark[row["offset"] + behind]:
+                break
+            here -= 1
+        if i <= last:
+            switch[i]["place"], switch[i]["end"], switch[i]["begin"] = -1.0, 0.0, 0.0  # not seen
+        if here < state[HEAD]:
+            continue
+        at = here
+        if i > last:
+            continue
+        head = here if i == last else head
+        row = kept.chord[here]
+        share, apart = _foot(pieces.vertex[i], kept.ends[here])
+        switch[i]["place"] = row["begin"] + share * row["step"]
+        if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
+            reach = _reach(apart, row["step"], row["h"], bounds.acceleration)
+            switch[i]["end"] = reach + row["error"] + PLACE_ROUNDING
+        switch[i]["begin"] = 2.0 * row["step"]  # from here on how far the place of several is unknown
+    spent = switch[last]["cost"]
+    for i in range(first, last + 1):
+        switch[i]["place"] = max(switch[i]["place"], along[SURE])
+        switch[i]["weight"], switch[i]["group"] = FIRM if pieces.joint[i]["stop"] else 1.0, 1
+        _pool(switch, first, i)
+    for i in range(first, last + 1):
+        place, reach = switch[i]["place"], switch[i]["end"]
+        switch[i]["end"] = place + reach
+        switch[i]["begin"] = max(place - reach, along[JUDGED])
+        before = i - 1
+        while before > 0 and switch[before]["begin"] > switch[i]["begin"]:
+            switch[before]["begin"] = switch[i]["begin"]
+            before -= 1
+    along[SURE] = max(along[SURE], switch[last]["place"])
+    i = last + 1
+    while i < len(switch) and switch[i]["cost"] < np.inf and spent < np.inf:
+        switch[i]["cost"] -= spent
+        i += 1
+    state[OPEN], state[HEAD] = last + 1, head
+
+
+@kernel()
+def _pool(switch: Array, first: int, i: int) -> None:
+    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together, at the mean of these
+    places: on a chord that is where they are together nearest."""
+    n = i
+    while n > first and switch[n]["place"] < switch[n - 1]["place"]:
+        begin, weight = n - switch[n - 1]["group"], switch[n]["weight"] + switch[n - 1]["weight"]
+        moved = switch[n]["weight"] * (switch[n]["place"] - switch[n - 1]["place"])
+        place = switch[n - 1]["place"] + moved / weight
+        for m in range(begin, i + 1):
+            switch[m]["place"], switch[m]["weight"], switch[m]["group"] = place, weight, i + 1 - begin
+            switch[m]["end"] = max(switch[m]["end"], switch[m]["begin"])
+        n = begin
+
+
+@kernel()
+def _foot(vertex: FloatArray, ends: FloatArray) -> tuple[float, float]:
+    """Share of the chord (2, A) at which it is nearest to a vertex (A,), and its distance there."""
+    along, length_sq = 0.0, 0.0
+    for axis in range(len(vertex)):
+        move = ends[1, axis] - ends[0, axis]
+        along += (vertex[axis] - ends[0, axis]) * move
+        length_sq += move * move
+    share, apart_sq = min(max(along / length_sq, 0.0), 1.0), 0.0
+    for axis in range(len(vertex)):
+        apart_sq += (ends[0, axis] + share * (ends[1, axis] - ends[0, axis]) - vertex[axis]) ** 2
+    return share, math.sqrt(apart_sq)
+
+
+@kernel()
+def _reach(apart: float, step: float, h: float, acceleration: float) -> float:
+    """How far the nearest place of a motion can be from that of its chord (module text) [mm]."""
+    if not math.isfinite(acceleration):
+        return 4.0 * step
+    pace, push = step / h, acceleration * h
+    turn = 1.5 * push / pace
+    reach = 2.0 * h * (pace + push)
+    if turn < 1.0:
+        reach = min(reach, (apart + push * h / 8.0) * turn / (1.0 - turn))
+    return reach

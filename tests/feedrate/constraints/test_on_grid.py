@@ -1,0 +1,69 @@
+"""What limits leave on a grid, by geometry that the tests know themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from benchmarks.setpoints import trajectory_of
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.limits import VELOCITY
+from planner.feedrate.constraints.on_grid import OnGrid
+from planner.feedrate.sampling.samples import sample_path
+from planner.geometry.build import toolpath_from_program
+from planner.motion import limits_used
+from planner.nc.reader import parse_program
+
+
+def grid_of(program, machine, resolution=1e-3):
+    path = round_corners(toolpath_from_program(program, machine), machine, BezierCorner())
+    return OnGrid(sample_path(path, machine, resolution), machine)
+
+
+def test_between_the_points_of_a_coarse_grid_no_axis_is_faster_than_its_velocity():
+    """A circle, on which max_k |r'_k| is largest between points. x = feed^2 is linear in the way between them."""
+    radius, fastest = 10.0, 20.0
+    machine = problems.machine(velocity=fastest)
+    grid = grid_of(parse_program(f"G21 G17 F60000\nG3 X0 Y0 I-{radius:g} J0\n"), machine, 0.1)
+    s, d1 = grid.samples.s, grid.samples.d1
+    points = fastest**2 / np.abs(d1).max(axis=1) ** 2  # of each point alone
+    allowed = np.min([cap.feed_sq for cap in VELOCITY.at_points(grid)], axis=0)
+    along = np.linspace(0.0, s[-1], 20 * len(s))
+    phi = along / radius
+    turned = np.maximum(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
+    assert (np.sqrt(np.interp(along, s, points)) * turned).max() > 1.01 * fastest
+    assert (np.sqrt(np.interp(along, s, allowed)) * turned).max() <= fastest * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("theta", [0.4, 1.3, 2.4])
+def test_at_a_corner_chords_have_what_the_rounding_leaves_of_the_tolerance(theta):
+    """Eq. (18): eps - eps_ap, with eps_ap the distance of the rounded corner from its vertex."""
+    machine = problems.machine()
+    vertex = np.array([20.0, 0.0])
+    end = vertex + 20.0 * np.array([np.cos(theta), np.sin(theta)])
+    grid = grid_of(problems.polyline([[0, 0], vertex, end]), machine)
+    off = np.linalg.norm(grid.samples.position[:, :2] - vertex, axis=1).min()
+    corner = grid.samples.element[grid.right] < 0
+    assert corner.any()
+    assert 0.1 * machine.tolerance < off < machine.tolerance
+    assert grid.sides()[1].tol_chord[corner] == pytest.approx(machine.tolerance - off, rel=1e-3)
+    assert grid.sides()[1].tol_chord[~corner] == pytest.approx(machine.tolerance)
+
+
+def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():
+    """v^2/R across the motion, whatever it has along it."""
+    radius, speed, along, most = 5.0, 40.0, 700.0, 250.0
+    t = np.linspace(0.0, 0.3, 50)
+    c, s, nothing = np.cos(t), np.sin(t), 0 * t
+    velocity = speed * np.stack([-s, c, nothing], axis=1)
+    motion = trajectory_of(t, radius * np.stack([c, s, nothing], axis=1), velocity)
+    acceleration = along * velocity / speed - speed**2 / radius * np.stack([c, s, nothing], axis=1)
+    motion = dataclasses.replace(motion, acceleration=acceleration)
+    machine = problems.machine().model_copy(update={"normal_acceleration": most})
+    ((order, ratio),) = limits_used.normal_ratios(machine, motion)
+    assert order == 2
+    assert ratio == pytest.approx(speed**2 / radius / most, rel=1e-9)

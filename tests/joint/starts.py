@@ -1,0 +1,39 @@
+"""Runs from which searches of these tests begin."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from benchmarks import problems
+from planner.geometry.build import toolpath_from_program
+from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
+from planner.joint.run import TubeRun, tube_runs_of
+from planner.motion.vertex_times import passing_times
+from planner.nc.program import Program
+from planner.nc.reader import parse_program
+from planner.planning.methods.optimal import OptimalMethod
+
+MACHINE = problems.machine()
+PROGRAMS = {
+    "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
+    "arcs": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
+    "pentagon": problems.pentagon(side=6.0),
+}
+
+
+@cache
+def begun(name: str, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
+    """A run, and its motion on Bezier corners cut into steps."""
+    return begun_on(PROGRAMS[name], cut)
+
+
+def begun_on(program: Program, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
+    """The same of a program of one run."""
+    toolpath = toolpath_from_program(program, MACHINE)
+    (run,) = tube_runs_of(toolpath, MACHINE)
+    seen = OptimalMethod(corner="bezier").plan(program, MACHINE).require().trajectory
+    times = np.maximum.accumulate(passing_times(seen, toolpath))
+    times[-1] = seen.t[-1]
+    return run, guess_from(run, seen, times[run.first], cut)

@@ -1,0 +1,95 @@
+"""A motion that was found, searched once more in shorter steps."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from starts import begun
+
+from benchmarks import problems
+from planner.joint.guess import Cut
+from planner.joint.motion import CLOSED_EVERY, closed_at_nodes, integrated
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
+from planner.joint.refine import divided, searched_again
+from planner.joint.run import TubeRun
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.optimal.effort import EFFORTS
+
+
+def found_in_long_steps(name: str) -> tuple[TubeRun, np.ndarray, TubeSolution]:
+    run, guess = begun(name, Cut(per_unit=1.0, of_leg=1.0))
+    found = TubeOwn(gap=1e-3, divide=False).solve(run, guess)
+    assert found.steps is not None
+    return run, guess.leg, found
+
+
+@pytest.mark.parametrize("name", ["corner", "arcs"])
+def test_a_divided_motion_is_the_same_motion(name: str):
+    run, leg, found = found_in_long_steps(name)
+    finer, steps = divided(run, leg, found, Cut(per_unit=4.0, of_leg=1.0)), found.steps
+    assert finer.parts.sum() == len(finer.guess) > 1.5 * len(leg)
+    np.testing.assert_allclose(np.add.reduceat(finer.guess.h, np.cumsum(finer.parts) - finer.parts), steps.h)
+    state = finer.guess.state
+    jerk = np.repeat(steps.jerk, finer.parts, axis=0)
+    np.testing.assert_allclose(integrated(state[0], finer.guess.h, jerk)[:, 0], state[:, 0], atol=1e-9)
+    assert (finer.guess.leg == np.repeat(leg, finer.parts)).all()
+
+
+@pytest.mark.parametrize("name", ["corner", "arcs", "pentagon"])
+def test_shorter_steps_are_faster_and_as_fast_as_without_the_long_ones(name: str):
+    run, leg, found = found_in_long_steps(name)
+    again = searched_again(run, found, divided(run, leg, found, Cut()), TubeOwn())
+    at_once = TubeOwn().solve(*begun(name))
+    assert again is not None
+    assert again.kept is None
+    assert again.price.any(axis=1).all()
+    assert again.steps.h.sum() < found.steps.h.sum() * (1.0 - 1e-5)
+    assert again.steps.h.sum() == pytest.approx(at_once.steps.h.sum(), rel=5e-4)
+    # a price is what a limit saves: of steps in which it is the same, whatever their number
+    assert again.price.sum() == pytest.approx(found.price.sum(), rel=0.05)
+
+
+def test_what_the_second_search_leaves_is_what_the_first_has_found(monkeypatch):
+    run, leg, found = found_in_long_steps("pentagon")
+    finer = divided(run, leg, found, Cut())
+    nothing = dataclasses.replace(found, steps=None, kept=None, price=None)
+    monkeypatch.setattr(TubeOwn, "solve", lambda *of: nothing)
+    assert searched_again(run, found, finer, TubeOwn()) is None
+
+
+def test_nodes_are_met_between_which_gaps_add_up():
+    rng = np.random.default_rng(5)
+    h, jerk = rng.uniform(0.5, 1.5, 3 * CLOSED_EVERY + 7), rng.normal(size=(3 * CLOSED_EVERY + 7, 2))
+    state = integrated(rng.normal(size=(3, 2)), h, jerk)
+    off = state + 1e-9 * rng.normal(size=state.shape)
+    nodes, closed = closed_at_nodes(off, h, jerk)
+    ends = np.linspace(0, len(h), 4).astype(int)
+    np.testing.assert_array_equal(nodes[ends], off[ends])
+    for k in range(len(h)):  # no step jumps
+        np.testing.assert_allclose(
+            integrated(nodes[k], h[k : k + 1], closed[k : k + 1])[-1], nodes[k + 1], atol=1e-9
+        )
+    assert np.abs(closed - jerk).max() < 1e-7
+
+
+@pytest.mark.parametrize("far", [1e2, 1e5])
+def test_where_the_job_is_does_not_matter(far: float):
+    """Positions count from the first node of a window: far from the machine's origin they would have no digits left for gaps."""
+    here, there = (problems.polyline(np.array([[0, 0], [4, 0], [4, 4], [9, 3]]) + by) for by in (0.0, far))
+    times = [
+        OptimalMethod().plan(job, problems.machine()).require().trajectory.cycle_time for job in (here, there)
+    ]
+    assert times[1] == pytest.approx(times[0], rel=2e-5)
+
+
+def test_the_search_of_every_effort_has_its_steps():
+    assert [len(EFFORTS[name].search.finer) for name in ("quick", "normal", "best")] == [0, 1, 2]
+    job, machine = problems.pentagon(6.0), problems.machine()
+    times = [
+        OptimalMethod(effort=name).plan(job, machine).require().trajectory.cycle_time for name in EFFORTS
+    ]
+    assert times[1] < times[0] * (1.0 - 1e-5)
+    assert times[2] < times[1] * (1.0 + 1e-5)

@@ -1,0 +1,118 @@
+"""The search along many short runs, side by side: the same motion on any number of threads."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import planner
+from planner.base.threads import use_threads
+from planner.delivery import mending
+from planner.feedrate.solution import Status
+from planner.joint.parts import FoundRun
+from planner.planning.job.trace import Trace
+from planner.planning.methods import all_runs
+from planner.planning.methods.all_runs import LONG
+
+RUNS = 60
+STROKE = "G1 X{0} Y{1}\nG1 X{2} Y{1}\nG1 X{2} Y{0}\nG1 X{0} Y{3}\nG1 X{3} Y{2}\nG1 X{1} Y{0}\nG4 P0.01\n"
+
+
+@pytest.fixture
+def threads() -> Iterator[None]:
+    yield
+    use_threads(None)
+
+
+@pytest.mark.usefixtures("threads")
+@pytest.mark.usual_sizes
+def test_many_short_runs_have_the_same_motion_on_any_number_of_threads() -> None:
+    program = "G21 G90 G64 P0.05 F6000\n" + "".join(
+        STROKE.format(*np.round(np.array([0.0, 3.0, 7.0, 11.0]) + 0.1 * k, 3)) for k in range(RUNS)
+    )
+    machine = planner.load_machine("mill")
+    found = []
+    for count in (1, 3):
+        use_threads(count)
+        told = Trace()
+        found.append(
+            planner.plan(
+                planner.read_program(text=program, machine=machine), machine, effort="quick", log=told
+            )
+        )
+        searched = [step for step in told.steps if step.name == "search"]
+        assert searched[-1].facts["steps"] > LONG
+        assert found[-1].verdict is not None
+        assert found[-1].verdict.passed
+    first, other = (plan.require().trajectory for plan in found)
+    assert first is not None
+    assert other is not None
+    np.testing.assert_array_equal(first.position, other.position)
+
+
+def short_job() -> str:
+    """Twelve runs between full stops."""
+    return "G21 G90 G64 P0.05 F6000\n" + "".join(
+        STROKE.format(*np.round(np.array([0.0, 3.0, 7.0, 11.0]) + 0.1 * k, 3)) for k in range(12)
+    )
+
+
+def searched(told: Trace) -> dict[str, object]:
+    """The last step of the search."""
+    return [step for step in told.steps if step.name == "search"][-1].facts
+
+
+def planned(effort: str = "quick") -> tuple[planner.Plan, Trace]:
+    machine, told = planner.load_machine("mill"), Trace()
+    program = planner.read_program(text=short_job(), machine=machine)
+    return planner.plan(program, machine, effort=effort, log=told), told
+
+
+@pytest.mark.parametrize("effort", ["quick", "normal"])
+def test_a_run_that_the_search_does_not_find_is_planned_alone_and_the_others_are_kept(monkeypatch, effort):
+    whole, told = planned(effort)
+    assert searched(told)["alone"] == 0
+    own = all_runs.search
+
+    def one_fails(k, run, starts, solver):
+        found = own(k, run, starts, solver)
+        return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else found
+
+    monkeypatch.setattr(all_runs, "search", one_fails)
+    made, told = planned(effort)
+    assert searched(told)["alone"] == 1
+    assert made.verdict is not None
+    assert made.verdict.passed, made.verdict.faults
+    assert "stays on 1 of 12 runs between full stops" in made.sentence
+    assert abs(made.cycle_time / whole.cycle_time - 1.0) < 0.05 / 12
+    assert made.grid is not None
+    assert made.grid.t[-1] <= made.cycle_time
+    assert 0.0 < max(made.grid.share) <= 1.0 + 1e-9
+
+
+def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
+    """Slower in places would mend it; without that the run is not taken, and the others are."""
+    monkeypatch.setattr(mending, "ROUNDS", 0)
+    own = all_runs.search
+
+    def one_is_fast(k, run, starts, solver):
+        found = own(k, run, starts, solver)
+        if k != 7:
+            return found
+        steps = found.steps
+        f = 0.98
+        rates = {
+            name: getattr(steps, name) / f**power
+            for power, name in enumerate(("velocity", "acceleration", "jerk"), start=1)
+        }
+        return dataclasses.replace(found, steps=dataclasses.replace(steps, h=f * steps.h, **rates))
+
+    whole, _ = planned()
+    monkeypatch.setattr(all_runs, "search", one_is_fast)
+    made, told = planned()
+    assert searched(told)["alone"] == 1
+    assert made.verdict.passed, made.verdict.faults
+    assert made.cycle_time < whole.cycle_time * (1.0 + 0.1 / 12)  # of one run of twelve

@@ -1,0 +1,116 @@
+"""`optimal` is never slower than what it could have been: full stops, method kinematic, any single corner shape."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from quick import slow_but
+
+from benchmarks.random_lines import job
+from benchmarks.runner.figures_of_merit import ALLOWED, beaten
+from benchmarks.runner.measure import outcome
+from benchmarks.runner.rows import ERROR, METHOD, Row
+from benchmarks.runner.suites import RANDOM_RIVALS, Job
+from benchmarks.runner.ways import way_of
+from planner.baselines.lookahead.stop_moves import parts_of
+from planner.feedrate.jerk.solver import JerkLimited
+from planner.feedrate.solution import Status
+from planner.geometry.build import toolpath_from_program
+from planner.machine import load_machine
+from planner.nc.reader import parse_program
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.registry import plan
+from planner.planning.methods.stop import StopMethod
+from planner.planning.optimal import loop
+from planner.planning.optimal.order import ThirdOrder
+
+# Jobs on which other plans take the place of splines: fir corners 70, method kinematic 86. On 3 and 40 splines stay.
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", slow_but([3, 86], [3, 40, 70, 86]))
+def test_nothing_is_faster_than_optimal(seed):
+    program, machine = job(seed)
+    one = Job(name="random", program=lambda machine: program, machine=lambda: machine)
+    rows = {
+        way: outcome(way_of(way), one, Row(suite="", job="", way=way, kind=METHOD, status=ERROR))
+        for way in ("optimal", *RANDOM_RIVALS)
+    }
+    assert rows["optimal"].comparable
+    against = beaten({"random": rows})
+    assert "stop" in against
+    assert [way for way, by in against.items() if by["random"] > ALLOWED] == []
+
+
+def test_the_plan_says_when_full_stops_take_its_place():
+    machine = job(17)[1]
+    plan = OptimalMethod().plan(parse_program("G21 G1 X10 F3000\n", machine), machine)
+    assert (plan.method, plan.corner) == ("optimal", "auto")
+    assert plan.sentence.startswith("full stops take less time than splines; ")
+    assert plan.trajectory.cycle_time == pytest.approx(plan.stop_time, rel=1e-6)
+    assert plan.verdict.passed
+    assert plan.prices is not None
+
+
+def test_where_a_line_is_cut_into_blocks_does_not_matter_to_full_stops():
+    machine = job(17)[1]
+    whole = "G21 G1 X3 F3000\nX3.1 Y2\nX1 Y2.2\n"
+    cut = "G21 G1 X1.25 F3000\nX3\nX3.1 Y2\nX2.05 Y2.1\nX1 Y2.2\n"
+    method = StopMethod(join_lines=True)
+    plans = [method.plan(parse_program(text, machine), machine) for text in (whole, cut)]
+    assert all(plan.verdict.passed for plan in plans)
+    assert plans[1].cycle_time == pytest.approx(plans[0].cycle_time, rel=1e-12)
+    assert plans[0].cycle_time == pytest.approx(plans[0].stop_time, rel=1e-6)
+    assert plans[1].stop_time > 1.1 * plans[1].cycle_time
+    other_feed = cut.replace("X3\n", "X3 F2900\n")  # such lines are parts of their own
+    assert parts_of(toolpath_from_program(parse_program(other_feed, machine), machine), True).still.sum() == 5
+
+
+def test_fir_corners_are_planned_only_where_their_bounds_leave_a_chance(monkeypatch):
+    program, machine = job(3)
+    plan = OptimalMethod(rounds=0).plan(program, machine)
+    assert plan.status is Status.OPTIMAL
+    settings = loop.Settings(method="optimal", corner="auto", order=ThirdOrder(JerkLimited()))
+    monkeypatch.setattr(loop, "Stopped", lambda job: None)
+    monkeypatch.setattr(loop, "with_closed_forms", lambda best, job, stopped: best)
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: plan)
+    monkeypatch.setattr(loop, "fir_corners_may_be_faster", lambda best, job, order: False)
+    assert loop.fastest_plan(None, settings) is plan
+    large = dataclasses.replace(plan, grid_points=loop.RIVAL_POINTS + 1)
+    monkeypatch.setattr(loop, "plan_on_path", lambda job, settings, stopped: large)
+    monkeypatch.setattr(loop, "fir_corners_may_be_faster", None)
+    assert loop.fastest_plan(None, settings) is large
+
+
+# Rows within a limit of the normal acceleration. `kinematic` stops at the two sharp turns, which no bound on its corners knows.
+ROWS = """G21 G90 G64 P0.02
+G1 X0 Z-0.05 F900
+X0.5 Z-0.07
+X1 Z-0.03
+X1.5 Z0.05
+X2 Z0.06
+Y0.9 Z0.02
+X1.5 Z0.03
+X1 Z-0.04
+X0.5 Z-0.06
+M2
+"""
+
+
+def of_rows(**settings):
+    machine = load_machine("mill").model_copy(update={"normal_acceleration": 90.0})
+    return plan(parse_program(ROWS, machine), machine, **settings)
+
+
+@pytest.mark.parametrize("settings", [{"effort": "quick"}, {}, {"method": "second-order"}])
+def test_closed_forms_are_never_faster(settings):
+    """They cost nothing beside the rest, so that no bound decides whether they are planned."""
+    least = min(of_rows(method=method).cycle_time for method in ("kinematic", "stop"))
+    made = of_rows(**settings)
+    assert made.verdict.passed
+    assert made.cycle_time <= least * (1.0 + ALLOWED)
+
+
+def test_normal_effort_is_never_slower_than_quick():
+    assert of_rows().cycle_time <= of_rows(effort="quick").cycle_time * (1.0 + 1e-9)

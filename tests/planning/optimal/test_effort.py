@@ -1,0 +1,83 @@
+"""More effort never costs time on the machine; the names are those of the registry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks import problems
+from planner import plan
+from planner.base.errors import InputError
+from planner.base.names import EFFORTS as NAMES
+from planner.machine import load_machine
+from planner.machine.parts import Fir
+from planner.machine.user_limit import PathLimit
+from planner.planning.optimal.effort import EFFORTS
+
+MACHINE = load_machine("mill")
+
+
+class Slow(PathLimit):
+    """A limit of one's own on the speed along the path."""
+
+    name = "slow"
+
+    def velocity(self, at):
+        return 50.0
+
+
+def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
+    assert tuple(EFFORTS) == NAMES
+    for effort in EFFORTS.values():
+        grids = [effort.grids(points).final for points in (1, 10**4, 10**5, 10**6, 10**8)]
+        assert grids == sorted(grids)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "program", [problems.zigzag(20), problems.star_spiral(40)], ids=lambda own: own.source
+)
+def test_more_effort_is_never_slower(program):
+    quick, normal, best = (plan(program, MACHINE, effort=name) for name in NAMES)
+    assert quick.verdict.passed
+    assert normal.verdict.passed
+    assert best.verdict.passed
+    assert normal.trajectory.cycle_time <= quick.trajectory.cycle_time * (1 + 1e-4)
+    assert best.trajectory.cycle_time <= normal.trajectory.cycle_time * (1 + 1e-4)
+    for made in (quick, normal, best):
+        assert "geometry and feed together" in made.sentence
+        assert 0.9 < made.grid.share.max() + made.grid.share[-2] <= 1.0 + 1e-12
+        assert made.prices is not None
+    np.testing.assert_allclose(best.trajectory.position[-1], best.toolpath.end[-1], atol=1e-9)
+
+
+@pytest.mark.slow
+def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
+    """On mill, a/j = 40 ms: rounds end 2 % later than ipopt's free optimum, 2.8357 s for 50 legs."""
+    rounds, default = plan(problems.zigzag(6), MACHINE, rounds=40), plan(problems.zigzag(6), MACHINE)
+    assert default.verdict.passed
+    assert default.trajectory.cycle_time < rounds.trajectory.cycle_time * (1 - 1e-2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "why",
+    [
+        {"machine": MACHINE.with_own((Slow(),))},
+        {"machine": MACHINE.model_copy(update={"fir": Fir(time_constants=(0.004,))})},
+        {"geometry": "spline"},
+        {"rounds": 1},
+    ],
+    ids=["a limit of one's own", "filters", "splines asked for", "rounds asked for"],
+)
+def test_what_the_search_does_not_know_is_planned_by_rounds(why):
+    made = plan(problems.zigzag(4), **({"machine": MACHINE} | why))
+    assert made.verdict.passed
+    assert "geometry and feed together" not in made.sentence
+
+
+def test_an_unknown_effort_and_one_for_another_method():
+    with pytest.raises(InputError, match="no effort 'hard'; there are quick, normal, best"):
+        plan(problems.zigzag(), MACHINE, effort="hard")
+    with pytest.raises(InputError, match="method stop does not use it"):
+        plan(problems.zigzag(), MACHINE, effort="best", method="stop")

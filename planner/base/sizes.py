@@ -61,7 +61,7 @@ class Sizes:
     windows_shared: int = _size(PARTS, 1_000, 0)
 
     # The judge and what it is asked for before.
-    judged_at_once: int = _size(PARTS, 65_536, 64)  # samples: 8 MB
+    judged_at_once: int = _size(PARTS, 16_384, 64)  # samples: 2 MB
     places_at_once: int = _size(PARTS, 100_000, 350)  # times of its own: 30 MB
     corners_at_once: int = _size(PARTS, 100_000, 3)  # 50 MB
     filtered_at_once: int = _size(PARTS, 50_000, 37)  # times behind filters: 5 MB

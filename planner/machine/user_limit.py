@@ -23,7 +23,7 @@ function q of the position, such as a joint of the kinematics that carry the too
 the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (base/series.py). The length of the path is such a q
 with q' = 1. Between grid points the same measures hold as for the axes: points where the rows are not close to linear and a margin
 (feedrate/sampling/own_rows.py), tightening (planning/optimal/tighten.py). Methods `optimal` and `second-order` plan with these
-limits; the verdict judges the motions of all methods by them, from the delivered positions (verifier/own.py).
+limits; the verdict judges the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
 """
 
 from __future__ import annotations

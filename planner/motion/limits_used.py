@@ -1,6 +1,6 @@
 """How much of the limits that are no axis' own a motion uses at its samples: for the planner, which slows a motion down where it must.
 
-The judge has code of its own for each of them (verifier/limits.py, verifier/own.py).
+The judge has code of its own for each of them (verifier/limits.py, verifier/user_limits.py).
 """
 
 from __future__ import annotations

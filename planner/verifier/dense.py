@@ -9,7 +9,7 @@ from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import Look, measured
 from planner.verifier.limits import ACCELERATION
 from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 
 
 class Comparison:

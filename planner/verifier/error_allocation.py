@@ -52,11 +52,12 @@ from planner.verifier.between import bow_share
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import Excess, Fault, Kind, and_more
 from planner.verifier.findings import FAULTS_OF_A_KIND, Look
-from planner.verifier.limits import ACCELERATION, FEED_AT_REST, ROUNDING_ULPS, normal_limit
+from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
 from planner.verifier.pieces import ProgramPieces
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 from planner.verifier.times import AnyMotion
+from planner.verifier.worst import ROUNDING_ULPS
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3

@@ -40,7 +40,7 @@ from planner.verifier.pieces import (
     program_pieces,
     widened,
 )
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 from planner.verifier.stream import BLOCK_SAMPLES
 
 

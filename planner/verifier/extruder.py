@@ -15,7 +15,7 @@ Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the dig
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,63 +23,48 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, Look, joint_times
-from planner.verifier.given import Given
-from planner.verifier.limits import FEED_AT_REST, ROUNDING_ULPS
+from planner.verifier.findings import FAULTS_OF_A_KIND, Look, check_of, joint_times
+from planner.verifier.given import DERIVATIVES, Given
+from planner.verifier.limits import FEED_AT_REST, UNITS
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
+from planner.verifier.records import SampleBlock
+from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
+from planner.verifier.worst import COLUMN, ROUNDING_ULPS, Worst, differences, less_error
 
 NEAR = 8.0  # within so many tolerances of way E is the programmed one where a joint is passed [-]
 REST = 1e-9  # axes that move less than this between samples rest [mm]
 PLACE_ROUNDING = 1e-6  # of E [mm of filament]: the digits that programs carry
-QUANTITIES = ("velocity", "acceleration", "jerk")
-UNITS = ("mm/s", "mm/s2", "mm/s3")
-COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "extruder")
+COLUMNS = ("t", "position", *DERIVATIVES, "extruder")
 CARRIED = 4  # samples that a chunk shares with the one before
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class ExtruderSeen:
-    """What the extruder did: of each quantity the worst (value, time, place of the axes, line), and faults of its place."""
+    """What the extruder did: checks of its limits by name, faults of its place, and notes."""
 
-    worst: list[tuple[float, float, FloatArray, int]] = field(default_factory=list)
+    checks: dict[str, LimitCheck] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def checks(self, limits: FloatArray, not_limited: tuple[str, ...]) -> dict[str, LimitCheck]:
-        """Its limits (3,), by name."""
-        return {
-            f"{name}.e": LimitCheck(
-                name=f"{name}.e",
-                unit=unit,
-                ratio=value / float(limit),
-                value=value,
-                limit=float(limit),
-                time=time,
-                position=at,
-                line=line,
-                limited=name not in not_limited,
-                note="places of the extruder",
-            )
-            for name, unit, limit, (value, time, at, line) in zip(
-                QUANTITIES, UNITS, limits, self.worst, strict=False
-            )
-        }
-
 
 def extruder_seen(
-    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, given: Given
+    trajectory: Trajectory,
+    looks: list[Look],
+    toolpath: Toolpath,
+    pieces: ProgramPieces,
+    given: Given,
+    not_limited: tuple[str, ...],
 ) -> ExtruderSeen:
     """What the extruder of a delivered motion did; nothing where the program has none."""
     if toolpath.extrusion is None:
         return ExtruderSeen()
-    passed = joint_times(looks[0], pieces)
-    watch = _Watch(toolpath, passed, given)
+    watch = _Watch(toolpath, joint_times(looks[0], pieces), given)
     for chunk in trajectory.chunks():
         if not len(chunk.extruder):
             return ExtruderSeen(notes=("there is no column e: what the extruder does is not judged",))
         watch.take(chunk)
-    return ExtruderSeen(watch.worst, tuple(watch.place_faults()))
+    return ExtruderSeen(watch.checks(not_limited), tuple(watch.place_faults()))
 
 
 class _Watch:
@@ -89,8 +74,9 @@ class _Watch:
         fed = toolpath.extrusion
         assert fed is not None
         self.toolpath, self.fed, self.passed, self.given = toolpath, fed, passed, given
-        none = (0.0, 0.0, np.zeros(len(toolpath.axes)), int(toolpath.line[0]))
-        self.worst = [none, none, none]
+        names = [(f"{name}.e", "mm" + per) for name, per in zip(DERIVATIVES, UNITS, strict=True)]
+        self.worst = Worst(names, len(toolpath.axes))
+        self.worst.least[:] = fed.limits
         self.seen = np.full(len(fed.joint), np.nan)  # E where each joint is passed
         self.speed = np.zeros(len(fed.joint))  # and the speed there
         self.end, self.period = 0.0, 0.0
@@ -120,41 +106,31 @@ class _Watch:
         self.end = float(e[-1])
         if len(t) < 2:
             return
+        block = SampleBlock(
+            t=t,
+            position=position,
+            velocity=velocity,
+            acceleration=acceleration,
+            jerk=jerk,
+            piece=np.zeros(len(t), dtype=np.int64),
+        )
         h, chord = np.diff(t), np.linalg.norm(np.diff(position, axis=0), axis=1)
         self.period = max(self.period, float(h.max()))
         moved = np.maximum(np.abs(np.diff(e)) - 2.0 * off, 0.0)
-        self._keep(0, np.append(0.0, moved / h), t, position)
-        speed = np.linalg.norm(velocity, axis=1)
+        self._keep(0, np.append(0.0, moved / h), block)
+        (speed, u, j), _ = along_path(block, delivered=True)
         going = speed > FEED_AT_REST
-        along = velocity / np.where(going, speed, 1.0)[:, None]
-        u = np.einsum("nk,nk->n", acceleration, along)
-        across = ((acceleration - u[:, None] * along) ** 2).sum(axis=1)
-        j = np.einsum("nk,nk->n", jerk, along) + np.divide(
-            across, speed, out=np.zeros_like(speed), where=going
-        )
         way = np.maximum(h * (speed[1:] + speed[:-1]) / 2.0 - h**2 * np.diff(u) / 12.0, chord)
         ratio = np.divide(moved, way, out=np.zeros_like(way), where=chord > REST)
         least = np.minimum(np.append(0.0, ratio), np.append(ratio, 0.0)) * going
-        self._keep(1, least * np.abs(u), t, position)
-        self._keep(2, least * np.abs(j), t, position)
-        self._differences(t, e, chord <= REST, off, position)
+        self._keep(1, least * np.abs(u), block)
+        self._keep(2, least * np.abs(j), block)
+        still = np.append(True, chord <= REST)  # of the period before each sample
+        for order, seen in enumerate(differences(t, e[:, None], np.full((len(t), 1), off))):
+            if order:  # acceleration and jerk of the extruder while the axes rest
+                still[1:] &= still[:-1]
+                self._keep(order, np.where(still, less_error(seen)[:, 0], 0.0), block)
         self._places(t, e, speed)
-
-    def _differences(
-        self, t: FloatArray, e: FloatArray, rests: FloatArray, off: float, position: FloatArray
-    ) -> None:
-        """Acceleration and jerk of the extruder while the axes rest."""
-        d, error = np.diff(e) / np.diff(t), 2.0 * off / np.diff(t)
-        still = rests.astype(bool)
-        for order in (2, 3):
-            if len(d) < 2:
-                return
-            over = order / (t[order:] - t[:-order])
-            d, error = over * np.diff(d), over * (error[1:] + error[:-1])
-            still = still[1:] & still[:-1]
-            value = np.zeros(len(t))
-            value[order:] = np.where(still, np.maximum(np.abs(d) - error, 0.0), 0.0)
-            self._keep(order - 1, value, t, position)
 
     def _places(self, t: FloatArray, e: FloatArray, speed: FloatArray) -> None:
         """E where the joints are passed, as far as the samples go."""
@@ -163,11 +139,19 @@ class _Watch:
         self.seen[here] = np.interp(when[here], t, e)
         self.speed[here] = np.interp(when[here], t, speed)
 
-    def _keep(self, which: int, value: FloatArray, t: FloatArray, position: FloatArray) -> None:
-        k = int(value.argmax())
-        if value[k] > self.worst[which][0]:
-            segment = int(np.clip(np.searchsorted(self.passed, t[k]) - 1, 0, len(self.toolpath) - 1))
-            self.worst[which] = float(value[k]), float(t[k]), position[k], int(self.toolpath.line[segment])
+    def _keep(self, row: int, value: FloatArray, block: SampleBlock) -> None:
+        assert self.toolpath.extrusion is not None
+        self.worst.take(row, value[:, None], self.toolpath.extrusion.limits[row], COLUMN, block)
+
+    def checks(self, not_limited: tuple[str, ...]) -> dict[str, LimitCheck]:
+        """The worst of its limits, by name."""
+        found = {}
+        for row, (name, _) in enumerate(self.worst.names):
+            segment = int(np.searchsorted(self.passed, self.worst.time[row])) - 1
+            line = int(self.toolpath.line[np.clip(segment, 0, len(self.toolpath) - 1)])
+            check = check_of(self.worst, row, self.toolpath, line, not_limited)
+            found[name] = replace(check, note="places of the extruder")
+        return found
 
     def place_faults(self) -> list[Fault]:
         """Joints at which the extruder is not where the program wants it."""

@@ -20,33 +20,21 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.verifier.excess import NAMES, Spans
+from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
-from planner.verifier.limits import COLUMN, DIFFERENCE
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
 from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
+from planner.verifier.worst import COLUMN, DIFFERENCE, Worst
 
 
 class Feeds:
-    """Judges the feed of a motion, block of samples by block of samples.
+    """Judges the feed of a motion, block of samples by block of samples, into a row of `Worst`."""
 
-    row          : (4,) the worst, as a row of `limits.Worst`: ratio, value [mm/s], limit [mm/s], `COLUMN` or `DIFFERENCE`
-    time, at     : when [s] and where (A,) [mm]
-    piece        : on which piece
-
-    over : takes where the feed is exceeded
-    """
-
-    def __init__(self, pieces: ProgramPieces, bounds: Bounds, over: Spans, axes: tuple[str, ...] = ()):
+    def __init__(self, pieces: ProgramPieces, bounds: Bounds, worst: Worst, row: int, axes: tuple[str, ...]):
         groups = axis_groups(axes)
         self._groups = groups if (groups > 0).any() else groups[:0]
-        self.row, self.time, self.at, self.piece = np.zeros(4), 0.0, np.zeros(pieces.vertex.shape[1]), 0
-        self._pieces, self._bounds, self._switches, self._over = (
-            pieces,
-            bounds,
-            Switches(pieces, bounds),
-            over,
-        )
+        self._pieces, self._bounds, self._switches = pieces, bounds, Switches(pieces, bounds)
+        self._worst, self._row = worst, row
         self._block = np.zeros(1, dtype=np.int64)  # the first one that chords can still be on
         self._left: Chords | None = None
 
@@ -72,22 +60,19 @@ class Feeds:
         chords = self._left
         if chords is None or len(chords.t) < 2 or chords.place[1] > until:
             return
-        worst, sample, over = self.row.copy(), np.full(1, -1, dtype=np.int64), np.zeros(len(chords.t))
+        worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
+        over = np.zeros(len(chords.t))
         known = int(self._switches.state[OPEN])
         switch = self._switches.switch
         done = _judged(
             self._pieces, self._groups, switch, known, self._block, chords, until, worst, sample, over
         )
         if over.any():
-            self._over.add(NAMES.index("feed"), chords.t, over)
+            self._worst.over.add(NAMES.index("feed"), chords.t, over)
         k = int(sample[0])
         if k >= 0:
-            self.row, self.time, self.at, self.piece = (
-                worst,
-                float(chords.t[k]),
-                chords.position[k].copy(),
-                int(chords.piece[k]),
-            )
+            seen = tuple(worst.tolist())
+            self._worst.keep(self._row, seen, float(chords.t[k]), chords.position[k], int(chords.piece[k]))
         self._switches.along[JUDGED] = float(chords.place[done - 1])
         self._left = Chords(*(column[done - 1 :].copy() for column in chords))
 

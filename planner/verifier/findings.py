@@ -8,18 +8,16 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
-from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import in_degrees
 from planner.verifier import limits as rows
 from planner.verifier.excess import Excess, Fault, Kind, and_more, of_check
 from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
+from planner.verifier.worst import BACK, DIFFERENCE, Worst
 
-QUANTITIES = ("velocity", "acceleration", "jerk")
-UNITS = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
 
 # A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a motion times are good to
@@ -53,21 +51,17 @@ def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
 
 def measured(looks: list[Look], group: int) -> FloatArray:
     """Largest ratio per axis (A,) of a group of rows, over all readings."""
-    axes = looks[0].seen.at.shape[1]
-    return np.array([look.seen.worst[group * axes : (group + 1) * axes, 0] for look in looks]).max(axis=0)
+    axes = looks[0].seen.worst.at.shape[1]
+    ratios = [look.seen.worst.row[group * axes : (group + 1) * axes, 0] for look in looks]
+    return np.array(ratios).max(axis=0)
 
 
 def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]) -> list[Excess]:
     """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are of, at the worst place."""
-    found = [
-        each
-        for look in looks
-        for seen in (look.seen.over, look.seen.own.over)
-        for each in seen.excesses(not_limited)
-    ]
+    found = [each for look in looks for each in look.seen.worst.over.excesses(not_limited)]
     shown = {each.name for each in found}
     broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
-    back = rows.BACK * looks[0].seen.gap_max  # a difference of positions is of what lies so far behind it
+    back = BACK * looks[0].seen.gap_max  # a difference of positions is of what lies so far behind it
     return found + [of_check(check.name, (check.time - back, check.time), check.ratio) for check in broken]
 
 
@@ -75,88 +69,45 @@ def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tupl
 
 
 def limit_checks(
-    looks: list[Look],
-    toolpath: Toolpath,
-    machine: Machine,
-    pieces: ProgramPieces,
-    not_limited: tuple[str, ...],
-) -> dict[str, LimitCheck]:
-    """The worst of every limit, by name."""
-    axes = toolpath.axes
-    table = [
-        (f"{quantity}.{letter}", ("deg" if letter in ROTARY_AXES else "mm") + UNITS[quantity], row, limit)
-        for group, quantity in enumerate(QUANTITIES)
-        for row, (letter, limit) in enumerate(
-            zip(axes, machine.limits(quantity, axes), strict=True),  # type: ignore[arg-type]
-            start=group * len(axes),
-        )
-    ]
-    table.append(("feed", "mm/s", rows.GROUPS * len(axes) + rows.FEED, np.inf))
-    across = rows.normal_limit(machine)
-    if np.isfinite(across):
-        table.append((rows.NORMAL_NAME, "mm/s2", rows.GROUPS * len(axes) + rows.NORMAL, across))
-    checks = {
-        name: _limit_check(name, unit, row, limit, looks, toolpath, pieces, not_limited)
-        for name, unit, row, limit in table
-    }
-    return checks | _own_checks(looks, toolpath, pieces, not_limited)
-
-
-def _own_checks(
     looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, not_limited: tuple[str, ...]
 ) -> dict[str, LimitCheck]:
-    """The worst of every limit of one's own that bounds anything (own.py)."""
+    """The worst of every limit that bounds anything, by name."""
     checks = {}
-    for row in range(len(looks[0].seen.own.worst)):
-        if not any(look.seen.own.bounded[row] for look in looks):
-            continue
-        look = looks[int(np.argmax([each.seen.own.worst[row, 0] for each in looks]))]
-        own = look.seen.own
-        (ratio, value, limit_there, how), (name, unit) = own.worst[row], own.name(row)
-        checks[name] = LimitCheck(
-            name=name,
-            unit=unit,
-            ratio=float(ratio),
-            value=float(value),
-            limit=float(limit_there if ratio > 0 else own.least[row]),
-            time=float(own.time[row]),
-            position=own.at[row],
-            line=line_of(toolpath, pieces, own.piece[row]),
-            limited=name.split(".")[0] not in not_limited,
-            note=look.noted("differences of position" if how == rows.DIFFERENCE else "column")
-            if ratio > 0
-            else "",
-        )
+    for row, (name, _) in enumerate(looks[0].seen.worst.names):
+        bounded = name == "feed" or any(np.isfinite(look.seen.worst.least[row]) for look in looks)
+        if name and bounded:
+            look = max(looks, key=lambda each: each.seen.worst.row[row, 0])
+            line = line_of(toolpath, pieces, int(look.seen.worst.piece[row]))
+            checks[name] = check_of(look.seen.worst, row, toolpath, line, not_limited, look.note)
     return checks
 
 
-def _limit_check(
-    name: str,
-    unit: str,
+def check_of(
+    worst: Worst,
     row: int,
-    limit: float,
-    looks: list[Look],
     toolpath: Toolpath,
-    pieces: ProgramPieces,
+    line: int,
     not_limited: tuple[str, ...],
+    note: str = "",
 ) -> LimitCheck:
-    look = max(looks, key=lambda each: each.seen.worst[row, 0])
-    ratio, value, limit_there, how = look.seen.worst[row]
-    text = "differences of position" if how == rows.DIFFERENCE else "column"
+    """The worst of one quantity, rotary axes in degrees; `note` says of which reading it is."""
+    name, unit = worst.names[row]
+    ratio, value, limit, how = worst.row[row].tolist()
     degrees = in_degrees(toolpath.axes, toolpath.radius)
     letter = name.rpartition(".")[2]
     per = float(degrees[toolpath.axes.index(letter)]) if letter in toolpath.axes else 1.0
+    seen = "differences of position" if how == DIFFERENCE else "column"
     return LimitCheck(
         name=name,
         unit=unit,
-        ratio=float(ratio),
-        value=float(value) * per,
-        limit=float(limit_there if ratio > 0 else limit) * per,
-        time=float(look.seen.time[row]),
-        position=look.seen.at[row] * degrees,
-        line=line_of(toolpath, pieces, look.seen.piece[row]),
-        limited=name.split(".")[0] not in not_limited,
-        note=look.noted(text) if ratio > 0 else "",
+        ratio=ratio,
+        value=value * per,
+        limit=(limit if ratio > 0 else float(worst.least[row])) * per,
+        time=float(worst.time[row]),
+        position=worst.at[row] * degrees,
+        line=line,
+        limited=name.partition(".")[0] not in not_limited,
+        note=", ".join(filter(None, (seen, note))) if ratio > 0 else "",
     )
 
 
@@ -175,8 +126,9 @@ def column_faults(
         for column, against, group, bound in tests:
             for axis, letter in enumerate(toolpath.axes):
                 row = group * len(toolpath.axes) + axis
-                if (ratio := float(look.seen.worst[row, 0])) > bound[axis]:
-                    time, line = float(look.seen.time[row]), line_of(toolpath, pieces, look.seen.piece[row])
+                worst = look.seen.worst
+                if (ratio := float(worst.row[row, 0])) > bound[axis]:
+                    time, line = float(worst.time[row]), line_of(toolpath, pieces, int(worst.piece[row]))
                     text = (
                         f"{column}.{letter} does not agree with {against} at t = {time:.6g} s, line {line}: "
                     )
@@ -190,7 +142,8 @@ def column_faults(
 
 def largest_chord_error(looks: list[Look]) -> float:
     """Largest bow over one delivered period [mm]."""
-    return float(looks[0].seen.worst[rows.GROUPS * looks[0].seen.at.shape[1] + rows.CHORD, 1])
+    worst = looks[0].seen.worst
+    return float(worst.row[rows.GROUPS * worst.at.shape[1] + rows.CHORD, 1])
 
 
 # ---- ends, order, stops -----------------------------------------------------------------------------------------------

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.verifier import limits as rows
 from planner.verifier.findings import Look
 from planner.verifier.kernel import kernel
 from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, match_samples, new_match, nowhere
 from planner.verifier.pieces import ProgramPieces, reach_piece
 from planner.verifier.stops import AtStop
 from planner.verifier.stream import Observed
+from planner.verifier.worst import Worst
 
 Each = Callable[[FloatArray, FloatArray, Located], None]
 
@@ -33,33 +33,22 @@ def follow(
     search : whether a motion that was lost is looked for on the pieces ahead; if not, it is lost for good
     """
     axes = pieces.vertex.shape[1]
-    count = rows.GROUPS * axes + rows.ROWS_ALONE
-    seen = Observed(
-        worst=np.zeros((count, 4)),
-        time=np.zeros(count),
-        at=np.zeros((count, axes)),
-        piece=np.zeros(count, dtype=np.int64),
-        match=new_match(pieces),
-    )
+    seen = Observed(match=new_match(pieces), worst=Worst((), axes))
     if not search:
         seen.match.tally[SEARCHED] = SEARCH_MAX
-    anywhere = AtStop(
-        np.full(axes, np.inf), np.full(axes, np.inf), np.zeros(axes)
-    )  # the motion need not rest
+    free = np.full(axes, np.inf)
+    anywhere = AtStop(free, free, np.zeros(axes))  # the motion need not rest
     carried_t, carried = np.empty(0), np.empty((0, axes))
     for new_t, new in parts:
         t, position = np.concatenate([carried_t, new_t]), np.concatenate([carried, new])
         skip = len(carried_t)
-        if not skip:
-            seen.first, seen.t_first = position[0].copy(), float(t[0])
+        seen.take(t, position, skip)
         place = nowhere(len(t))
         match_samples(pieces, seen.match, t, position, skip, 1, position[:0], anywhere, place)
         if each is not None:
             ratio = np.empty(len(t))
             _ratios(pieces, place.piece, position, ratio)
             each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
-        seen.samples += len(t) - skip
-        seen.last, seen.t_last = position[-1].copy(), float(t[-1])
         carried_t, carried = t[-1:], position[-1:]
     return Look(seen, note)
 

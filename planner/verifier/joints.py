@@ -15,8 +15,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -26,16 +24,15 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, Machine
 from planner.motion.trajectory import Trajectory, joined
 from planner.verifier.excess import Fault, Kind
-from planner.verifier.findings import QUANTITIES
+from planner.verifier.findings import check_of
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.judge import verify
 from planner.verifier.kinematics import tip_and_direction
-from planner.verifier.limits import COLUMN, NORMAL_NAME
-from planner.verifier.own import OwnSeen
+from planner.verifier.limits import NORMAL_NAME, limits_of, look_at_axes, rows_of
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
-from planner.verifier.sample_block import Limits, SampleBlock
-from planner.verifier.stream import CARRIED
+from planner.verifier.records import SampleBlock
 from planner.verifier.verdict import LimitCheck, Verdict
+from planner.verifier.worst import BACK, Worst
 
 # Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints [-].
 NOT_JUDGED = 100.0
@@ -83,7 +80,7 @@ class JointVerdict:
     def _of_joints_and_tip(self) -> dict[str, LimitCheck]:
         of_tip = {n: c for n, c in self.tip.limits.items() if n.rpartition(".")[2] not in LINEAR_AXES}
         found = self.limits | of_tip
-        order = {quantity: k for k, quantity in enumerate(QUANTITIES)}
+        order = {quantity: k for k, quantity in enumerate(DERIVATIVES)}
         return dict(sorted(found.items(), key=lambda pair: order.get(pair[0].partition(".")[0], len(order))))
 
 
@@ -122,7 +119,7 @@ def verify_joints(
         progress=progress,
     )
     gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
-    limits = _joint_checks(setpoints, machine, given, not_limited)
+    limits = _joint_checks(setpoints, toolpath, machine, given, not_limited)
     broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
     faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
     error = (np.inf if tip.contour_error_mm is None else tip.contour_error_mm) + gap
@@ -197,65 +194,20 @@ def _of_tip(machine: Machine) -> Machine:
 
 
 def _joint_checks(
-    setpoints: Trajectory, machine: Machine, given: Given, not_limited: tuple[str, ...]
+    setpoints: Trajectory, toolpath: Toolpath, machine: Machine, given: Given, not_limited: tuple[str, ...]
 ) -> dict[str, LimitCheck]:
     """The worst of each limit of the linear joints, by name."""
-    axes = setpoints.axes
-    seen = OwnSeen(tuple(_Joint(letter, machine.axes[letter]) for letter in LINEAR_AXES), axes)
-    limits = _limits(machine, axes, given, not_limited)
+    limits = limits_of(machine, setpoints, given, not_limited)
+    worst = Worst(rows_of(limits), len(limits.axes))
     travelled, skip = 0.0, 0
-    for part in _overlapping(setpoints, CARRIED):
-        seen.take(
-            SampleBlock(
-                **{name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)},
-                piece=np.asarray(part.line, dtype=np.int64),
-                skip=skip,
-                travelled=travelled,
-            ),
-            limits,
-        )
-        travelled += float(np.linalg.norm(np.diff(part.position, axis=0), axis=1).sum())
-        skip = min(CARRIED, len(part))
-    checks = {}
-    for row, (ratio, value, limit, how) in enumerate(seen.worst):
-        name, unit = seen.name(row)
-        checks[name] = LimitCheck(
-            name=name,
-            unit=unit,
-            ratio=float(ratio),
-            value=float(value),
-            limit=float(limit if ratio > 0 else seen.least[row]),
-            time=float(seen.time[row]),
-            position=seen.at[row],
-            line=int(seen.piece[row]),
-            limited=name.partition(".")[0] not in not_limited,
-            note="column" if how == COLUMN else "differences of position",
-        )
-    return checks
-
-
-def _limits(machine: Machine, axes: tuple[str, ...], given: Given, not_limited: tuple[str, ...]) -> Limits:
-    rounding = np.zeros(len(axes)) if not len(given.position_rounding) else np.array(given.position_rounding)
-    return Limits(
-        per_axis=np.array([machine.limits(name, axes) for name in DERIVATIVES]),  # type: ignore[arg-type]
-        linear=np.array([letter in LINEAR_AXES for letter in axes]),
-        judged=np.array([name in given.columns for name in DERIVATIVES]),
-        rounding=rounding,
-        time_rounding=given.time_rounding,
-        normal=np.inf,
-        acceleration_at_stop=np.full(len(axes), np.inf),
-        jerk_limited="jerk" not in not_limited,
-    )
-
-
-class _Joint(SimpleNamespace):
-    """A joint as `OwnSeen` asks for it: itself, with its limits."""
-
-    def __init__(self, letter: str, axis: Axis):
-        super().__init__(name=letter, unit="mm", turn=None, axis=axis)
-
-    def bounds(self, at: Any) -> tuple[float, float, float]:
-        return self.axis.velocity, self.axis.acceleration, self.axis.jerk
-
-    def value(self, at: Any) -> Any:
-        return getattr(at, self.name)
+    for part in _overlapping(setpoints, BACK):
+        columns = {name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)}
+        piece = np.asarray(part.line, dtype=np.int64)  # the line itself
+        block = SampleBlock(**columns, piece=piece, skip=skip, travelled=travelled)
+        look_at_axes(block, limits, worst)
+        travelled, skip = float(block.travelled_to()[-1]), min(BACK, len(part))
+    checks = [
+        check_of(worst, row, toolpath, int(worst.piece[row]), not_limited)
+        for row in range(len(DERIVATIVES) * len(limits.axes))
+    ]
+    return {check.name: check for check in checks if check.name.rpartition(".")[2] in LINEAR_AXES}

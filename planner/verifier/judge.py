@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
-from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
+from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier import contour, error_allocation, findings, samples
 from planner.verifier.between import bow_share
@@ -17,18 +16,16 @@ from planner.verifier.exact import exact_faults
 from planner.verifier.excess import Kind
 from planner.verifier.extruder import extruder_seen
 from planner.verifier.filtered import after_filters
-from planner.verifier.findings import QUANTITIES
 from planner.verifier.given import DERIVATIVES, WHOLE, Given
 from planner.verifier.held import thread_checks, thread_faults
-from planner.verifier.limits import NORMAL_NAME, normal_limit
+from planner.verifier.limits import NORMAL_NAME, limits_of
 from planner.verifier.pieces import program_pieces, widened
 from planner.verifier.reading import CHORDS, Reader
 from planner.verifier.ringing import ringing_of
-from planner.verifier.sample_block import Limits
 from planner.verifier.times import AnyMotion, cells_per_period
 from planner.verifier.verdict import Verdict
 
-NOT_LIMITED_NAMES = (*QUANTITIES, "feed", NORMAL_NAME)
+NOT_LIMITED_NAMES = (*DERIVATIVES, "feed", NORMAL_NAME)
 READING = 0.9  # share of a verdict's time that the first reading takes, about [-]
 
 
@@ -61,7 +58,7 @@ def verify(
     if motion is None:
         samples.check_unit_of_time(trajectory, toolpath, machine)
     pieces = program_pieces(toolpath)
-    limits = _limits(machine, trajectory, given, not_limited)
+    limits = limits_of(machine, trajectory, given, not_limited)
     if limits.rounding.any():
         pieces = widened(pieces, more=float(np.linalg.norm(limits.rounding)))
     acceleration = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
@@ -71,7 +68,7 @@ def verify(
     looks = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
     apart = contour.apart(looks, pieces, reader.read)
     contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
-    checks = findings.limit_checks(looks, toolpath, machine, pieces, not_limited)
+    checks = findings.limit_checks(looks, toolpath, pieces, not_limited)
     contour_check = apart.contour_check(toolpath)
     end_error, end_faults = findings.end_error(looks, toolpath, limits.rounding)
     lost, order, order_faults = findings.order(looks, toolpath, pieces)
@@ -89,9 +86,8 @@ def verify(
     of_samples += findings.column_faults(looks, limits, toolpath, pieces)
     of_samples += samples.rest_faults(reader.delivered, looks, limits)
     threads = thread_checks(trajectory, looks, toolpath, pieces, machine)
-    extruder = extruder_seen(trajectory, looks, toolpath, pieces, given)
-    if toolpath.extrusion is not None:
-        checks |= extruder.checks(toolpath.extrusion.limits, not_limited)
+    extruder = extruder_seen(trajectory, looks, toolpath, pieces, given, not_limited)
+    checks |= extruder.checks
     notes += extruder.notes
     after = after_filters(trajectory, toolpath, machine, pieces)
     linear_error, angle_error = _both_errors(apart, toolpath)
@@ -172,31 +168,3 @@ def _check_input(trajectory: Trajectory, toolpath: Toolpath, not_limited: tuple[
             raise ValueError(
                 f"not_limited: '{name}' is not known; allowed are {', '.join(NOT_LIMITED_NAMES)}"
             )
-
-
-def _limits(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
-    per_axis = np.array([machine.limits(name, trajectory.axes) for name in DERIVATIVES])  # type: ignore[arg-type]
-    return Limits(
-        per_axis=per_axis,
-        linear=np.array([letter in LINEAR_AXES for letter in trajectory.axes]),
-        judged=np.array([name in given.columns for name in DERIVATIVES]),
-        rounding=_rounding(trajectory, given, per_axis[1]),
-        time_rounding=given.time_rounding,
-        normal=normal_limit(machine),
-        acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
-        jerk_limited="jerk" not in not_limited,
-        axes=trajectory.axes,
-        own=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
-    )
-
-
-def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
-    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion can have there [mm]."""
-    rounding = np.zeros(len(acceleration))
-    if len(given.position_rounding):
-        rounding = rounding + given.position_rounding
-    if given.end_rounding and len(trajectory) > 1:
-        h = float(trajectory.t[-1] - trajectory.t[-2])
-        speed = np.abs(trajectory.position[-1] - trajectory.position[-2]) / h + acceleration * h
-        rounding = rounding + given.end_rounding * speed
-    return rounding

@@ -13,7 +13,7 @@ from planner.verifier.dense import Comparison
 from planner.verifier.findings import Look
 from planner.verifier.given import Given
 from planner.verifier.pieces import PERIOD_ROUNDING, ProgramPieces
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 from planner.verifier.samples import Delivered
 from planner.verifier.stream import Watch
 from planner.verifier.times import AnyMotion, look

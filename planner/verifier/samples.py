@@ -33,12 +33,13 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind
-from planner.verifier.findings import QUANTITIES, Look, measured
-from planner.verifier.given import Given
-from planner.verifier.limits import ACCELERATION, JERK, ROUNDING_ULPS
+from planner.verifier.findings import Look, measured
+from planner.verifier.given import DERIVATIVES, Given
+from planner.verifier.limits import ACCELERATION, JERK
 from planner.verifier.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
-from planner.verifier.sample_block import Limits
+from planner.verifier.records import Limits
 from planner.verifier.stops import STILL
+from planner.verifier.worst import ROUNDING_ULPS
 
 # A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the
 # machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at least 1000 times.
@@ -163,7 +164,7 @@ def digits(
     )
     error = limits.rounding + speed * given.time_rounding
     faults, shares = [], []
-    for order, quantity in enumerate(QUANTITIES, start=1):
+    for order, quantity in enumerate(DERIVATIVES, start=1):
         share = 2.0**order * error / h**order / limits.per_axis[order - 1]
         k = int(share.argmax())
         shares.append(f"{quantity}.{axes[k]} to {100 * share[k]:.2g} % of its limit")

@@ -30,8 +30,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.verifier.kernel import kernel
-from planner.verifier.limits import ROUNDING_ULPS
 from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, reach_chord
+from planner.verifier.worst import ROUNDING_ULPS
 
 # cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked at [mm2]; place: where
 # it is passed along the chords from the start [mm]; begin, end: from where the block after it may have begun, and to where the one

@@ -1,0 +1,124 @@
+"""The worst of some quantities over a motion, and divided differences of positions, by which they are seen.
+
+The n-th divided difference is a mean of the n-th derivative (Hermite-Genocchi), so n! times it can exceed a
+limit only if the motion does, whatever the spacing of the samples:
+
+    d1 = dx / dt,    d2 = 2 (d1' - d1) / (t2 - t0),    d3 = 3 (d2' - d2) / (t3 - t0)
+
+No slack is needed but for rounding. A position carries an error of `ROUNDING_ULPS` units in the last place of
+what it is computed from: the coordinate, the path length run so far and (limit times) the time. To it come the
+digits that a file was written with: those of the position, and those of the time at the speed that the motion
+can have there. The error is carried through the same recursion and taken off: at 1 m of coordinates, 100 m of
+path and 1 ms it is worth 2e-10 mm, 1e-7 mm/s, 4e-4 mm/s2, 2 mm/s3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.verifier.excess import Spans, above
+from planner.verifier.records import Limits, SampleBlock
+
+ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
+COLUMN, DIFFERENCE = 0, 1  # how a value was seen
+BACK = 3  # periods that a third difference reaches back
+
+
+class Worst:
+    """The worst so far of R quantities, and where they are exceeded.
+
+    names : of each quantity name and unit; no name for what is no limit of its own
+    row   : (R, 4) ratio, value, limit, `COLUMN` or `DIFFERENCE`
+    time  : (R,) [s]; at: (R, A) [mm]; piece: (R,)
+    least : (R,) the least limit; inf where nothing limited it
+    over  : spans in which the columns exceed limits
+    """
+
+    def __init__(self, names: Sequence[tuple[str, str]], axes: int):
+        count = len(names)
+        self.names = tuple(names)
+        self.row, self.time, self.at = np.zeros((count, 4)), np.zeros(count), np.zeros((count, axes))
+        self.piece, self.least = np.zeros(count, dtype=np.int64), np.full(count, np.inf)
+        self.over = Spans()
+
+    def take(
+        self,
+        first: int,
+        value: FloatArray,
+        limit: FloatArray | float,
+        how: int,
+        block: SampleBlock,
+        span: int | None = None,
+    ) -> None:
+        """Take in samples of the quantities `first`, `first` + 1, ... of a block.
+
+        value : (n, K); limit: what is allowed, of a shape that fits it
+        span  : index in `NAMES` of the quantity, where spans above the limit are noted
+        """
+        limit = np.broadcast_to(limit, value.shape)
+        ratio = (value / limit)[block.skip :]
+        if not len(ratio):
+            return
+        rows = slice(first, first + value.shape[1])
+        self.least[rows] = np.minimum(self.least[rows], limit[block.skip :].min(axis=0))
+        for k, n in enumerate(ratio.argmax(axis=0).tolist()):
+            if ratio[n, k] > self.row[first + k, 0]:
+                at = block.skip + n
+                seen = float(ratio[n, k]), float(value[at, k]), float(limit[at, k]), how
+                self.keep(first + k, seen, float(block.t[at]), block.position[at], int(block.piece[at]))
+        if span is not None and (over := above(ratio.max(axis=1))).any():
+            self.over.add(span, block.t[block.skip :], over)
+
+    def keep(
+        self, row: int, seen: tuple[float, float, float, int], time: float, at: FloatArray, piece: int
+    ) -> None:
+        """The worst of a quantity is now ratio, value, limit and how it was `seen`, there."""
+        self.row[row], self.time[row], self.at[row], self.piece[row] = seen, time, at, piece
+
+
+def position_error(block: SampleBlock, limits: Limits) -> FloatArray:
+    """(n, A) largest error of the positions (module text) [mm]."""
+    t, position = block.t, block.position
+    far = block.travelled_to()[:, None]
+    ulp = ROUNDING_ULPS * 2.0**-52
+    error: FloatArray = ulp * (np.abs(position) + far + limits.per_axis[0] * t[:, None]) + limits.rounding
+    if limits.time_rounding > 0.0 and len(t) > 1:
+        lasting = np.diff(t)[:, None]
+        speed = np.abs(np.diff(position, axis=0)) / lasting + limits.per_axis[1] * lasting
+        error[1:] += limits.time_rounding * speed
+        error[0] += limits.time_rounding * speed[0]
+    return error
+
+
+def differences(
+    t: FloatArray, values: FloatArray, error: FloatArray, turn: float | None = None
+) -> list[tuple[FloatArray, FloatArray]]:
+    """n! times the n-th divided differences for n = 1, 2, 3, and their error, each at the last of its samples
+    and 0 before.
+
+    values : (n, K) at the times t (n,) [s]; error: (n, K) of them
+    turn   : what values may jump by because they start again; None if they do not
+    """
+    found, off = values, error
+    every: list[tuple[FloatArray, FloatArray]] = []
+    for order in (1, 2, 3):
+        value, wrong = np.zeros_like(values), np.zeros_like(values)
+        if len(found) > 1:
+            over = (order / (t[order:] - t[:-order]))[:, None]
+            step = np.diff(found, axis=0)
+            if order == 1 and turn is not None:
+                step = step - turn * np.round(step / turn)
+            found, off = over * step, over * (off[1:] + off[:-1])
+            value[order:], wrong[order:] = found, off
+        else:
+            found = found[:0]
+        every.append((value, wrong))
+    return every
+
+
+def less_error(difference: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """The size of a difference, less its error."""
+    return np.maximum(np.abs(difference[0]) - difference[1], 0.0)

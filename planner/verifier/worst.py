@@ -58,19 +58,23 @@ class Worst:
         value : (n, K); limit: what is allowed, of a shape that fits it
         span  : index in `NAMES` of the quantity, where spans above the limit are noted
         """
-        limit = np.broadcast_to(limit, value.shape)
         ratio = (value / limit)[block.skip :]
         if not len(ratio):
             return
         rows = slice(first, first + value.shape[1])
-        self.least[rows] = np.minimum(self.least[rows], limit[block.skip :].min(axis=0))
+        least = np.asarray(limit)[block.skip :].min(axis=0) if np.ndim(limit) == 2 else limit
+        self.least[rows] = np.minimum(self.least[rows], least)
+        limit, most = np.broadcast_to(limit, value.shape), 0.0
         for k, n in enumerate(ratio.argmax(axis=0).tolist()):
+            most = max(most, ratio[n, k])
             if ratio[n, k] > self.row[first + k, 0]:
                 at = block.skip + n
                 seen = float(ratio[n, k]), float(value[at, k]), float(limit[at, k]), how
                 self.keep(first + k, seen, float(block.t[at]), block.position[at], int(block.piece[at]))
-        if span is not None and (over := above(ratio.max(axis=1))).any():
-            self.over.add(span, block.t[block.skip :], over)
+        if span is not None and most > 1.0:
+            over = above(ratio.max(axis=1))
+            if over.any():
+                self.over.add(span, block.t[block.skip :], over)
 
     def keep(
         self, row: int, seen: tuple[float, float, float, int], time: float, at: FloatArray, piece: int

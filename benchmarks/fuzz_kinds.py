@@ -23,7 +23,9 @@ from benchmarks.fuzz_trajectories import make_trajectory, try_trajectory
 _JUDGED = ("planner/report/trajectory_reader.py", "planner/report/digits.py", "planner/verifier")
 KINDS = {
     "nc": Kind(make_program, try_program, ("planner/nc",), guided=False),
-    "hpgl": Kind(make_drawing, try_drawing, ("planner/nc/hpgl", "planner/nc/dialects.py"), guided=False),
+    "hpgl": Kind(
+        make_drawing, try_drawing, ("planner/nc/hpgl", "planner/nc/language/detect.py"), guided=False
+    ),
     "machine": Kind(make_machine, try_machine, ("planner/machine", "planner/verifier"), guided=False),
     "imports": Kind(
         make_settings, try_settings, ("planner/controls/machine_import", "planner/machine"), guided=False

@@ -17,10 +17,10 @@ import math
 import re
 
 from planner.nc import codes
-from planner.nc.block import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
 from planner.nc.codes import Assumption
-from planner.nc.ignored_words import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, IgnoredWords
+from planner.nc.faults import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, IgnoredWords
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
+from planner.nc.moves import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
 from planner.nc.settings import (
     ALWAYS_READ,
     EVERYTHING,

@@ -29,10 +29,9 @@ import numpy as np
 from planner.base.units import MM_PER_INCH
 from planner.nc import auxiliary, codes
 from planner.nc.arcs import AXES, IN_PLANE
-from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import integer
+from planner.nc.moves import Block, WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 

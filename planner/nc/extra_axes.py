@@ -1,4 +1,4 @@
-"""State of the axes beside x, y and z (extra_axis_moves.py has their rules)."""
+"""State of the axes beside x, y and z (offsets.py has their rules)."""
 
 from __future__ import annotations
 

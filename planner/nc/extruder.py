@@ -21,9 +21,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.base.kernels import njit
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.events import EventTable
 from planner.nc.lexer import Words
-from planner.nc.program import MOVES, Kind, Program
+from planner.nc.program import MOVES, EventTable, Kind, Program
 
 _FLOW, _WHOLE_FLOW = 221.0, 100.0  # M221 S100
 _E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")

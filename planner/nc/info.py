@@ -17,9 +17,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine
 from planner.nc.arcs import IN_PLANE
 from planner.nc.bezier import at, homogeneous, lengths
-from planner.nc.events import EventTable, plain
 from planner.nc.faults import Fault
-from planner.nc.program import FEED_MOVES, MOVES, Expansion, Kind, Program, ToolPoint
+from planner.nc.program import FEED_MOVES, MOVES, EventTable, Expansion, Kind, Program, ToolPoint, plain
 from planner.nc.reader import interpret, load, source_name
 from planner.nc.reading import AS_USUAL, Reading
 

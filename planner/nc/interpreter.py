@@ -20,16 +20,15 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
-from planner.nc import auxiliary, codes, compensation, feeds, moves, offsets
-from planner.nc.block import Block, WordFault
+from planner.nc import auxiliary, codes, mover, moves, offsets
 from planner.nc.block_reader import read_block
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
-from planner.nc.faults import FaultList, Findings, Notes
-from planner.nc.ignored_words import IgnoredWords
+from planner.nc.faults import FaultList, Findings, IgnoredWords, Notes
 from planner.nc.integers import DwellWords
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
+from planner.nc.moves import Block, WordFault
 from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
@@ -240,9 +239,9 @@ class Interpreter:
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
-            compensation.check_unchanged(self.state, block)
+            mover.check_unchanged(self.state, block)
         self._limits.take(block.settings, self.state, self.table, block.line, self.findings)
-        feeds.set_feed(self.state, block, self.findings)
+        auxiliary.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.table, block, self.findings)
         if block.g.get("one-shot") == 40:
@@ -286,9 +285,7 @@ class Interpreter:
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
-            self.mover.cutter = compensation.switch(
-                state, self.table, block, self.mover.cutter, self.findings
-            )
+            self.mover.cutter = mover.switch(state, self.table, block, self.mover.cutter, self.findings)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.findings)
         self.tool_point.take(state, self.table, block)

@@ -1,6 +1,8 @@
 """Motion of blocks: G0 to G3, splines, drilling cycles and threads, with or without cutter radius compensation.
 
 G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by switches.
+
+G40, G41, G42, G41.1 and G42.1: the words that switch cutter radius compensation (cutter.py), and what is refused while it is on.
 """
 
 from __future__ import annotations
@@ -8,16 +10,99 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, compensation, drilling, extra_axis_moves, feeds, moves, offsets, threads
+from planner.nc import auxiliary, codes, drilling, moves, offsets, threads
 from planner.nc.arcs import is_hardly_turned
-from planner.nc.block import OFFSET_NUMBER, Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
-from planner.nc.faults import Findings
-from planner.nc.ignored_words import IgnoredWords
+from planner.nc.faults import Findings, IgnoredWords
+from planner.nc.moves import OFFSET_NUMBER, Block, WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
-from planner.nc.state import NO_MOTION, REFUSED_MOTION, State
+from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State
+
+# Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
+_OFF = 400
+_LEFT = (410, 411)
+_DYNAMIC = (411, 421)
+_REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retract mode")
+_REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while it is on
+
+
+def check_unchanged(state: State, block: Block) -> None:
+    """Raise WordFault for words that must not stand in a block while compensation is on."""
+    for group in _REFUSED_GROUPS:
+        code = block.g.get(group)
+        if code is not None and not (group == "plane" and code == {2: 170, 1: 180, 0: 190}[state.normal]):
+            raise WordFault(block.at[group], _refusal(f"G{codes.number(code)}"))
+    one_shot = block.g.get("one-shot")
+    sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
+    refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block))
+    if one_shot is not None and refused:
+        raise block.fault(_refusal(f"G{codes.number(one_shot)}"), "one-shot")
+    if block.homing:
+        raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
+    if "tool change" in block.m:
+        raise block.fault(_refusal("M6"), "tool change")
+
+
+def _system_in_force(state: State, block: Block) -> bool:
+    number = round(block.value.get("P", 0.0))
+    return number == 0 or (state.system in SYSTEMS and SYSTEMS.index(state.system) + 1 == number)
+
+
+def _refusal(name: str) -> str:
+    return f"{name} while cutter radius compensation is on; write G40 before it"
+
+
+def check_motion(state: State, block: Block) -> None:
+    """Cycles and threads are not compensated. Raises WordFault."""
+    if state.motion > 3:
+        raise block.fault(_refusal(f"G{codes.number(state.motion)}"))
+
+
+def switch(
+    state: State, table: BlockTable, block: Block, on: Cutter | None, findings: Findings
+) -> Cutter | None:
+    """The compensation after G40 to G42.1, given the one in force. Raises WordFault."""
+    code = block.g["cutter compensation"]
+    if code == _OFF:
+        if on is not None:
+            on.fix()
+            if not on.started:
+                state.actual = None
+        return None
+    name = f"G{codes.number(code)}"
+    word = block.at["cutter compensation"]
+    if on is not None:
+        raise WordFault(word, f"{name} while cutter radius compensation is on; write G40 before it")
+    if state.normal == 0:
+        raise WordFault(word, f"{name} in the y z plane is not supported; write G17 or G18 before it")
+    if state.normal == 1 and state.rotated:
+        raise WordFault(word, f"{name} in G18 while the work system is rotated is not supported")
+    if "L" in block.value:
+        raise block.fault(
+            f"the edge orientation L of {name} is not supported; remove it and write the tool's path", "L"
+        )
+    diameter = _diameter(state, block, code, findings)
+    if diameter == 0.0:
+        return None
+    left = (code in _LEFT) == (diameter > 0)
+    return Cutter(state, table, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
+
+
+def _diameter(state: State, block: Block, code: int, findings: Findings) -> float:
+    """[mm]"""
+    name = f"G{codes.number(code)}"
+    if code in _DYNAMIC:
+        if "D" not in block.value:
+            raise block.fault(f"{name} needs the tool's diameter as a D word", "cutter compensation")
+        return block.value["D"] * state.unit
+    number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
+    tool = state.tools.get(number)
+    if tool is None or tool.diameter == 0.0:
+        text = f"tool {number} has no diameter in the machine file: {name} does not move the path"
+        findings.assume(text, block.line, block.at["cutter compensation"])
+    return 0.0 if tool is None else tool.diameter
 
 
 def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
@@ -38,10 +123,10 @@ def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -
         state.position[:] = home
     else:
         state.position[:] = moves.target(state, block)
-        extra_axis_moves.move(state, block)
+        offsets.move(state, block)
         table.add(Kind.RAPID, block.line, state)
         state.position[:] = _some_axes(state, block, home)
-    extra_axis_moves.go_home(state, block, code, everything=everything)
+    offsets.go_home(state, block, code, everything=everything)
     table.add(Kind.RAPID, block.line, state)
 
 
@@ -132,7 +217,7 @@ class Mover:
 
     def _take_default_feed(self, block: Block) -> None:
         if not self.ignored.strict:
-            feeds.take_default(self.state, self.feed_default, block, self.findings)
+            auxiliary.take_default(self.state, self.feed_default, block, self.findings)
 
     def _move(self, block: Block) -> None:
         """A block with a motion code in force, and somewhere to go."""
@@ -145,16 +230,16 @@ class Mover:
         if state.in_thread and state.motion not in codes.THREADS:
             threads.stop(state, self.table, block.line)
         if self.cutter is not None:
-            extra_axis_moves.refuse(state, block, "under cutter radius compensation")
-            compensation.check_motion(state, block)
+            offsets.refuse(state, block, "under cutter radius compensation")
+            check_motion(state, block)
         if state.motion > 3:
-            extra_axis_moves.refuse(state, block, "in a cycle or a thread")
+            offsets.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
             threads.thread(state, self.table, block, self.findings)
         elif state.motion == codes.THREADING:
             threads.cut_thread(state, self.table, block, self.findings)
         elif state.motion in codes.CYCLES:
-            feeds.check_feed(state, block)
+            auxiliary.check_feed(state, block)
             drilling.drill(state, self.table, block, self.findings)
         elif state.motion in (2, 3):
             self._arc(block)
@@ -166,18 +251,16 @@ class Mover:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
         begin = state.further.position.copy() if state.further.letters else NOWHERE
-        extra_axis_moves.move(state, block)
+        offsets.move(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
         if kind == Kind.LINE:
-            feeds.check_feed(state, block)
+            auxiliary.check_feed(state, block)
             length = float(np.linalg.norm(target - state.position))
-            feeds.feed_of_time(
-                state, block, extra_axis_moves.length_moved(state, begin, length), self.findings
-            )
-        if kind == Kind.LINE and feeds.on_surface(state):
-            extra_axis_moves.refuse(state, block, "under a constant surface speed")
+            auxiliary.feed_of_time(state, block, offsets.length_moved(state, begin, length), self.findings)
+        if kind == Kind.LINE and auxiliary.on_surface(state):
+            offsets.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
-            state.feed = feeds.surface_feed(state, max(map(abs, radii)), block.motion_word())
+            state.feed = auxiliary.surface_feed(state, max(map(abs, radii)), block.motion_word())
             if cutter is None:
                 self._on_surface(block, target, *radii)
                 return
@@ -190,11 +273,11 @@ class Mover:
     def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
         """A straight move in parts, each with the feed of its larger radius."""
         state, start, at = self.state, self.state.place.copy(), begin
-        parts = feeds.surface_parts(state, begin, end)
+        parts = auxiliary.surface_parts(state, begin, end)
         self.table.make_room(len(parts))
         for part in parts:
             there = begin + part * (end - begin)
-            state.feed = feeds.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
+            state.feed = auxiliary.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
             state.position[:] = target if part == 1.0 else start + part * (target - start)
             state.actual, at = None, there
             self.table.add(Kind.LINE, block.line, state)
@@ -203,8 +286,8 @@ class Mover:
         """G2, G3."""
         state = self.state
         target = moves.target(state, block)
-        extra_axis_moves.move(state, block)
-        feeds.check_feed(state, block)
+        offsets.move(state, block)
+        auxiliary.check_feed(state, block)
         if self.cutter is None and state.actual is not None:
             raise block.fault("the move after G40 must be straight; write G0 or G1 to where this arc begins")
         try:
@@ -217,11 +300,11 @@ class Mover:
                 length = moves.arc_length(state.position, target, arc, normal)
                 text = f"an arc of {length:.4g} mm hardly turns; some controls make a full circle of it"
                 self.findings.assume(text, block.line, block.motion_word())
-            if feeds.on_surface(state):
+            if auxiliary.on_surface(state):
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
-                state.feed = feeds.surface_feed(state, abs(centre) + size, block.motion_word())
-            feeds.feed_of_time(
+                state.feed = auxiliary.surface_feed(state, abs(centre) + size, block.motion_word())
+            auxiliary.feed_of_time(
                 state, block, moves.arc_length(state.position, target, arc, normal), self.findings
             )
             if self.cutter is not None:
@@ -236,7 +319,7 @@ class Mover:
         state = self.state
         if not is_spline_line(block):
             return
-        extra_axis_moves.refuse(state, block, "on a spline")
+        offsets.refuse(state, block, "on a spline")
         if self.cutter is not None:
             raise block.fault("a spline under cutter radius compensation; write G40 before it")
         if state.actual is not None:
@@ -250,7 +333,7 @@ class Mover:
         if found is None:
             return
         self._take_default_feed(block)
-        feeds.check_feed(state, block)
+        auxiliary.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]
         self.table.add_spline(points, weights, line, state)

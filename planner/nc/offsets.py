@@ -10,20 +10,139 @@ say; a tool's new offset is in force from its next G43 on.
 
 Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59. After G91 both would add,
 which is refused: the flat program (language/flat.py) could not say it.
+
+Axes beside x, y and z: rotary A B C in degrees, and U V W, which are linear too, in mm. They are joints: no kinematics.
+
+A machine that has one gives its letter to programs. Its coordinates follow the rules of the others, without rotation of the work system
+and without tool offsets:
+
+    machine position = origin of the work system + G92 offset + programmed coordinate
+
+F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w, else that of the rotary
+axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in absolute mode to the programmed place within a
+turn, forwards if the number is positive (0 included), backwards if it has a minus; after G53 too, where LinuxCNC takes the magnitude of
+the number less the offsets (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes, extra_axis_moves
-from planner.nc.block import Block, WordFault
+from planner.nc import codes
+from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.faults import Findings
-from planner.nc.moves import coordinate, integer
+from planner.nc.moves import Block, WordFault, coordinate, integer
 from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
+
+_TURN = 360.0  # degrees
+
+
+def _zeros() -> FloatArray:
+    return np.zeros(len(LETTERS))
+
+
+def refuse(state: State, block: Block, where: str) -> None:
+    """Raise WordFault for a further axis in a place that does not know them."""
+    if block.has(state.further.letters):
+        word = block.first_of(state.further.letters)
+        letter = next(c for c in state.further.letters if block.at.get(c) == word)
+        raise WordFault(
+            word, f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
+        )
+
+
+def move(state: State, block: Block) -> None:
+    """Move the further axes to where the words of a block lead. Raises WordFault for a place of a wrapped axis beyond a turn."""
+    further = state.further
+    in_machine = block.g.get("one-shot") == 530
+    offset = _zeros() if in_machine else further.offset(state.system)
+    for column in further.columns:
+        letter = LETTERS[column]
+        if letter not in block.value:
+            continue
+        value, here = block.value[letter] * scale(state, column), float(further.position[column])
+        if not state.absolute and not in_machine:
+            further.position[column] = here + value
+        elif letter in further.wrapped:
+            if abs(value) >= _TURN:
+                raise WordFault(
+                    block.at[letter],
+                    f"axis {letter} is wrapped: its places are above -360 and below 360 degrees",
+                )
+            zero = further.offset(state.system)[column]
+            place = abs(value - zero if in_machine else value)
+            further.position[column] = _unwrapped(math.copysign(place, value), here - zero) + zero
+        else:
+            further.position[column] = value + offset[column]
+
+
+def _unwrapped(value: float, here: float) -> float:
+    """The place `value` [degrees] within a turn, ahead of `here` in the direction of its sign."""
+    place = abs(value) + math.floor(here / _TURN) * _TURN
+    forwards = math.copysign(1.0, value) > 0
+    if forwards and place < here:
+        return place + _TURN
+    return place - _TURN if not forwards and place > here else place
+
+
+def scale(state: State, column: int) -> float:
+    """Degrees or mm of a programmed unit."""
+    return 1.0 if column < ROTARY else state.unit
+
+
+def shift_extra_axes(state: State, block: Block, code: int) -> None:
+    """G52 and G92 with words of further axes, and G92.1 to G92.3 for all of them."""
+    further = state.further
+    if code not in (520, 920):
+        further.g92 = further.g92_saved.copy() if code == 923 else _zeros()
+        if code == 921:
+            further.g92_saved = _zeros()
+        return
+    origin = further.origins.get(state.system, _zeros())
+    for column in further.columns:
+        letter = LETTERS[column]
+        if letter in block.value:
+            value = block.value[letter] * scale(state, column)
+            further.g92[column] = value if code == 520 else further.position[column] - origin[column] - value
+    further.g92_saved = further.g92.copy()
+
+
+def set_system(state: State, block: Block, code: int, *, from_place: bool) -> None:
+    """G10 L2 (`from_place` False) and L20: the origin of a work system."""
+    further = state.further
+    origin = further.origins.get(code, _zeros()).copy()
+    for column in further.columns:
+        letter = LETTERS[column]
+        if letter in block.value:
+            value = block.value[letter] * scale(state, column)
+            origin[column] = further.position[column] - further.g92[column] - value if from_place else value
+    further.origins[code] = origin
+
+
+def go_home(state: State, block: Block, code: int, *, everything: bool) -> None:
+    """The further axes of the block, or all, go to the position of G28 or G30."""
+    further = state.further
+    home = further.homes.get(code, _zeros())
+    for column in further.columns:
+        if everything or LETTERS[column] in block.value:
+            further.position[column] = home[column]
+
+
+def length_moved(state: State, start: FloatArray, xyz: float) -> float:
+    """The length that F and inverse time go by [mm; where only rotary axes move, degrees times the programmed unit].
+
+    start : (6,) of the further axes before the move;  xyz : length of the path of x, y and z [mm]
+    """
+    if xyz > 0.0 or not state.further.letters:
+        return xyz
+    moved = state.further.position - start
+    parallel = float(np.linalg.norm(moved[ROTARY:]))
+    return parallel if parallel > 0.0 else float(np.linalg.norm(moved[:ROTARY])) * state.unit
+
 
 _FIXTURE = 593  # the system of G10 L11
 
@@ -32,7 +151,7 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
     """G43, G43.1, G43.2, G43.4, G49. Raises WordFault for words that contradict each other."""
     code = block.g["tool length"]
     if code in (431, 432) and "motion" not in block.g:
-        extra_axis_moves.refuse(state, block, "of a tool offset")
+        refuse(state, block, "of a tool offset")
     if code == 490:
         state.tool_offset = np.zeros(3)
     elif code == 431:
@@ -103,7 +222,7 @@ def shift_origin(state: State, block: Block) -> None:
         state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
         if code == 921:
             state.g92_saved = np.zeros(3)
-    extra_axis_moves.shift_origin(state, block, code)
+    shift_extra_axes(state, block, code)
     state.apply_offsets()
 
 
@@ -142,7 +261,7 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
-    extra_axis_moves.set_system(state, block, code, from_place=kind == 20)
+    set_system(state, block, code, from_place=kind == 20)
 
 
 def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
@@ -160,11 +279,11 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
-    extra_axis_moves.set_system(state, block, code, from_place=False)
+    set_system(state, block, code, from_place=False)
 
 
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
-    extra_axis_moves.refuse(state, block, "of a tool offset")
+    refuse(state, block, "of a tool offset")
     if "P" not in block.value:
         raise block.fault(f"G10 L{kind} needs its tool as a P word", "one-shot")
     number = integer(block, "P", 1)

@@ -1,5 +1,5 @@
 """The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused, left out or parked whatever
-stands beside them (rotary axes, extruders; see `planner.nc.ignored_words`). Everything else stops it.
+stands beside them (rotary axes, extruders; see `planner.nc.faults`). Everything else stops it.
 
 This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser engraving). It follows the
 same rules as the interpreter: feed first, then S, then the straight move; whatever is not certainly right is left to the
@@ -15,11 +15,11 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
-from planner.nc.block import NUMBER_MAX
 from planner.nc.block_table import BlockTable
 from planner.nc.extra_axes import LETTERS, ROTARY
-from planner.nc.ignored_words import AXIS, LEFT_OUT, PARKED, REFUSED, IgnoredWords
+from planner.nc.faults import AXIS, LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
+from planner.nc.moves import NUMBER_MAX
 from planner.nc.program import Kind
 from planner.nc.state import State
 

@@ -13,12 +13,20 @@ from pathlib import Path
 from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine
-from planner.nc.dialects import is_plotter_file, language_of, refuse_models
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter, OpenArc
-from planner.nc.language.detect import LATHE_NOTE, dialect_of, has_further_systems, has_two_axes, is_turned
+from planner.nc.language.detect import (
+    LATHE_NOTE,
+    dialect_of,
+    has_further_systems,
+    has_two_axes,
+    is_plotter_file,
+    is_turned,
+    language_of,
+    refuse_models,
+)
 from planner.nc.lexer import Words, split_words, text_alone, without_leader
 from planner.nc.points import are_points, read_points
 from planner.nc.program import Program

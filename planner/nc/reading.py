@@ -1,7 +1,7 @@
 """How a program is read: what is refused, what is left out, and what is assumed where the program does not say it.
 
 Without settings a reader is lenient where nothing moves and strict where something does: what it does not know and what cannot move an
-axis is counted in a note (planner/nc/ignored_words.py), and what may move is refused with its line.
+axis is counted in a note (planner/nc/faults.py), and what may move is refused with its line.
 """
 
 from __future__ import annotations

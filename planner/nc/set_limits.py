@@ -21,9 +21,9 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import Machine
-from planner.nc.block import WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
+from planner.nc.moves import WordFault
 from planner.nc.program import MOVES, SetLimit
 from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
 from planner.nc.state import State

@@ -20,10 +20,9 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.bezier import cubic_pieces, homogeneous, raised
-from planner.nc.block import Block, WordFault
 from planner.nc.codes import CUBIC, NURBS, NURBS_END, NURBS_WITH_KNOTS, QUADRATIC
 from planner.nc.lexer import Words
-from planner.nc.moves import target
+from planner.nc.moves import Block, WordFault, target
 from planner.nc.state import State
 
 ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.nc.events import plain
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.program import Kind, PathControl, Program, plain
 from planner.nc.writer import FEED_MIN, round_down
 
 DECIMALS = 7  # of a coordinate in mm

@@ -31,10 +31,9 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves
-from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import integer
+from planner.nc.moves import Block, WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import State
 

@@ -25,11 +25,19 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine
 from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
-from planner.nc.block import Block, WordFault
 from planner.nc.block_table import BlockTable
-from planner.nc.events import EventTable
 from planner.nc.extra_axes import LETTERS, ROTARY
-from planner.nc.program import FEED_MOVES, MOVES, Kind, PathControl, Program, SplineTable, ToolPoint
+from planner.nc.moves import Block, WordFault
+from planner.nc.program import (
+    FEED_MOVES,
+    MOVES,
+    EventTable,
+    Kind,
+    PathControl,
+    Program,
+    SplineTable,
+    ToolPoint,
+)
 from planner.nc.settings import TOOL_POINT_ON
 from planner.nc.state import State
 

@@ -19,7 +19,7 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES
-from planner.nc.dialects import is_plotter_file
+from planner.nc.language.detect import is_plotter_file
 from planner.nc.points import are_points
 from planner.nc.program import Program
 from planner.nc.reader import parse_program

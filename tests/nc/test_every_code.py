@@ -12,8 +12,8 @@ from same_program import machine
 from planner.base.errors import InputError
 from planner.nc import codes, settings
 from planner.nc.hpgl import instructions
-from planner.nc.language.heidenhain import codes as heidenhain
-from planner.nc.language.siemens import codes as siemens
+from planner.nc.language.heidenhain import definitions
+from planner.nc.language.siemens import commands
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
@@ -164,7 +164,7 @@ HEIDENHAIN = Reading(dialect="heidenhain")
 M_NOTHING = {
     **dict.fromkeys((3, 4, 5, 13, 14, 19), "spindle: feeds are per minute"),
     **dict.fromkeys((7, 8, 9), "coolant"),
-    **dict.fromkeys(heidenhain.NOTHING, "heidenhain/codes.py says of each what it does"),
+    **dict.fromkeys(definitions.NOTHING, "heidenhain/definitions.py says of each what it does"),
 }
 
 
@@ -231,8 +231,8 @@ S_NOTHING = {
         ["G450", "G451"], "outer corners under compensation, which is off; G451 with it is refused"
     ),
     **dict.fromkeys(["G601", "G602", "G603"], "when an exact stop ends: at the setpoint"),
-    **dict.fromkeys(siemens.IDLE, "siemens/codes.py: IDLE"),
-    **dict.fromkeys(siemens.IDLE_CALLS, "siemens/codes.py: IDLE_CALLS"),
+    **dict.fromkeys(commands.IDLE, "siemens/commands.py: IDLE"),
+    **dict.fromkeys(commands.IDLE_CALLS, "siemens/commands.py: IDLE_CALLS"),
     "TRAFOOF": "the end of TRAORI, which is refused without kinematics",
 }
 
@@ -265,14 +265,14 @@ SPELLED = (
 
 def test_words_of_sinumerik() -> None:
     tables = {
-        *siemens.IDLE,
-        *siemens.SAID,
-        *siemens.REFUSED,
+        *commands.IDLE,
+        *commands.SAID,
+        *commands.REFUSED,
         "TRAORI",
         "TRAFOOF",
         *(f"G{n}" for n in range(1000)),
     }
-    words = {CALLED.get(word, word) for word in (*tables, *siemens.IDLE_CALLS)} | set(SPELLED)
+    words = {CALLED.get(word, word) for word in (*tables, *commands.IDLE_CALLS)} | set(SPELLED)
     assert doing_nothing(words, ("",), sinumerik, SIEMENS) == {CALLED.get(word, word) for word in S_NOTHING}
 
 

@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from planner.base.arrays import Array, FloatArray
-from planner.nc.language.milling import CORNERS_CLEAR
-from planner.nc.pocket_shapes import ArcSlot, Path, PocketShape, RoundedRectangle, loops
+from planner.nc.language.milling import CORNERS_CLEAR, ArcSlot, Path, PocketShape, RoundedRectangle, loops
 
 SHAPES = {
     "rectangle": RoundedRectangle(30.0, 20.0, 6.0),
@@ -36,6 +35,11 @@ def depth_in(shape: PocketShape, points: Array) -> FloatArray:
     off = np.angle(points * cmath.rect(1, -middle))
     along = np.clip(off, -abs(shape.sweep) / 2, abs(shape.sweep) / 2)
     return shape.b - np.abs(points - shape.radius * np.exp(1j * (middle + along)))
+
+
+def corner_of(shape: PocketShape) -> float:
+    """The smallest radius that the walls turn inwards with."""
+    return shape.corner if isinstance(shape, RoundedRectangle) else shape.b
 
 
 def along(path: Path, apart: float = 0.02) -> Array:
@@ -65,7 +69,7 @@ def test_a_loop_is_closed_and_lies_as_far_from_the_walls_as_asked(shape: PocketS
         depth = depth_in(shape, points)
         # inside of the corners' radius the path has sharp corners, which are further from the walls
         assert depth.min() == pytest.approx(part * shape.room, abs=1e-9)
-        if part * shape.room <= shape.corner:
+        if part * shape.room <= corner_of(shape):
             assert depth.max() == pytest.approx(part * shape.room, abs=1e-9)
         area = 0.5 * np.sum((points.conj() * np.roll(points, -1)).imag)
         assert np.sign(area) == turning
@@ -74,7 +78,7 @@ def test_a_loop_is_closed_and_lies_as_far_from_the_walls_as_asked(shape: PocketS
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("allowance", [0.0, 0.7])
 def test_the_paths_clear_everything_up_to_the_allowance(shape: PocketShape, allowance: float) -> None:
-    radius = min(shape.corner, shape.room) * 0.6
+    radius = min(corner_of(shape), shape.room) * 0.6
     paths = loops(shape, radius + allowance, CORNERS_CLEAR * radius, 1)
     places = np.concatenate([along(path) for path in paths])
     assert depth_in(shape, places).min() >= radius + allowance - 1e-9

@@ -9,7 +9,7 @@ from planner.controls.export.controls import Control
 from planner.controls.export.output import comment
 from planner.controls.export.rows import Source
 from planner.nc import codes
-from planner.nc.events import plain
+from planner.nc.program import plain
 from planner.nc.state import system_name
 from planner.planning.job.plan import Plan
 

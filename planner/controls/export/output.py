@@ -17,7 +17,7 @@ from planner.controls.export.chords import DECIMALS
 from planner.controls.export.controls import OPTIONS, Control
 from planner.controls.export.rows import Row, Source, Word
 from planner.machine import Machine
-from planner.nc.events import plain
+from planner.nc.program import plain
 from planner.nc.writer import round_down
 
 INCH_DECIMALS = DECIMALS + 2  # a hundredth of an inch is about a quarter of a millimetre

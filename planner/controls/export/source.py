@@ -12,9 +12,8 @@ from planner.base.errors import InputError
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
 from planner.controls.export.rows import Source, rows_of
-from planner.nc.events import plain
 from planner.nc.points import are_points
-from planner.nc.program import FEED_MOVES, Program
+from planner.nc.program import FEED_MOVES, Program, plain
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
 from planner.nc.text import program_text

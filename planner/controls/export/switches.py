@@ -7,7 +7,7 @@ from planner.controls.export.controls import is_command, is_setting
 from planner.controls.export.output import Output, called
 from planner.controls.export.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, LENGTHS, Row, Word
 from planner.nc import codes
-from planner.nc.events import plain
+from planner.nc.program import plain
 
 _SPINDLE, _SPINDLE_OFF = (3, 4), 5
 _G96, _G80 = 960, 800

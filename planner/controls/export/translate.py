@@ -19,8 +19,7 @@ from planner.controls.export.rows import G4, G10, G53, HOMES, LENGTHS, Row, Sour
 from planner.controls.export.switches import Switches
 from planner.machine import Machine
 from planner.nc import codes
-from planner.nc.events import plain
-from planner.nc.program import Kind
+from planner.nc.program import Kind, plain
 from planner.nc.reading import FANUC, IGNORE
 from planner.nc.settings import AXES
 from planner.nc.writer import FEED_MIN

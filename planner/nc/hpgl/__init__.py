@@ -1,5 +1,5 @@
 """Reading plotter files (HPGL), as pen plotters and cutting plotters take them, into the same record as NC programs.
 
-In reading order: `instructions` (what there is, and why some of it is not read), `lexer` (how it is written), `plotter`
-(what it means), `drawing` (the blocks so far).
+In reading order: `instructions` (what there is, why some of it is not read, how it is written), `plotter` (what it means), `drawing`
+(user units, the blocks so far).
 """

@@ -2,11 +2,22 @@
 
 A plotter leaves out instructions that it does not know. Here they are left out too, and counted in a note; of those that HP's plotters
 know, none that could change the path is left out: it is read, or ignored with a note, or a fault.
+
+From bytes to instructions, as plotters read them: two letters and numbers.
+
+    instruction = letter letter [number (separator number)*] [terminator]
+    number      = [+|-] digits [. digits]
+    separator   = comma or white space, or nothing before a sign
+    terminator  = ; or the letters of the next instruction
+
+Lines mean nothing. Between instructions may stand device control (ESC . letter), the frame of printers (ESC %, @PJL lines) and, at
+the end, characters that are no instruction; they are left out with a note. Small letters are read as capitals.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 
@@ -108,3 +119,115 @@ TEXT = {
 }
 
 ALLOWED = " ".join(form.name for form in FORMS.values())
+
+
+# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a mistake.
+NUMBER_MAX = 1e9
+
+_BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
+CONTROL = rb"(?:\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*)"
+_CONTROL = re.compile(CONTROL)
+_INSTRUCTION = re.compile(rb"([A-Za-z]{2})([-+.,\d\s]*)")
+_NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)")
+_SEPARATOR = re.compile(rb"\s*,?\s*")
+_NO_NUMBER = re.compile(rb"\A\s*,|,\s*,")
+# Bytes that no instruction holds.
+_NO_INSTRUCTION = bytes(c for c in range(256) if not chr(c).isascii() or not chr(c).isalnum())
+
+Report = Callable[[int, int, str], None]  # from, to, message
+
+
+@dataclass(slots=True)
+class Instruction:
+    """One instruction: its two letters, its numbers, where it starts and ends in the source, and its text, if it takes any."""
+
+    name: str
+    numbers: list[float]
+    at: int
+    end: int
+    text: bytes = b""
+
+
+def instructions(data: bytes, report: Report, note: Callable[[str], None]) -> Iterator[Instruction]:
+    """The instructions in their order. What cannot be read goes to `report`, what is left out to `note`."""
+    at, last = 0, len(data.rstrip(_NO_INSTRUCTION))
+    while True:
+        at = _match(_BLANK, data, at).end()
+        if at >= last:
+            break
+        match = _INSTRUCTION.match(data, at)
+        if match is None:
+            at = _passed_over(data, at, report, note)
+            continue
+        name, start, end = match.group(1).decode().upper(), at, match.end()
+        if name in TEXT:
+            at = _match(TEXT[name], data, at + 2).end()
+            yield Instruction(name, [], start, start + 2, data[start + 2 : at])
+            continue
+        at = end
+        numbers = _numbers(data, start + 2, end, report)
+        if numbers is not None:
+            yield Instruction(name, numbers, start, end)
+    if rest := data[at:].strip():
+        note(f"the file ends with {rest[:8].decode('latin-1')!r}, which is no instruction; left out")
+
+
+def _passed_over(data: bytes, at: int, report: Report, note: Callable[[str], None]) -> int:
+    """Where to go on after what is no instruction: device control is left out with a note, everything else is a fault."""
+    control = _CONTROL.match(data, at)
+    if control:
+        note("device control (ESC sequences, @PJL lines) is left out")
+        return control.end()
+    number = _NUMBER.match(data, at)
+    if number:
+        report(at, number.end(), "a number without an instruction before it")
+        return number.end()
+    what = "a letter by itself" if data[at : at + 1].isalpha() else "this character"
+    report(
+        at,
+        at + 1,
+        f"{what} starts no instruction; an instruction is two letters and numbers, such as PU0,400",
+    )
+    return at + 1
+
+
+def _numbers(data: bytes, start: int, end: int, report: Report) -> list[float] | None:
+    """The numbers between two places; None, after a report, if they cannot be read."""
+    field = data[start:end]
+    try:
+        numbers = [float(text) for text in field.replace(b",", b" ").split()]
+    except ValueError:  # a sign without a separator before it, or no number at all
+        return _numbers_one_by_one(data, start, end, report)
+    if b"," in field and (gap := _NO_NUMBER.search(field)):
+        report(start + gap.end() - 1, start + gap.end(), "a number is missing before this comma")
+        return None
+    if numbers and max(map(abs, numbers)) > NUMBER_MAX:
+        return _numbers_one_by_one(data, start, end, report)
+    return numbers
+
+
+def _numbers_one_by_one(data: bytes, start: int, end: int, report: Report) -> list[float] | None:
+    numbers: list[float] = []
+    at = _match(_SEPARATOR, data, start).end()
+    while at < end:
+        match = _NUMBER.match(data, at, end)
+        apart = not numbers or data[at - 1 : at] in b", \t\r\n\f\v" or data[at : at + 1] in b"+-"
+        if match is None or not apart:
+            report(
+                at, at + 1, "this is no number; write digits, such as -12.5, with commas between the numbers"
+            )
+            return None
+        value = float(match.group())
+        if abs(value) > NUMBER_MAX:
+            report(at, match.end(), f"the number is too large; at most {NUMBER_MAX:g} is allowed")
+            return None
+        numbers.append(value)
+        at = _match(_SEPARATOR, data, match.end()).end()
+    return numbers
+
+
+def _match(pattern: re.Pattern[bytes], data: bytes, at: int) -> re.Match[bytes]:
+    """The match of a pattern that fits everywhere."""
+    match = pattern.match(data, at)
+    assert match is not None
+    return match

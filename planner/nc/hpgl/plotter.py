@@ -24,10 +24,27 @@ from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
 from planner.nc.faults import Fault, Notes
-from planner.nc.hpgl.drawing import PEN_CHANGE, PEN_DOWN, PEN_UP, Drawing, Point, circle_through
-from planner.nc.hpgl.instructions import ALLOWED, CHANGING, FORMS, IGNORED, PAGE_ENDS, REFUSED, WITH_NUMBERS
-from planner.nc.hpgl.lexer import Instruction, instructions
-from planner.nc.hpgl.scaling import Scaling, ScalingError
+from planner.nc.hpgl.drawing import (
+    PEN_CHANGE,
+    PEN_DOWN,
+    PEN_UP,
+    Drawing,
+    Point,
+    Scaling,
+    ScalingError,
+    circle_through,
+)
+from planner.nc.hpgl.instructions import (
+    ALLOWED,
+    CHANGING,
+    FORMS,
+    IGNORED,
+    PAGE_ENDS,
+    REFUSED,
+    WITH_NUMBERS,
+    Instruction,
+    instructions,
+)
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import Setup

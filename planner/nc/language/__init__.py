@@ -3,11 +3,10 @@
 In reading order:
 
     tree        what a program says: expressions and statements, in no language's spelling
-    compiled    statements to Python source, compiled once: `expressions` in basic blocks
+    compiled    statements to Python source, compiled once: `expressions` (and operators that all dialects have) in basic blocks
     rows        what the running program appends: row after row, given to the interpreter in chunks
     run         the running program: its parameters, calls and limits
     system_variables  parameters that hold the state of the control
-    arithmetic  operators and functions that all dialects have
     expression_reader  expressions by the ranks of their operators, for all dialects;  spelling: as RS274NGC and Fanuc write them
     linuxcnc, fanuc, heidenhain, siemens    a folder for each dialect: its text to statements
     source      the lines of a program: which are plain words, which belong to the language

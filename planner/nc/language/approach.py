@@ -25,7 +25,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, Arc, at_place, in_plane
-from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.corner_moves import OffsetMoves
 from planner.nc.language.travel_rows import STANDS, Move, TravelRow
 
 _F = ord("F")

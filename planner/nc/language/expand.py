@@ -13,7 +13,7 @@ from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import compile_procedures
-from planner.nc.language.fanuc import text as fanuc_text
+from planner.nc.language.fanuc import calls
 from planner.nc.language.fanuc.calls import fanuc_files
 from planner.nc.language.fanuc.lathe import LatheParser
 from planner.nc.language.fanuc.lathe_cycles import LatheCycles
@@ -22,12 +22,12 @@ from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.heidenhain import text as heidenhain_text
 from planner.nc.language.heidenhain.flow import files as heidenhain_files
 from planner.nc.language.heidenhain.parser import HeidenhainParser
-from planner.nc.language.linuxcnc import text as linuxcnc_text
+from planner.nc.language.linuxcnc import parser
 from planner.nc.language.linuxcnc.parser import LinuxcncParser
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
-from planner.nc.language.siemens.calls import siemens_files
+from planner.nc.language.siemens.commands import siemens_files
 from planner.nc.language.siemens.parser import SiemensParser
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import (
@@ -97,10 +97,10 @@ class _Front:
 
 _FRONTS = {
     LINUXCNC: _Front(
-        linuxcnc_text.LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
+        parser.LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
-    FANUC: _Front(fanuc_text.LANGUAGE, FanucVariables, FanucParser, fanuc_files),
-    LATHE: _Front(fanuc_text.LANGUAGE, LatheVariables, LatheParser, fanuc_files),
+    FANUC: _Front(calls.LANGUAGE, FanucVariables, FanucParser, fanuc_files),
+    LATHE: _Front(calls.LANGUAGE, LatheVariables, LatheParser, fanuc_files),
     HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionVariables, HeidenhainParser, heidenhain_files),
     SIEMENS: _Front(siemens_text.LANGUAGE, PositionVariables, SiemensParser, siemens_files),
 }

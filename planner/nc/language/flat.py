@@ -10,11 +10,10 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from planner.machine import Machine
-from planner.nc.events import plain
 from planner.nc.faults import require_none
 from planner.nc.integers import LENGTHS, DwellWords
 from planner.nc.lexer import Words
-from planner.nc.program import Program
+from planner.nc.program import Program, plain
 from planner.nc.reader import execute, interpret
 from planner.nc.reading import FANUC, Reading
 

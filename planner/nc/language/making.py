@@ -5,11 +5,15 @@ and units, each a list of letters and numbers, and raises ValueError for values 
 
 What programs of the languages mean that is planned otherwise, and may change geometry or time: sentences that are said first, by the
 names under which statements carry them (`assumed_row`).
+
+Makers of several dialects share the holes below: tapping, pecking with decreasing infeeds, and bores that are milled. Tapping goes in
+and out at the feed lead * speed of the spindle, with a full stop at the bottom, where the spindle turns round. It is planned with
+that feed as its upper limit, not in step with the spindle; a note says so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from planner.nc.interpreter import Interpreter
@@ -91,3 +95,162 @@ def equal_steps(whole: float, most: float) -> int:
 
 
 _ROUNDING = 1e-9  # of a number of steps
+
+
+_COARSE = {
+    3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 7: 1.0, 8: 1.25, 9: 1.25, 10: 1.5, 11: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5,
+    22: 2.5, 24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0,
+}  # fmt: skip  # leads of metric coarse threads by their size [mm], ISO 261
+BREAK = 0.2  # mm by which the tool goes back to break a chip, where the program does not say it
+
+
+@dataclass(frozen=True)
+class HolePlan:
+    """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell at the bottom [s].
+
+    Raises ValueError if the bottom is not below the surface.
+    """
+
+    clear: float
+    top: float
+    bottom: float
+    retract: float
+    feed: float = 0.0
+    dwell: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.bottom >= self.top:
+            raise ValueError("the bottom of the hole lies at or above its surface")
+
+
+def coarse_lead(size: float, unit: float) -> float:
+    """The lead of a metric thread by its size, in the program's unit. Raises ValueError for sizes without one."""
+    if size not in _COARSE:
+        raise ValueError(f"M{size:g} is no size of a metric coarse thread here; give the lead itself (PIT)")
+    return _COARSE[int(size)] / unit
+
+
+def go(z: float, feed: float | None = None) -> Row:
+    """To z, at a feed or at rapid speed."""
+    return [("G", 0.0), ("Z", z)] if feed is None else [("G", 1.0), ("F", feed), ("Z", z)]
+
+
+def dwell_rows(seconds: float) -> Iterator[Row]:
+    """A dwell, if it is one."""
+    if seconds > 0.0:
+        yield [("G", 4.0), ("P", seconds)]
+
+
+def tapped(
+    making: Making,
+    hole: HolePlan,
+    lead: float,
+    speed: float,
+    *,
+    back: float = 0.0,
+    up: float | None = None,
+    start: bool = True,
+) -> Iterator[Row]:
+    """In with lead * speed, out with lead * back (0: the same speed). Raises ValueError without a lead or a speed.
+
+    lead  : negative for a left-hand thread
+    up    : where the way out ends, else at the clearance
+    start : the tool goes to the clearance first
+    """
+    if not (speed > 0.0 and lead != 0.0):
+        raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
+    size = abs(lead)
+    making.assume(
+        "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
+    )
+    first, second = (3.0, 4.0) if lead > 0.0 else (4.0, 3.0)
+    if start:
+        yield go(hole.clear)
+    yield [("S", speed), ("M", first)]
+    yield go(hole.bottom, size * speed)
+    yield [("G", 4.0), ("P", max(hole.dwell, 0.0))]
+    yield [("S", back or speed), ("M", second)]
+    yield go(hole.clear if up is None else up, size * (back or speed))
+    yield [("G", 4.0), ("P", 0.0)]
+    yield [("S", speed), ("M", first)]
+
+
+@dataclass(frozen=True)
+class Pecks:
+    """Infeeds of a deep hole.
+
+    infeed : the first, 0 for all at once;  less : by which each is less than the one before;  least : but at least this
+    breaks : how many infeeds end with a retract by `back` alone, before one that leads out to the clearance
+    chip   : depth between two such retracts within an infeed, 0 for none
+    above  : dwell outside [s]
+    ahead  : how far above the depth already drilled rapid speed ends, at the first and at the last infeed
+    """
+
+    infeed: float
+    less: float
+    least: float
+    back: float
+    ahead: tuple[float, float]
+    breaks: int = 0
+    chip: float = 0.0
+    above: float = 0.0
+
+    def depths(self, depth: float) -> list[float]:
+        """Where the infeeds end, down to a depth. Raises ValueError for infeeds that never reach it."""
+        step = self.infeed if self.infeed > 0.0 else depth
+        least = self.least if self.less > 0.0 else step
+        if least <= 0.0:
+            raise ValueError("the least of decreasing infeeds is to be above 0")
+        equal_steps(depth, least)
+        found: list[float] = []
+        while not found or found[-1] < depth:
+            found.append(min((found[-1] if found else 0.0) + step, depth))
+            step = max(step - self.less, least)
+        return found
+
+
+def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
+    """By infeeds down to the bottom; the tool stays there. Raises ValueError."""
+    depths = pecks.depths(hole.top - hole.bottom)
+    yield go(hole.clear)
+    broken, done = 0, 0.0
+    for k, deep in enumerate(depths):
+        for part in range(1, equal_steps(deep - done, pecks.chip)):
+            yield go(hole.top - done - part * pecks.chip, hole.feed)
+            yield go(hole.top - done - part * pecks.chip + pecks.back)
+        yield go(hole.top - deep, hole.feed)
+        done = deep
+        if k == len(depths) - 1:
+            break
+        if broken < pecks.breaks:
+            broken += 1
+            yield go(hole.top - deep + pecks.back)
+            continue
+        broken = 0
+        yield go(hole.clear)
+        yield from dwell_rows(pecks.above)
+        gap = pecks.ahead[0] + (pecks.ahead[1] - pecks.ahead[0]) * k / max(len(depths) - 2, 1)
+        yield go(min(hole.top - deep + gap, hole.clear))
+    yield from dwell_rows(hole.dwell)
+
+
+def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
+    """A bore milled on a helix: infeed per turn, once round on the ground, back to the middle. Raises ValueError."""
+    radius = making.tool_radius()
+    size = diameter / 2.0 - radius
+    if size <= 0.0:
+        raise ValueError("the bore is to be wider than the tool")
+    if size > radius:
+        raise ValueError(
+            f"a helix of radius {size:.6g} leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
+        )
+    x, y, _ = making.here()
+    count = equal_steps(hole.top - hole.bottom, infeed)
+    yield go(hole.clear)
+    yield [("G", 1.0), ("F", hole.feed), ("X", x + size), ("Y", y)]
+    yield go(hole.top, hole.feed)
+    code = 3.0 if turning > 0 else 2.0
+    for k in range(1, count + 2):
+        z = hole.bottom if k >= count else hole.top + (hole.bottom - hole.top) * k / count
+        yield [("G", code), ("F", hole.feed), ("X", x + size), ("Y", y), ("Z", z), ("I", -size), ("J", 0.0)]
+    yield [("G", 1.0), ("X", x), ("Y", y)]

@@ -20,13 +20,12 @@ import numpy as np
 from planner.nc.arcs import IN_PLANE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import Approach
-from planner.nc.language.coordinates import Coordinates
-from planner.nc.language.corner_moves import CornerMove
-from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.travel_rows import (
     AXES,
     CENTRES,
     TURNS,
+    Coordinates,
     G,
     M,
     Move,

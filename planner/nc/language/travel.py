@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 from planner.base.arrays import FloatArray
 from planner.nc.language.approach import Approach, Departure
-from planner.nc.language.corner_moves import CornerMove
-from planner.nc.language.offset_moves import OffsetMoves
+from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.rows_through import RowsThrough
 
 

@@ -21,8 +21,7 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.machine import Machine, Times
-from planner.nc.events import EventTable
-from planner.nc.program import Program
+from planner.nc.program import EventTable, Program
 
 TOOL_CHANGE, SPINDLE_START, SPINDLE_STOP = 6, 3, 5  # M codes
 _TURNS = {3: 1, 4: -1, 5: 0, TOOL_CHANGE: 0}  # M codes, and how the spindle turns after them

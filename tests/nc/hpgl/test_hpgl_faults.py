@@ -9,9 +9,9 @@ import pytest
 from drawings import FINE, Move, assert_same_path, path_of
 
 from planner.base.errors import InputError
-from planner.nc.dialects import is_plotter_file
 from planner.nc.hpgl.instructions import FORMS, IGNORED, REFUSED
 from planner.nc.info import inspect_program
+from planner.nc.language.detect import is_plotter_file
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading

@@ -1,14 +1,39 @@
-"""Calls and returns of Fanuc's and Haas' macros: M97, M98, M99, G65 and G66 as statements.
-
-Loops of Fanuc's and Haas' macros: WHILE [c] DO 1 ... END 1.
-"""
+"""Fanuc's and Haas' macros: their expressions, loops (WHILE [c] DO 1 ... END 1), and calls and returns (M97, M98, M99, G65, G66)."""
 
 from __future__ import annotations
 
 from planner.nc.language import tree
-from planner.nc.language.fanuc.text import LOCALS
+from planner.nc.language.expression_reader import ranked
+from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.source import SourceLine
-from planner.nc.language.spelling import LineReader
+from planner.nc.language.spelling import LineReader, Spelling
+from planner.nc.language.system_variables import FanucVariables
+from planner.nc.language.tree import Language
+
+LOCALS = 33  # #1 to #33 are a call's own
+_FUNCTIONS = "ABS ACOS ADP ASIN ATAN BCD BIN COS EXP FIX FUP LN ROUND SIN SQR SQRT TAN"
+_RANKS = ranked("EQ NE GT GE LT LE", "+ - OR XOR", "* / MOD AND")
+SPELLING = Spelling(functions=frozenset(_FUNCTIONS.split()), ranks=_RANKS, long_values=True)
+LANGUAGE = Language(
+    operations=ARITHMETIC
+    | {
+        ("AND", 2): "float(int({0})&int({1}))",
+        ("OR", 2): "float(int({0})|int({1}))",
+        ("XOR", 2): "float(int({0})^int({1}))",
+        ("ATAN", 2): "(atan2({0},{1})%360.0)",
+        ("FIX", 1): "float(trunc({0}))",
+        ("FUP", 1): "copysign(ceil(abs({0})),{0})",
+        ("ROUND", 1): "copysign(floor(abs({0})+0.5),{0})",
+    },
+    conditions=COMPARISONS,
+    locals=LOCALS,
+    largest=9999,
+    vacant=None,
+    system_numbers=FanucVariables.numbers,
+    read="({0} or 0.0)",
+    raw=frozenset(("EQ", "NE")),
+)
+
 
 _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE

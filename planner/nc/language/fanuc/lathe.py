@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language.fanuc.calls import code_of
-from planner.nc.language.fanuc.lathe_singles import LatheSingles, absolute, shared
+from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, shared
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Call,
@@ -44,7 +44,7 @@ _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
 _AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
 
 
-class LatheParser(LatheSingles):
+class LatheParser(LatheWords):
     """Statements of a lathe's program."""
 
     def __init__(self, source: Source):

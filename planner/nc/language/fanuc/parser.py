@@ -18,8 +18,7 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.fanuc import calls
-from planner.nc.language.fanuc.calls import FanucControl
-from planner.nc.language.fanuc.text import SPELLING
+from planner.nc.language.fanuc.calls import SPELLING, FanucControl
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 

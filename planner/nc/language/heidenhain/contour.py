@@ -12,8 +12,15 @@ import re
 from dataclasses import replace
 
 from planner.nc.language.approach import KINDS
-from planner.nc.language.heidenhain.items import POSITION, Items, absolute, items, looked_up
-from planner.nc.language.heidenhain.text import ConversationalBlock, value
+from planner.nc.language.heidenhain.text import (
+    POSITION,
+    ConversationalBlock,
+    Items,
+    absolute,
+    items,
+    looked_up,
+    value,
+)
 from planner.nc.language.tree import ZERO, Expression, MadeRows, Number, Statement, assign, made
 
 _KIND = re.compile(r"\s*(P?)(LT|LN|CT|LCT)\b", re.IGNORECASE)

@@ -23,10 +23,21 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from planner.nc.language.holes import BREAK, HolePlan, Pecks, dwell_rows, go, milled, pecked, tapped
-from planner.nc.language.making import Maker, Making, Row, equal_steps
-from planner.nc.language.milling import PocketPlan, pocket_rows
-from planner.nc.pocket_shapes import ArcSlot, PocketShape, RoundedRectangle
+from planner.nc.language.making import (
+    BREAK,
+    HolePlan,
+    Maker,
+    Making,
+    Pecks,
+    Row,
+    dwell_rows,
+    equal_steps,
+    go,
+    milled,
+    pecked,
+    tapped,
+)
+from planner.nc.language.milling import ArcSlot, PocketPlan, PocketShape, RoundedRectangle, pocket_rows
 
 # Q parameters of all cycles (module text), and of all pockets.
 _HOLE = (200, 201, 203, 204, 211)

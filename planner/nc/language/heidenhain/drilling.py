@@ -18,9 +18,8 @@ Q200, Q203, Q204 replace those of the cycle; Q301 0: between the places at Q200,
 
 from __future__ import annotations
 
-from planner.nc.language.heidenhain.items import X, Y, Z, looked_up
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import ConversationalBlock, own
+from planner.nc.language.heidenhain.text import ConversationalBlock, X, Y, Z, looked_up, own
 from planner.nc.language.heidenhain.text import parameter as q
 from planner.nc.language.tree import (
     ONE,

@@ -20,18 +20,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from planner.nc.arcs import IN_PLANE
-from planner.nc.language.heidenhain.items import (
+from planner.nc.language.heidenhain.text import (
     DIRECTION,
     PLANE,
     POLAR,
     POLE,
     POSITION,
+    ConversationalBlock,
     Items,
     X,
     Y,
     absolute,
+    own,
 )
-from planner.nc.language.heidenhain.text import ConversationalBlock, own
 from planner.nc.language.tree import (
     ONE,
     TWO,

@@ -20,23 +20,26 @@ from collections.abc import Callable
 
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain.codes import REMEDY, Codes
 from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
+from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
-from planner.nc.language.heidenhain.items import (
+from planner.nc.language.heidenhain.text import (
     PLANE,
     POLAR,
     POLE,
+    ConversationalBlock,
     Items,
     X,
     Y,
     Z,
     absolute,
+    blocks,
     items,
     looked_up,
+    own,
     refuse_arc_axes,
+    value,
 )
-from planner.nc.language.heidenhain.text import ConversationalBlock, blocks, own, value
 from planner.nc.language.source import Source
 
 _FUNCTION = re.compile(
@@ -48,7 +51,7 @@ _FUNCTION = re.compile(
 _MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
 
 
-class HeidenhainParser(Codes):
+class HeidenhainParser(Definitions):
     """Statements of a conversational program. Faults of all its blocks are kept in `faults`."""
 
     def __init__(self, source: Source):

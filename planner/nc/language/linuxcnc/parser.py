@@ -17,25 +17,147 @@ from __future__ import annotations
 import re
 
 from planner.nc.language import tree
-from planner.nc.language.linuxcnc.control import KEYWORDS, LinuxcncControl, end_of
-from planner.nc.language.linuxcnc.text import ARGUMENTS_MAX, LANGUAGE, SPELLING
+from planner.nc.language.expression_reader import ranked
+from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import LineReader
+from planner.nc.language.spelling import LineReader, Spelling
+from planner.nc.language.system_variables import LinuxcncVariables
+from planner.nc.language.tree import Language
+
+ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
+EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
+_FUNCTIONS = "ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT TAN"
+_RANKS = ranked("AND OR XOR", "EQ NE GT GE LT LE", "+ -", "* / MOD", "**")
+SPELLING = Spelling(functions=frozenset(_FUNCTIONS.split()), ranks=_RANKS)
+LANGUAGE = Language(
+    operations=ARITHMETIC
+    | {("EQ", 2): f"(abs({{0}}-{{1}})<{EQUAL!r})", ("NE", 2): f"(abs({{0}}-{{1}})>={EQUAL!r})"},
+    conditions=COMPARISONS | LOGICAL,
+    locals=ARGUMENTS_MAX,
+    largest=5601,
+    vacant=0.0,
+    system_numbers=LinuxcncVariables.numbers,
+    system_names=LinuxcncVariables.names,
+)
+
+
+_NESTED_MAX = 100  # loops and branches in each other
+_ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
+KEYWORDS = frozenset(
+    ("sub", "call", "return", "if", "elseif", "else", "while", "do", "repeat", "break", "continue", *_ENDS)
+)
+
+
+def _needed(condition: tree.Expression | None, keyword: str, line: SourceLine) -> tree.Expression:
+    if condition is None:
+        raise line.fault(f"{keyword} needs an [expression] after it")
+    return condition
+
+
+def end_of(kind: str) -> str:
+    """The keyword that ends a control statement."""
+    return "while [condition]" if kind == "do" else f"end{kind}"
+
 
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _PROGRAM = ""
 
 
-class LinuxcncParser(LinuxcncControl):
-    """Statements of one file. Faults of all its lines are kept in `faults`."""
+class LinuxcncParser:
+    """Statements of one file; those that are open while it is read.
+
+    procedures : subprograms by their labels
+    main       : statements of the main program
+    base, body : statements outside of all that is open, and where the next one goes
+    open       : control statements whose end has not come, the outermost first
+    faults     : of all lines
+    """
 
     def __init__(self, source: Source):
-        super().__init__()
+        self.procedures: dict[str, tree.Procedure] = {}
+        self.main: list[tree.Statement] = []
+        self.open: list[tree.OpenStatement] = []
+        self.base = self.body = self.main
         self.source = source
         self.faults: list[tree.ProgramFault] = []
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
+
+    def _add(self, label: str, place: tree.SourcePlace, body: list[tree.Statement]) -> None:
+        if label in self.procedures:
+            first = self.procedures[label].place.line
+            raise tree.ProgramFault(place, f"a second subprogram o{label}; the first is on line {first}")
+        self.procedures[label] = tree.Procedure(label, place, body)
+
+    def _control(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
+        top = self.open[-1] if self.open else None
+        if keyword == "while" and top is not None and top.kind == "do" and top.label == label:
+            self._close(top)
+            self.body.append(tree.Loop(top.place, "do", label, _needed(condition, keyword, line), top.body))
+        elif keyword in ("sub", "if", "while", "do", "repeat"):
+            self._begin(keyword, label, condition, line)
+        elif keyword in ("elseif", "else"):
+            self._another_branch(keyword, label, condition, line)
+        elif keyword in _ENDS:
+            self._end(keyword, label, condition, line)
+        elif keyword == "return":
+            if not any(o.kind == "sub" for o in self.open):
+                raise line.fault("return stands in a subprogram only")
+            self.body.append(tree.Return(line.place, condition))
+        else:
+            if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
+                raise line.fault(f"there is no loop o{label} around this {keyword}")
+            self.body.append((tree.Break if keyword == "break" else tree.Continue)(line.place, label))
+
+    def _begin(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
+        if keyword == "sub" and self.open:
+            raise line.fault(f"a subprogram begins inside {self.open[-1].kind}; write its end before it")
+        if len(self.open) >= _NESTED_MAX:
+            raise line.fault(f"more than {_NESTED_MAX} loops and branches in each other")
+        if keyword not in ("sub", "do"):
+            _needed(condition, keyword, line)
+        opened = tree.OpenStatement(keyword, line.place, condition, label)
+        self.open.append(opened)
+        if keyword == "sub":
+            self._add(label, line.place, opened.body)
+        self.body = opened.body
+
+    def _another_branch(
+        self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine
+    ) -> None:
+        top = self._innermost("if", keyword, label, line)
+        if top.condition is None:
+            raise line.fault(f"{keyword} after else; else comes last")
+        top.another_branch(_needed(condition, keyword, line) if keyword == "elseif" else None)
+        self.body = top.body
+
+    def _end(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
+        kind = _ENDS[keyword]
+        top = self._innermost(kind, keyword, label, line)
+        self._close(top)
+        if kind == "sub":
+            if condition is not None:
+                top.body.append(tree.Return(line.place, condition))
+        elif kind == "if":
+            self.body.append(top.branched())
+        else:
+            assert top.condition is not None
+            self.body.append(tree.Loop(top.place, kind, label, top.condition, top.body))
+
+    def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> tree.OpenStatement:
+        if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
+            last = (
+                f"o{self.open[-1].label} {self.open[-1].kind} on line {self.open[-1].place.line} is open"
+                if self.open
+                else "nothing is open"
+            )
+            raise line.fault(f"o{label} {keyword} has no o{label} {kind} before it: {last}")
+        return self.open[-1]
+
+    def _close(self, top: tree.OpenStatement) -> None:
+        self.open.pop()
+        self.body = self.open[-1].body if self.open else self.base
 
     def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""

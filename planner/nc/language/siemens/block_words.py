@@ -13,8 +13,8 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.making import assumed_row
-from planner.nc.language.siemens import codes, cycles, drilling
-from planner.nc.language.siemens.calls import Calls
+from planner.nc.language.siemens import commands, cycles, drilling
+from planner.nc.language.siemens.commands import Commands
 from planner.nc.language.siemens.text import LineTokens, position
 from planner.nc.language.source import Source
 from planner.nc.language.tree import (
@@ -39,7 +39,7 @@ _ARCS = {"CIP": "arc through", "CT": "tangent arc"}
 _ANGLES = "choose a post-processor that writes the angles of the rotary axes (A=, B=, C=)"
 
 
-class BlockWords(Calls):
+class BlockWords(Commands):
     """Rows of words. source : the file; circular : CIP or CT was written, and no other motion code since."""
 
     source: Source
@@ -80,10 +80,10 @@ class BlockWords(Calls):
                 raise reader.fault("KONT, another approach to the contour, is not read; write NORM", token.at)
             elif name == "STOPRE":  # the block before it ends in an exact stop, until the control has read on
                 stops = True
-            elif name in codes.SAID:
-                before.append(assumed_row(reader.place, codes.SAID[name]))
+            elif name in commands.SAID:
+                before.append(assumed_row(reader.place, commands.SAID[name]))
                 _skip(reader)
-            elif name in codes.IDLE or (name in codes.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
+            elif name in commands.IDLE or (name in commands.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
                 _skip(reader)
             elif reader.peek() == "=" and (name in self.names or re.fullmatch(r"R\d+", name)):
                 reader.next += 1
@@ -116,7 +116,7 @@ class BlockWords(Calls):
                 raise reader.fault(
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
-        returns = (17.0, *(codes.RETURNS if self.source.file else ()))
+        returns = (17.0, *(commands.RETURNS if self.source.file else ()))
         ended = [
             one
             for one in words
@@ -171,7 +171,7 @@ class BlockWords(Calls):
         if letter in ("A", "B", "C") and name != letter and number is None:
             raise reader.fault(f"{name}=, a direction of the tool, is not read; {_ANGLES}", at - reader.start)
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
-            raise reader.fault(f"{name} is not read; {codes.REMEDY}", at - reader.start)
+            raise reader.fault(f"{name} is not read; {commands.REMEDY}", at - reader.start)
         given = Number(number) if number is not None else self._given(reader, letter, at)
         if letter == "D":
             self.body.append(assumed_row(reader.place, "tool offset"))
@@ -200,11 +200,11 @@ class BlockWords(Calls):
             return [word("G", at, float(code))]
         if code == 641:
             return [word("G", at, 64.0)]
-        if code in codes.CODES:
-            return [word("G", at, one) for one in codes.CODES[code]]
-        if code in (*codes.SAME_CODES, 4):
+        if code in commands.CODES:
+            return [word("G", at, one) for one in commands.CODES[code]]
+        if code in (*commands.SAME_CODES, 4):
             return [word("G", at, float(code))]
-        raise reader.fault(f"G{code} of Siemens is not read; {codes.REMEDY}", at - reader.start)
+        raise reader.fault(f"G{code} of Siemens is not read; {commands.REMEDY}", at - reader.start)
 
 
 def _skip(reader: LineTokens) -> None:

@@ -1,16 +1,94 @@
-"""Commands of a Sinumerik program: cycles, frames, declarations and messages."""
+"""Commands of a Sinumerik program: cycles, frames, declarations and messages; their tables; calls of subprograms.
+
+Subprograms are files of their own in the program's folder:
+
+    NAME            call NAME.SPF (or .MPF); NAME P3 three times; NAME(1, R2) with values
+    CALL "NAME"     the same, for names that begin with digits
+    L10             call L10.SPF
+    PROC NAME(REAL A, INT B)    the first line of a subprogram: its variables, which get the values of the call
+    M17, RET, M30   its end
+
+Variables of DEF are a call's own; R parameters are shared. Commands of the reader hand values over in shared names.
+"""
 
 from __future__ import annotations
 
 import re
 
-from planner.nc.language.frames import ADDED, SIEMENS
-from planner.nc.language.siemens import codes, cycles, drilling
-from planner.nc.language.siemens.control import SiemensControl
-from planner.nc.language.siemens.text import LineTokens, position, variable
-from planner.nc.language.tree import ZERO, Expression, Message, Number, Statement, assign, made, row
+from planner.nc.language.makers import ADDED, SIEMENS
+from planner.nc.language.siemens import cycles, drilling
+from planner.nc.language.siemens.text import LineTokens, SiemensControl, handed_over, position, variable
+from planner.nc.language.tree import (
+    ONE,
+    ZERO,
+    Call,
+    Expression,
+    Message,
+    Number,
+    Parameter,
+    Return,
+    Statement,
+    assign,
+    made,
+    row,
+)
+
+# Letters of words with the same meaning in RS274NGC.
+PLAIN_LETTERS = "NGXYZIJKFSM"
+# G codes with the same meaning.
+RETURNS = (2, 17, 30)  # M codes that end a subprogram
+SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 54, 55, 56, 57, 90, 91, 94)
+# G codes of Siemens that are others here; an empty tuple changes nothing.
+CODES: dict[int, tuple[float, ...]] = {
+    9: (),  # exact stop of one block; a full stop is added behind it
+    **dict.fromkeys((53, 153), (53.0,)),
+    60: (61.1,),
+    64: (64.0,),
+    **dict.fromkeys((642, 643, 644, 645), (64.0,)),
+    70: (20.0,),
+    71: (21.0,),
+    500: (59.3,),  # whose origin is set to 0 before it
+    700: (20.0,),
+    710: (21.0,),
+    **dict.fromkeys((450, 451, 601, 602, 603, 621, 95 * 100), ()),
+}
+# Commands that move nothing and change nothing of what is planned: feedforward, compressors (their tolerance is the program's), how
+# orientations change where that is as planned, the defaults of approaches, frames and collision checks.
+IDLE = frozenset((
+    "FNORM", "FFWON", "FFWOF", "SOFT", "COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF", "UPATH", "SPATH",
+    "FIFOCTRL", "ORIMKS", "ORIAXES", "ORIMACHAX", "TOFRAMEOF", "PAROTOF",
+    "TOWSTD", "CUT2D", "CUT2DF", "CDON", "CDOF", "CDOF2", "NORM", "KONT", "DIAMOF", "CFTCP", "RTLION",
+))  # fmt: skip
+# The same with arguments or a value behind them.
+IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "LIMS"))
+# Commands and words that are not followed and may change geometry or time: what is said of them (making.py).
+SAID = {
+    **dict.fromkeys(("BRISK", "DRIVE"), "acceleration"),
+    **dict.fromkeys(("CFC", "CFIN"), "tool centre feed"),
+    **dict.fromkeys(("ORIWKS", "ORIVECT", "ORIVIRT1"), "orientation"),
+    "RTLIOF": "rapid axes",
+    "SPOS": "spindle position",
+}
+# Commands that switch the tool centre point on and off, and the M codes of RS274NGC that stand for them.
+TOOL_POINT = {"TRAORI": 428.0, "TRAFOOF": 429.0}
+# Commands that tilt or bend the coordinates.
+REFUSED = (
+    "ROTS", "AROTS", "CROTS", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
+)  # fmt: skip
+REMEDY = "let the CAM system write the moves out"
+
 
 TYPES = frozenset(("REAL", "INT", "BOOL"))
+
+
+_CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
+# Commands and cycles of the control, which are no files.
+_OF_THE_CONTROL = re.compile(
+    r"CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|RND|RNDM|CHF|CHR|POLY|BSPLINE|ASPLINE|CSPLINE|SPLINEPATH|CIP|CT|INVCW|INVCCW|"
+    r"TANG\w*|TRA\w*|COUP\w*|G\d+|DISR|DISCL|ANG|AP|RP|OFFN|FB|FA|SETPIECE|EXTCALL|PCALL|MCALL|STOPRE|ORI\w*|A3|B3|C3|LEAD|TILT|STR\w*"
+)
+_TIMES = re.compile(r"P(\d+)")
+_NAMES_MAX = 32  # parameters of a subprogram
 
 
 class Commands(SiemensControl):
@@ -146,9 +224,7 @@ class Commands(SiemensControl):
             self.body.append(Message(reader.place, (match.group(1),)))
 
     def _refused(self, reader: LineTokens) -> None:
-        raise reader.fault(
-            f"{reader.peek(-1)} is not read; {codes.REMEDY}", reader.tokens[reader.next - 1].at
-        )
+        raise reader.fault(f"{reader.peek(-1)} is not read; {REMEDY}", reader.tokens[reader.next - 1].at)
 
     def _tool_point(self, reader: LineTokens) -> None:
         """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for another one, and for TRAORI on
@@ -158,7 +234,7 @@ class Commands(SiemensControl):
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
             raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
         if self.at_tip:
-            self.body.append(row(reader.place, ("M", codes.TOOL_POINT[name])))
+            self.body.append(row(reader.place, ("M", TOOL_POINT[name])))
         elif name == "TRAORI":
             raise reader.fault(
                 "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
@@ -191,3 +267,83 @@ class Commands(SiemensControl):
         if absolute == self.absolute:
             return value
         return value - position(letter) if absolute else position(letter) + value
+
+    def _is_call(self, reader: LineTokens) -> bool:
+        """True if the line is a call by a name."""
+        name = reader.peek()
+        if (
+            reader.tokens[reader.next].kind != "name"
+            or not _CALLED.fullmatch(name)
+            or name in self.names | IDLE | IDLE_CALLS | SAID.keys()
+        ):
+            return False
+        behind = reader.peek(1)
+        return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
+
+    def _call(self, reader: LineTokens) -> None:
+        """NAME, NAME P3, NAME(values)."""
+        name = reader.peek()
+        reader.next += 1
+        times: Expression = ONE
+        given = self._arguments(reader)
+        if match := _TIMES.fullmatch(reader.peek()):
+            reader.next += 1
+            times = Number(float(match.group(1)))
+        if not reader.ended:
+            raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
+        self._append_call(reader, name, given, times)
+
+    def _call_text(self, reader: LineTokens) -> None:
+        """CALL "NAME"."""
+        text = reader.peek().strip('"')
+        if reader.ended or reader.tokens[reader.next].kind != "text":
+            raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
+        reader.next += 1
+        name = re.sub(
+            r"(?i)(_SPF|\.SPF|_MPF|\.MPF)\Z",
+            "",
+            re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1]),
+        )
+        self._append_call(reader, name.upper(), [], ONE)
+
+    def _append_call(
+        self, reader: LineTokens, name: str, given: list[Expression | None], times: Expression
+    ) -> None:
+        if len(given) > _NAMES_MAX:
+            raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
+        handed: list[tuple[Parameter, Expression]] = [
+            (handed_over(k), given[k] if k < len(given) and given[k] is not None else ZERO)  # type: ignore[misc]
+            for k in range(_NAMES_MAX if given else 0)
+        ]
+        if handed:
+            self.body.append(assign(reader.place, *handed))
+        self.body.append(Call(reader.place, name.lower(), None, name, times))
+
+    def _procedure(self, reader: LineTokens) -> None:
+        """PROC NAME(REAL A, INT B)."""
+        if reader.ended or reader.tokens[reader.next].kind != "name":
+            raise reader.fault("PROC is followed by the subprogram's name")
+        reader.next += 1
+        taken: list[tuple[Parameter, Expression]] = []
+        if reader.take("("):
+            while not reader.take(")"):
+                kind, name = reader.peek(), reader.peek(1)
+                if kind not in TYPES or reader.ended:
+                    raise reader.fault(f"a value of PROC is one of {', '.join(sorted(TYPES))} and a name")
+                reader.next += 2
+                self.names.add(name)
+                taken.append((variable(name), handed_over(len(taken))))
+                if not reader.take(",") and reader.peek() != ")":
+                    raise reader.fault(") is missing")
+        reader.next = len(reader.tokens)  # SAVE, DISPLOF and others
+        if taken:
+            self.body.append(assign(reader.place, *taken))
+
+    def _return(self, reader: LineTokens) -> None:
+        """RET."""
+        self.body.append(Return(reader.place))
+
+
+def siemens_files(name: str) -> frozenset[str]:
+    """Names that the file of a subprogram may have, in small letters: NAME.SPF, NAME.MPF, and as controls save them, NAME_SPF."""
+    return frozenset(name + ending for ending in (".spf", ".mpf", "_spf", "_mpf", ""))

@@ -19,10 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from planner.nc.language.holes import HolePlan, coarse_lead, dwell_rows, go, tapped
-from planner.nc.language.making import Maker, Making, Row
-from planner.nc.language.milling import HELIX, RAPID, STRAIGHT, PocketPlan, pocket_rows
-from planner.nc.pocket_shapes import PocketShape, RoundedRectangle
+from planner.nc.language.making import HolePlan, Maker, Making, Row, coarse_lead, dwell_rows, go, tapped
+from planner.nc.language.milling import (
+    HELIX,
+    RAPID,
+    STRAIGHT,
+    PocketPlan,
+    PocketShape,
+    RoundedRectangle,
+    pocket_rows,
+)
 
 _DEPTH = ("RTP", "RFP", "SDIS", "DP", "DPR")
 _CUTTING = ("MID", "FAL", "FALD", "FFP1", "FFD", "CDIR", "VARI", "MIDA", "AP1")

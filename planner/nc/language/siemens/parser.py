@@ -5,7 +5,7 @@
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
                REPEATB label P=n
     commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 82 83 (`drilling`), CYCLE84 to 89, 840,
-               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`codes.IDLE`);
+               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`commands.IDLE`);
                TRAORI and TRAFOOF on a machine with kinematics
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
@@ -21,8 +21,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.nc.language.frames import SIEMENS
-from planner.nc.language.siemens import codes, drilling
+from planner.nc.language.makers import SIEMENS
+from planner.nc.language.siemens import commands, drilling
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
@@ -72,9 +72,9 @@ class SiemensParser(BlockWords):
         """Rows, ascending, that are not words of the same meaning in RS274NGC."""
         words = self.source.words
         letter, value = words.letter, words.value
-        same = np.isin(letter, [ord(c) for c in codes.PLAIN_LETTERS])
-        same &= (letter != ord("G")) | np.isin(value, codes.SAME_CODES)
-        same &= (letter != ord("M")) | ~np.isin(value, codes.RETURNS if self.source.file else (17,))
+        same = np.isin(letter, [ord(c) for c in commands.PLAIN_LETTERS])
+        same &= (letter != ord("G")) | np.isin(value, commands.SAME_CODES)
+        same &= (letter != ord("M")) | ~np.isin(value, commands.RETURNS if self.source.file else (17,))
         targets = [int(label) for label in _TARGETS.findall(words.data)]
         same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
@@ -182,9 +182,9 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], None]] = {
     **dict.fromkeys(drilling.PATTERNS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
     **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
-    **dict.fromkeys(codes.TOOL_POINT, SiemensParser._tool_point),
+    **dict.fromkeys(commands.TOOL_POINT, SiemensParser._tool_point),
     "PROC": SiemensParser._procedure,
     "CALL": SiemensParser._call_text,
     "RET": SiemensParser._return,
-    **dict.fromkeys(codes.REFUSED, SiemensParser._refused),
+    **dict.fromkeys(commands.REFUSED, SiemensParser._refused),
 }

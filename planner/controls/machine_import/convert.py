@@ -1,23 +1,25 @@
 """From a control's settings to the text of a machine file: every number with its place, and what is assumed said aloud.
 
-Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion without it would step in
-acceleration at every switch. It is assumed from the time in which a drive builds up its acceleration,
+Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion without
+it would step in acceleration at every switch. It is assumed from the time in which a drive builds up its acceleration,
 
     jerk = acceleration / ramp time
 
-`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the frame rings: a
-ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
+`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the
+frame rings: a ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
 
-Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in machines for such controls.
+Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in machines for
+such controls.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
@@ -27,21 +29,18 @@ from planner.controls.machine_import.settings import ControlSettings, Sourced
 from planner.machine import ALL_AXES, Machine, machine_from_dict
 
 RAMP_TIME = 0.04  # [s]
-TOLERANCE = {
-    "LinuxCNC": 0.02,
-    "grbl": 0.05,
-    "Klipper": 0.05,
-    "Marlin": 0.05,
-    "RepRapFirmware": 0.05,
-}  # [mm], as of the built-in mill and router
+# [mm], as of the built-in mill and router
+TOLERANCE = {"LinuxCNC": 0.02, "grbl": 0.05, "Klipper": 0.05, "Marlin": 0.05, "RepRapFirmware": 0.05}
+NEEDED = ("velocity", "acceleration")
+DERIVATIVES = (*NEEDED, "jerk")
 DT = 0.001  # [s], where the control does not say: setpoints of offline plans
 
 # In the order in which a text is tried: Klipper's and LinuxCNC's sections are told apart by their names.
-CONTROLS: dict[str, tuple[Callable[[str], bool], Callable[[str, str], ControlSettings]]] = {
-    "linuxcnc": (linuxcnc.recognised, linuxcnc.settings),
-    "klipper": (klipper.recognised, klipper.settings),
-    "marlin": (marlin.recognised, marlin.settings),
-    "grbl": (grbl.recognised, grbl.settings),
+CONTROLS: dict[str, ModuleType] = {
+    "linuxcnc": linuxcnc,
+    "klipper": klipper,
+    "marlin": marlin,
+    "grbl": grbl,
 }
 
 
@@ -97,9 +96,10 @@ def import_machine(
 def _settings_of(text: str, source: str, control: str | None) -> ControlSettings:
     if control is not None:
         known_name("control", control, CONTROLS)
-    for name, (recognised, settings) in CONTROLS.items():
-        if control == name or (control is None and recognised(text)):
-            return settings(text, source)
+    for name, reader in CONTROLS.items():
+        if control == name or (control is None and reader.recognised(text)):
+            found: ControlSettings = reader.settings(text, source)
+            return found
     raise InputError(
         "no settings found of LinuxCNC (an INI file), grbl (what $$ prints), Klipper (printer.cfg), Marlin (what M503 prints) "
         "or RepRapFirmware (config.g)",
@@ -122,35 +122,24 @@ def _axes(
     """Limits by axis and quantity, and what of them is assumed. Raises InputError for what is missing."""
     if not 0.0 < ramp_time < float("inf"):
         raise InputError(f"the ramp time must be above 0 s, found {ramp_time:g}")
-    letters = ALL_AXES
-    limits = {
-        "velocity": dict(found.velocity),
-        "acceleration": dict(found.acceleration),
-        "jerk": dict(found.jerk),
-    }
+    limits = {name: dict(getattr(found, name)) for name in DERIVATIVES}
     for name, value in given.items():
         letter, _, quantity = name.partition(".")
-        if letter not in letters or quantity not in limits:
+        if letter not in ALL_AXES or quantity not in limits:
             raise InputError(f"'{name}' is no limit of an axis; write e.g. x.acceleration=500")
         limits[quantity][letter] = Sourced(value, "given")
     axes: dict[str, dict[str, Sourced]] = {}
     missing, no_jerk = [], []
-    for letter in letters:
-        velocity, acceleration = limits["velocity"].get(letter), limits["acceleration"].get(letter)
-        if velocity is None and acceleration is None and letter not in "xy":
+    for letter in ALL_AXES:
+        own = {name: limits[name][letter] for name in DERIVATIVES if letter in limits[name]}
+        if not own.keys() & {*NEEDED} and letter not in "xy":
             continue
-        missing += [
-            f"{letter}.{quantity}"
-            for quantity in ("velocity", "acceleration")
-            if letter not in limits[quantity]
-        ]
-        if velocity is None or acceleration is None:
-            continue
-        jerk = limits["jerk"].get(letter)
-        if jerk is None:
-            no_jerk.append(letter)
-            jerk = Sourced(acceleration.value / ramp_time, "assumed")
-        axes[letter] = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+        missing += [f"{letter}.{name}" for name in NEEDED if name not in own]
+        if own.keys() >= {*NEEDED}:
+            if "jerk" not in own:
+                no_jerk.append(letter)
+                own["jerk"] = Sourced(own["acceleration"].value / ramp_time, "assumed")
+            axes[letter] = own
     if missing:
         raise InputError(
             f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s, e.g. --set {missing[0]}=500",

@@ -1,27 +1,27 @@
 """Settings in tables, `[NAME]`, then `key = value` or `key: value`: LinuxCNC's INI files and Klipper's printer.cfg.
 
-Both take a file that is included at the place where it is named. For the rest they differ in what counts, and each is read as its
-control reads it (LinuxCNC 2.9: src/libnml/inifile/inifile.cc and scripts/linuxcnc; Klipper: klippy/configfile.py):
+Both take a file that is included at the place where it is named. For the rest they differ in what counts, and each is
+read as its control reads it (LinuxCNC 2.9: src/libnml/inifile/inifile.cc and scripts/linuxcnc; Klipper:
+klippy/configfile.py):
 
-    LinuxCNC   the first table of a name and in it the first of equal keys; upper and lower case differ; a comment is a line of its own;
-               a backslash at its end goes on with the next line; a file that is not there is left out
-    Klipper    the last of equal keys, whichever table of that name it is in; `key = ` begins at a line's start, and an indented line
-               belongs to the value above it; "#" begins a comment anywhere, ";" after a blank; a file that is not there is an error.
-               What SAVE_CONFIG wrote ("#*#" at the end of the first file) counts where the rest says nothing
+    LinuxCNC   the first table of a name and in it the first of equal keys; upper and lower case differ; a comment is
+               a line of its own; a backslash at its end goes on with the next line; a missing file is left out
+    Klipper    the last of equal keys, whichever table of that name it is in; `key = ` begins at a line's start, and an
+               indented line belongs to the value above it; "#" begins a comment anywhere, ";" after a blank; a missing
+               file is an error. What SAVE_CONFIG wrote ("#*#" at the end of the first file) counts where the rest
+               says nothing
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from planner.base.errors import InputError
 from planner.base.files import require_ending
-from planner.controls.machine_import.numbers import finite_number, leading_number, positive
-from planner.controls.machine_import.settings import Sourced
+from planner.controls.machine_import.settings import Setting, Settings
 
 INCLUDES_MAX = 100  # files that one file may include, with those that they include
 
@@ -29,22 +29,12 @@ _LINUXCNC_INCLUDE = re.compile(r"^\s*#INCLUDE(?:\s+(.*?))?\s*$")
 _KLIPPER_INCLUDE = re.compile(r"^\[include (.+)\]")
 _TABLE = re.compile(r"^\[(.+)\]")
 _SETTING = re.compile(r"^([^=:]+?)\s*[=:]\s*(.*)$")
-_READ = re.compile(
-    r"(?:TRAJ|KINS|HAL|EMCMOT|DISPLAY|RS274NGC|AXIS_\w|JOINT_\d+)$"
-)  # tables of LinuxCNC that are read
+# Tables of LinuxCNC that are read.
+_READ = re.compile(r"(?:TRAJ|KINS|HAL|EMCMOT|DISPLAY|RS274NGC|AXIS_\w|JOINT_\d+)$")
 _SAVED = re.compile(
     r"\n#\*# <-+ SAVE_CONFIG -+>\n#\*# DO NOT EDIT THIS BLOCK OR BELOW\. The contents are auto-generated\.\n#\*#\n"
 )
 _SAVED_LINE = "#*#"
-
-
-@dataclass(frozen=True)
-class IniSetting:
-    """The text of one setting and its place."""
-
-    text: str
-    source: str
-    line: int
 
 
 class _Line(NamedTuple):
@@ -56,68 +46,9 @@ class _Line(NamedTuple):
     after_include: bool = False
 
 
-class IniFile:
-    """Settings by table and key.
-
-    begins : whether a number is what a text begins with ("3 mm", as C's scanf reads it), not all of it
-    names  : of the tables
-    notes  : what was left out, one sentence each
-    """
-
-    def __init__(self, *, begins: bool = False) -> None:
-        self._begins = begins
-        self._settings: dict[tuple[str, str], list[IniSetting]] = {}
-        self.names: list[str] = []
-        self.notes: list[str] = []
-
-    def add(self, table: str, key: str, setting: IniSetting) -> None:
-        """Take in a setting behind those of the same key that are there."""
-        self._settings.setdefault((table, key), []).append(setting)
-
-    def counts_last(self) -> None:
-        """Keep only the last of equal keys."""
-        self._settings = {key: found[-1:] for key, found in self._settings.items()}
-
-    def take_missing(self, other: IniFile) -> None:
-        """Take in what another one has and this one has not."""
-        for key, found in other._settings.items():
-            self._settings.setdefault(key, found)
-        self.names += [name for name in other.names if name not in self.names]
-
-    def text(self, table: str, key: str) -> str | None:
-        """The text of a setting, the first of equal keys; None where it is not set."""
-        found = self._settings.get((table, key))
-        return found[0].text if found else None
-
-    def texts(self, table: str, key: str) -> list[str]:
-        """The texts of all equal keys."""
-        return [found.text for found in self._settings.get((table, key), [])]
-
-    def number(self, table: str, key: str) -> Sourced | None:
-        """A setting's number; None where it is not set. Raises InputError if it is none."""
-        return self._read(finite_number, table, key)
-
-    def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
-        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above 0."""
-        found = self._read(positive, table, key)
-        return found and Sourced(found.value * scale, found.place)
-
-    def _read(
-        self, reads: Callable[[str, str, str, int | None], float], table: str, key: str
-    ) -> Sourced | None:
-        found = self._settings.get((table, key))
-        if found is None or not found[0].text:
-            return None
-        place, text = f"[{table}] {key}", found[0].text
-        begun = leading_number(text) if self._begins else None
-        return Sourced(
-            reads(text if begun is None else repr(begun), place, found[0].source, found[0].line), place
-        )
-
-
-def read_linuxcnc_ini(text: str, source: str) -> IniFile:
+def read_linuxcnc_ini(text: str, source: str) -> Settings:
     """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each other."""
-    ini = IniFile(begins=True)
+    ini = Settings(begins=True)
     table: str | None = None
     pending = ""
     for line in _expanded(text, source, _LINUXCNC_INCLUDE, ini.notes):
@@ -135,11 +66,11 @@ def read_linuxcnc_ini(text: str, source: str) -> IniFile:
             ini.names.append(name)
         elif table is not None and found[:1] not in ("", "#", ";", "[") and "=" in found:
             key, _, value = found.partition("=")
-            ini.add(table, key.strip(), IniSetting(value.strip(), line.source, line.number))
+            ini.add(table, key.strip(), Setting(value.strip(), line.source, line.number))
     return ini
 
 
-def read_klipper_config(text: str, source: str) -> IniFile:
+def read_klipper_config(text: str, source: str) -> Settings:
     """The settings of a printer.cfg, as Klipper reads it.
 
     Raises InputError for a setting outside of a table, for files that include each other and for those that are not there.
@@ -160,9 +91,9 @@ def read_klipper_config(text: str, source: str) -> IniFile:
     return config
 
 
-def _klipper_tables(text: str, source: str) -> IniFile:
+def _klipper_tables(text: str, source: str) -> Settings:
     """The settings of a text, the last of equal ones."""
-    config = IniFile()
+    config = Settings()
     table = key = ""
     indent = 0
     for line in _expanded(text, source, _KLIPPER_INCLUDE, None):
@@ -185,7 +116,7 @@ def _klipper_tables(text: str, source: str) -> IniFile:
             )
         elif setting:
             key, indent = setting.group(1).lower(), depth
-            config.add(table, key, IniSetting(setting.group(2), line.source, line.number))
+            config.add(table, key, Setting(setting.group(2), line.source, line.number))
     config.counts_last()
     return config
 
@@ -235,13 +166,11 @@ def _expanded(
 def _files(name: str, source: str) -> list[Path]:
     """The files that a line includes, looked for beside the file that names them."""
     folder, path = Path(source).parent, Path(name.strip()).expanduser()
-    if any(c in name for c in "*?["):
-        return (
-            sorted(folder.glob(name.strip()))
-            if not path.is_absolute()
-            else sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-        )
-    return [folder / path]
+    if not any(c in name for c in "*?["):
+        return [folder / path]
+    if path.is_absolute():
+        folder, path = Path(path.anchor), path.relative_to(path.anchor)
+    return sorted(folder.glob(str(path)))
 
 
 def read_settings(path: Path, said: str = "") -> str:

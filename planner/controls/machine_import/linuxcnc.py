@@ -1,28 +1,42 @@
 """LinuxCNC's INI file: limits of axes and joints, units, servo period, kinematics, start-up codes.
 
-Read are [TRAJ] LINEAR_UNITS, ANGULAR_UNITS, COORDINATES, MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION and MAX_LINEAR_JERK, [AXIS_x]
-and [JOINT_n] MAX_VELOCITY, MAX_ACCELERATION and MAX_JERK, [AXIS_x] WRAPPED_ROTARY and OFFSET_AV_RATIO, [KINS] KINEMATICS, [EMCMOT]
-SERVO_PERIOD and [RS274NGC] RS274NGC_STARTUP_CODE. The axes are those of COORDINATES. An axis gets the smallest of the limits of its
-own section, of those along the path and of the joints that move it alone. A limit that is said nowhere is LinuxCNC's default, one
-unit a second (src/emc/nml_intf/emccfg.h). Files of LinuxCNC 2.7 and older have [AXIS_0] for x, [AXIS_1] for y and so on, and
-[TRAJ] MAX_VELOCITY and MAX_ACCELERATION (docs/src/config/ini-config of 2.7).
+Read are [TRAJ] LINEAR_UNITS, ANGULAR_UNITS, COORDINATES, MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION and
+MAX_LINEAR_JERK, [AXIS_x] and [JOINT_n] MAX_VELOCITY, MAX_ACCELERATION and MAX_JERK, [AXIS_x] WRAPPED_ROTARY and
+OFFSET_AV_RATIO, [KINS] KINEMATICS, [EMCMOT] SERVO_PERIOD and [RS274NGC] RS274NGC_STARTUP_CODE. The axes are those of
+COORDINATES. An axis gets the smallest of the limits of its own section, of those along the path and of the joints that
+move it alone. A limit that is said nowhere is LinuxCNC's default, one unit a second (src/emc/nml_intf/emccfg.h). Files
+of LinuxCNC 2.7 and older have [AXIS_0] for x, [AXIS_1] for y and so on, and [TRAJ] MAX_VELOCITY and MAX_ACCELERATION
+(docs/src/config/ini-config of 2.7).
 
-Which joint moves which axis is what the kinematics say: one after the other the letters of `coordinates=`, or of the module's own
-list, `_JOINTS`, whatever COORDINATES says: joint 2 of a lathe with plain trivkins is z.
+Which joint moves which axis is what the kinematics say: one after the other the letters of `coordinates=`, or of the
+module's own list, `_JOINTS`, whatever COORDINATES says: joint 2 of a lathe with plain trivkins is z.
+
+The table [kinematics] is what the commands of HAL set the pins of the kinematics to. Commands are those of [HAL]
+HALCMD and of the files that [HAL] HALFILE and POSTGUI_HALFILE name, where they are beside the INI file: `setp PIN
+VALUE`, and `sets SIGNAL VALUE` for pins that `net` joins to the signal; a value may be `[TABLE]KEY`. Pins that nothing
+sets are 0, as in LinuxCNC (src/emc/kinematics/trtfuncs.c).
 """
 
 from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH, RAD_PER_DEG
-from planner.controls.machine_import.hal import kinematics_of
-from planner.controls.machine_import.ini_file import IniFile, read_linuxcnc_ini
-from planner.controls.machine_import.numbers import leading_number
-from planner.controls.machine_import.settings import ControlSettings, Sourced, least, travel_note
+from planner.controls.machine_import.ini_file import read_linuxcnc_ini, read_settings
+from planner.controls.machine_import.settings import (
+    ControlSettings,
+    Setting,
+    Settings,
+    Sourced,
+    leading_number,
+    least,
+    travel_note,
+)
 from planner.machine import ROTARY_AXES
+from planner.machine.kinematics_data import XYZAC, XYZBC
 from planner.machine.parts import AXIS_LIMIT_MAX
 
 _LETTERS = "xyzabcuvw"  # in the order of LinuxCNC's axes
@@ -42,24 +56,43 @@ _NANOSECOND = 1e-9  # [s]: periods of HAL's threads are in them
 _SAME = 1e-3  # of two units: numbers such as 0.03937 are inches
 _TABLES = r"EMC|EMCMOT|TRAJ|KINS|DISPLAY|JOINT_\d+|AXIS_\w"
 # Start-up codes that are those of every program's start or have a key of the machine file.
-_USUAL = {
-    "G17",
-    "G21",
-    "G20",
-    "G40",
-    "G49",
-    "G54",
-    "G61",
-    "G61.1",
-    "G64",
-    "G80",
-    "G90",
-    "G91.1",
-    "G92.1",
-    "G94",
-    "G97",
-    "G98",
-    "G99",
+_USUAL = frozenset(
+    [
+        "G17",
+        "G21",
+        "G20",
+        "G40",
+        "G49",
+        "G54",
+        "G61",
+        "G61.1",
+        "G64",
+        "G80",
+        "G90",
+        "G91.1",
+        "G92.1",
+        "G94",
+        "G97",
+        "G98",
+        "G99",
+    ]
+)
+_PATH_CONTROL = {"G64": "blend", "G61": "exact_path", "G61.1": "exact_stop"}
+# Files that a machine file does not have: what they hold, and the table that takes it.
+_FILES = (
+    (
+        "RS274NGC",
+        "PARAMETER_FILE",
+        "work offsets and the places of G28 and G30",
+        "[work_offsets] and [positions] take",
+    ),
+    ("EMCIO", "TOOL_TABLE", "lengths and diameters of tools", "[tools] takes"),
+)
+_STARTUP = "RS274NGC", "RS274NGC_STARTUP_CODE"
+_TYPES = {f"{XYZAC}-kins": XYZAC, f"{XYZBC}-kins": XYZBC}  # module of LinuxCNC: type of a machine file
+_DISTANCES = {
+    XYZAC: ("x-rot-point", "y-rot-point", "z-rot-point", "y-offset", "z-offset"),
+    XYZBC: ("x-rot-point", "y-rot-point", "z-rot-point", "x-offset", "z-offset"),
 }
 
 
@@ -77,7 +110,7 @@ def settings(text: str, source: str) -> ControlSettings:
 class _Found:
     """An INI file with what its limits are measured in, and which joints move what."""
 
-    def __init__(self, ini: IniFile, source: str):
+    def __init__(self, ini: Settings, source: str):
         self.ini, self.source, self.notes = ini, source, list(ini.notes)
         self.unit = _unit(ini, "LINEAR_UNITS", _MM, source)
         turn = _unit(ini, "ANGULAR_UNITS", _DEGREES, source, otherwise=1.0)
@@ -85,64 +118,57 @@ class _Found:
         found = ini.text("TRAJ", "COORDINATES") or "xyz"
         self.letters = [letter for letter in _LETTERS if letter in found.lower()]
         self.scale = {letter: turn if letter in ROTARY_AXES else self.unit for letter in _LETTERS}
-        words = (ini.text("KINS", "KINEMATICS") or "trivkins").split()
-        self.module = words[0].lower()
-        given = re.search(r"coordinates\s*=\s*([a-z]+)", " ".join(words[1:]), re.IGNORECASE)
-        self.joints = given.group(1).lower() if given else _JOINTS.get(self.module, "")
-        self.alone = self.module in _JOINTS and not self.old
+        self.table = {
+            letter: f"AXIS_{k}" if self.old else f"AXIS_{letter.upper()}" for k, letter in enumerate(_LETTERS)
+        }
+        self.module, *words = (ini.text("KINS", "KINEMATICS") or "trivkins").split()
+        self.module = self.module.lower()
+        given = re.search(r"coordinates\s*=\s*([a-z]+)", " ".join(words), re.IGNORECASE)
+        joints = given.group(1).lower() if given else _JOINTS.get(self.module, "")
+        self.joints = joints if self.module in _JOINTS and not self.old else ""  # that move an axis alone
 
     def settings(self) -> ControlSettings:
         """Everything that a machine file takes, and notes on what it does not."""
         ini, unit = self.ini, self.unit
-        kinematics, said = kinematics_of(ini, self.module, self.source, unit)
-        path = "MAX_VELOCITY" if self.old else "MAX_LINEAR_VELOCITY"
-        acceleration = "MAX_ACCELERATION" if self.old else "MAX_LINEAR_ACCELERATION"
+        kinematics = self._kinematics()
+        linear = "" if self.old else "LINEAR_"
         tolerance, path_control, inch = self._startup()
-        found = ControlSettings(
+        wrapped = {letter: ini.number(self.table[letter], "WRAPPED_ROTARY") for letter in self.letters}
+        return ControlSettings(
             control="LinuxCNC",
             velocity=self._limits("MAX_VELOCITY", None, _DEFAULT),
-            acceleration=self._limits("MAX_ACCELERATION", acceleration, _DEFAULT),
+            acceleration=self._limits("MAX_ACCELERATION", f"MAX_{linear}ACCELERATION", _DEFAULT),
             jerk=self._limits("MAX_JERK", "MAX_LINEAR_JERK", None),
-            wrapped="".join(letter for letter in self.letters if self._is_wrapped(letter)),
-            feed_max=_possible(ini.positive("TRAJ", path, unit)),
+            wrapped="".join(c for c, found in wrapped.items() if c in ROTARY_AXES and found and found.value),
+            feed_max=_possible(ini.positive("TRAJ", f"MAX_{linear}VELOCITY", unit)),
             dt=ini.positive("EMCMOT", "SERVO_PERIOD", _NANOSECOND),
             tolerance=tolerance,
             path_control=path_control,
             inch=inch,
             lathe="y" not in self.letters,
             kinematics=kinematics,
-            notes=(*self.notes, *said, *self._left_out()),
+            notes=(*self.notes, *self._left_out()),
         )
-        return found
-
-    def _tables(self, letter: str) -> str:
-        """The table of an axis."""
-        return f"AXIS_{_LETTERS.index(letter)}" if self.old else f"AXIS_{letter.upper()}"
-
-    def _moved_by(self, letter: str) -> list[str]:
-        """The tables of the joints that move an axis alone."""
-        return [f"JOINT_{n}" for n, moved in enumerate(self.joints) if moved == letter and self.alone]
 
     def _limits(self, key: str, along: str | None, default: float | None) -> dict[str, Sourced]:
         """The smallest limit of each axis: its own, those of its joints, and that along the path."""
         limits, by_default = {}, []
         for letter in self.letters:
-            scale, table = self.scale[letter], self._tables(letter)
+            scale, table = self.scale[letter], self.table[letter]
             own = self.ini.positive(table, key, scale)
             if own is None and default is not None:
                 by_default.append(letter)
                 own = Sourced(default * scale, f"[{table}] {key}, not set: LinuxCNC's default")
-            ratio = self.ini.number(
-                table, "OFFSET_AV_RATIO"
-            )  # the share that an offset from outside has for itself
+            # the share that an offset from outside has for itself
+            ratio = self.ini.number(table, "OFFSET_AV_RATIO")
             if own is not None and default is not None and ratio is not None:
                 own = Sourced(own.value * (1.0 - ratio.value), f"{own.place}, less OFFSET_AV_RATIO")
-            path = (
-                self.ini.positive("TRAJ", along, self.unit) if along and letter not in ROTARY_AXES else None
-            )
-            joints = [self.ini.positive(joint, key, scale) for joint in self._moved_by(letter)]
-            found = least(*map(_possible, (own, *joints, path)))
-            if found:
+            linear = along is not None and letter not in ROTARY_AXES
+            path = self.ini.positive("TRAJ", along or "", self.unit) if linear else None
+            joints = [
+                self.ini.positive(f"JOINT_{n}", key, scale) for n, c in enumerate(self.joints) if c == letter
+            ]
+            if found := least(*map(_possible, (own, *joints, path))):
                 limits[letter] = found
         if by_default:
             self.notes.append(
@@ -151,55 +177,92 @@ class _Found:
             )
         return limits
 
-    def _is_wrapped(self, letter: str) -> bool:
-        found = self.ini.number(self._tables(letter), "WRAPPED_ROTARY")
-        return letter in ROTARY_AXES and found is not None and found.value != 0
-
     def _startup(self) -> tuple[Sourced | None, str | None, bool]:
         """Tolerance, path control and whether programs begin in inches; notes on the other start-up codes."""
-        code = re.sub(r"\([^)]*\)|;.*", "", self.ini.text("RS274NGC", "RS274NGC_STARTUP_CODE") or "").upper()
+        code = re.sub(r"\([^)]*\)|;.*", "", self.ini.text(*_STARTUP) or "").upper()
         codes = [f"{letter}{float(n):g}" for letter, n in re.findall(r"([GM])\s*(\d+(?:\.\d+)?)", code)]
         inch = "G20" in codes if {"G20", "G21"} & {*codes} else abs(self.unit / MM_PER_INCH - 1.0) < _SAME
-        other = [one for one in codes if one not in _USUAL]
-        place = "[RS274NGC] RS274NGC_STARTUP_CODE"
-        if other:
+        place = "[{}] {}".format(*_STARTUP)
+        if other := [one for one in codes if one not in _USUAL]:
             self.notes.append(f"{place}: {' '.join(other)} is left out; programs have to say it")
-        modes = [one for one in codes if one in ("G61", "G61.1", "G64")]
-        path_control = (
-            {"G64": "blend", "G61": "exact_path", "G61.1": "exact_stop"}[modes[-1]] if modes else None
-        )
+        modes = [_PATH_CONTROL[one] for one in codes if one in _PATH_CONTROL]
         given = re.search(r"G\s*64\s*P\s*(\d*\.?\d+)", code)
-        scale = MM_PER_INCH if inch else 1.0
-        tolerance = Sourced(float(given.group(1)) * scale, f"{place}, G64 P") if given else None
-        return tolerance if tolerance and tolerance.value > 0 else None, path_control, inch
+        tolerance = float(given.group(1)) * (MM_PER_INCH if inch else 1.0) if given else 0.0
+        said = Sourced(tolerance, f"{place}, G64 P") if tolerance > 0 else None
+        return said, modes[-1] if modes else None, inch
+
+    def _kinematics(self) -> dict[str, Sourced | str]:
+        """The table [kinematics], empty for other modules than tilting rotary tables; notes on what it does not say.
+
+        Raises InputError for a distance that is no number.
+        """
+        module = self.module
+        if module == "trivkins":
+            return {}
+        if module not in _TYPES:
+            said = f"[KINS] KINEMATICS is {module}: limits are those of the axes, joints move otherwise"
+            self.notes.append(said)
+            return {}
+        kind, pins = _TYPES[module], self._pins()
+        found: dict[str, Sourced | str] = {"type": kind}
+        for name in _DISTANCES[kind]:
+            place = f"{module}.{name}"
+            pin = pins.number("", place, self.unit) or Sourced(0.0, place)
+            found[name.replace("-", "_")] = pin
+        turned = f"{module}.conventional-directions"
+        if (pins.text("", turned) or "0").lower() not in ("0", "false"):
+            self.notes.append(f"{turned} is set: write the axes that turn left-handed here under `reversed`")
+        if "identityfirst" not in (self.ini.text("KINS", "KINEMATICS") or ""):
+            self.notes.append(
+                f"{module} begins with the tool centre point on; here a program switches it on by M428 or G43.4"
+            )
+        return found
+
+    def _pins(self) -> Settings:
+        """What pins are set to, by name."""
+        ini = self.ini
+        lines = ini.texts("HAL", "HALCMD")
+        for name in ini.texts("HAL", "HALFILE") + ini.texts("HAL", "POSTGUI_HALFILE"):
+            try:
+                lines += read_settings(Path(self.source).parent / name.split()[0]).splitlines()
+            except InputError:
+                continue  # of LinuxCNC's library, or not here
+        said: dict[str, dict[str, str]] = {"setp": {}, "sets": {}}
+        joined: dict[str, str] = {}
+        for line in lines:
+            words = [word for word in line.partition("#")[0].split() if word not in ("=>", "<=", "<=>")]
+            if len(words) >= 3 and words[0] in said:
+                named = re.fullmatch(r"\[(\w+)\]\(?(\w+)\)?", words[2])
+                value = (ini.text(*named.groups()) or "0") if named else words[2]
+                said[words[0]][words[1]] = value
+            elif len(words) >= 3 and words[0] == "net":
+                joined |= dict.fromkeys(words[2:], words[1])
+        signals = said["sets"]
+        pins = Settings("{key}")
+        of_signals = {pin: signals[signal] for pin, signal in joined.items() if signal in signals}
+        for pin, value in (said["setp"] | of_signals).items():
+            pins.add("", pin, Setting(value, self.source))
+        return pins
 
     def _left_out(self) -> list[str]:
         """Sentences on what a machine file does not have, and a program may ask for."""
         ini = self.ini
         travel = {}
         for letter in self.letters:
-            ends = tuple(ini.number(self._tables(letter), key) for key in ("MIN_LIMIT", "MAX_LIMIT"))
-            low, high = (
-                end.value * self.scale[letter] if end and abs(end.value) < AXIS_LIMIT_MAX else None
-                for end in ends
-            )
+            ends = [
+                ini.number(self.table[letter], key, self.scale[letter]) for key in ("MIN_LIMIT", "MAX_LIMIT")
+            ]
+            far = AXIS_LIMIT_MAX * self.scale[letter]
+            low, high = (end.value if end and abs(end.value) < far else None for end in ends)
             travel[letter] = (low, high)
         said = [travel_note(travel)]
         for letter in self.letters:
-            if (found := ini.number(self._tables(letter), "LOCKING_INDEXER_JOINT")) and found.value >= 0:
+            if (found := ini.number(self.table[letter], "LOCKING_INDEXER_JOINT")) and found.value >= 0:
                 said.append(
                     f"{letter} is a locking indexer in LinuxCNC, which moves by G0 alone: here it is an axis like others"
                 )
-        for table, key, what in (
-            (
-                "RS274NGC",
-                "PARAMETER_FILE",
-                "work offsets and the places of G28 and G30|[work_offsets] and [positions] take",
-            ),
-            ("EMCIO", "TOOL_TABLE", "lengths and diameters of tools|[tools] takes"),
-        ):
+        for table, key, things, takes in _FILES:
             if name := ini.text(table, key):
-                things, takes = what.split("|")
                 said.append(f"{things} are in {name} and are left out: {takes} them")
         codes = [remap.split()[0].upper() for remap in ini.texts("RS274NGC", "REMAP") if remap.split()]
         codes = [code for code in codes if self.module not in _JOINTS or code not in ("M428", "M429")]
@@ -214,7 +277,7 @@ def _possible(found: Sourced | None) -> Sourced | None:
 
 
 def _unit(
-    ini: IniFile, key: str, named: dict[str, float], source: str, otherwise: float | None = None
+    ini: Settings, key: str, named: dict[str, float], source: str, otherwise: float | None = None
 ) -> float:
     """mm or degrees per unit of the file: a name, or a number of units per mm or degree."""
     text = ini.text("TRAJ", key)

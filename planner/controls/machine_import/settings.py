@@ -1,10 +1,16 @@
-"""What the settings of a control say about a machine, each number with its place; and what they leave open."""
+"""Settings of a control as they stand in its text, and what they say about a machine; each number with its place."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
+
+from planner.base.errors import InputError
+
+_BEGINS = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 class Sourced(NamedTuple):
@@ -12,6 +18,10 @@ class Sourced(NamedTuple):
 
     value: float
     place: str
+
+    def times(self, factor: float) -> Sourced:
+        """The same in another unit."""
+        return Sourced(self.value * factor, self.place)
 
 
 class FoundMode(NamedTuple):
@@ -24,21 +34,16 @@ class FoundMode(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
-    """The settings of one control, in mm (degrees for rotary axes) and s.
+    """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are mappings.
 
-    control      : its name
-    velocity     : largest velocity by axis letter [mm/s]
-    acceleration : largest acceleration by axis letter [mm/s2]
-    jerk         : largest jerk by axis letter [mm/s3], where the control knows one
     wrapped      : letters of rotary axes whose places are within a turn
-    feed_max     : largest feed along the path [mm/s], where the control has one
-    dt           : interpolation period [s], where it is said
-    tolerance    : of G64 P [mm], where a start-up code has one
-    path_control : "blend", "exact_path" or "exact_stop", where a start-up code has one
+    feed_max     : largest feed along the path [mm/s]
+    dt           : interpolation period [s]
+    tolerance    : of G64 P [mm], path_control: "blend", "exact_path" or "exact_stop", of a start-up code
     inch         : whether programs without G20 and G21 are in inches
     lathe        : whether it is a lathe whose programs have radii until G7
     law          : keys of the table [control] of a machine file, and what the control has for them
-    corner_jump  : jump of velocity that a corner may have, by axis letter [mm/s], where the control has one
+    corner_jump  : jump of velocity that a corner may have [mm/s]
     kinematics   : keys of the table [kinematics] of a machine file; "type" is a text
     modes        : vibration modes that the control suppresses
     notes        : what of the settings has no counterpart in a machine file, one sentence each
@@ -62,18 +67,105 @@ class ControlSettings:
     notes: tuple[str, ...] = ()
 
 
+class Setting(NamedTuple):
+    """The text of one setting and where it stands."""
+
+    text: str
+    source: str
+    line: int | None = None
+
+
+class Settings:
+    """Settings by table and key.
+
+    place  : how a message names one, such as "[{table}] {key}"
+    begins : whether a number is what a text begins with ("3 mm", as C's scanf reads it), not all of it
+    names  : of the tables
+    notes  : what was left out, one sentence each
+    """
+
+    def __init__(self, place: str = "[{table}] {key}", *, begins: bool = False) -> None:
+        self._place, self._begins = place, begins
+        self._found: dict[tuple[str, str], list[Setting]] = {}
+        self.names: list[str] = []
+        self.notes: list[str] = []
+
+    def add(self, table: str, key: str, setting: Setting) -> None:
+        """Take in a setting behind those of the same key that are there."""
+        self._found.setdefault((table, key), []).append(setting)
+
+    def counts_last(self) -> None:
+        """Keep only the last of equal keys."""
+        self._found = {key: found[-1:] for key, found in self._found.items()}
+
+    def take_missing(self, other: Settings) -> None:
+        """Take in what another one has and this one has not."""
+        self._found = {**other._found, **self._found}
+        self.names += [name for name in other.names if name not in self.names]
+
+    def texts(self, table: str, key: str) -> list[str]:
+        """The texts of all equal keys."""
+        return [found.text for found in self._found.get((table, key), [])]
+
+    def text(self, table: str, key: str) -> str | None:
+        """The text of a setting, the first of equal keys; None where it is not set."""
+        return next(iter(self.texts(table, key)), None)
+
+    def has(self, table: str) -> bool:
+        """Whether a table has settings."""
+        return any(name == table for name, _ in self._found)
+
+    def number(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
+        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none."""
+        found = self._found.get((table, key))
+        if found is None or not found[0].text:
+            return None
+        text, source, line = found[0]
+        place = self._place.format(table=table, key=key)
+        begun = leading_number(text) if self._begins else None
+        try:
+            value = float(text.strip()) if begun is None else begun
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(
+                f"{place}: a number is needed, found {text.strip()[:40]!r}", source=source, line=line
+            )
+        return Sourced(value * scale, place)
+
+    def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
+        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above 0."""
+        found = self.number(table, key, scale)
+        if found is not None and found.value <= 0:
+            text, source, line = self._found[table, key][0]
+            said = f"{found.place}: must be above 0, found {text.strip()}"
+            raise InputError(said, source=source, line=line)
+        return found
+
+    def limits(
+        self, letters: str, key: str, scale: float = 1.0, *, table: str = ""
+    ) -> Iterator[tuple[str, Sourced]]:
+        """The axes that have a number above 0 under a key, and it; "{letter}" and "{axis}", the number of the axis
+        in `letters`, are filled in."""
+        for k, letter in enumerate(letters):
+            if found := self.positive(table, key.format(letter=letter.upper(), axis=k), scale):
+                yield letter, found
+
+
+def leading_number(text: str) -> float | None:
+    """The number with which a text begins, as C's scanf reads "3 mm"; None where it begins with none."""
+    found = _BEGINS.match(text.strip())
+    return float(found.group()) if found else None
+
+
 def travel_note(travel: Mapping[str, tuple[float | None, float | None]]) -> str:
-    """A sentence on how far the axes go, [mm] or degrees, which no machine file says; "" where the settings do not say it."""
+    """A sentence on how far the axes go, [mm] or degrees, which no machine file says; "" where settings have none."""
     said = [
-        f"{letter} {_end(low)} to {_end(high)}"
-        for letter, (low, high) in travel.items()
-        if low is not None or high is not None
+        f"{letter} {' to '.join('?' if end is None else f'{end:.6g}' for end in ends)}"
+        for letter, ends in travel.items()
+        if ends != (None, None)
     ]
     return f"travel is left out, and no plan is checked against it: {', '.join(said)}" if said else ""
-
-
-def _end(value: float | None) -> str:
-    return "?" if value is None else f"{value:.6g}"
 
 
 def least(*found: Sourced | None) -> Sourced | None:

@@ -5,7 +5,7 @@
 Jobs that are named are made again, the others stay as they are in the results. Each is planned by method `tube` from a quick start,
 then with 2 % less, 2 % more and 10 % more of the feed, of every limit of an axis whose 2 % are foretold to change the time by
 `WORTH` of it, and of the tolerance; and with 10 % more tolerance at the dearest corners alone (G64 P of the block). Foretold is
-what `planner what-if` tells (commands/study/forecast.py), the middle of its range. A plan made again ends elsewhere by some 1e-4 of
+what `planner what-if` tells (commands/study/what_if.py), the middle of its range. A plan made again ends elsewhere by some 1e-4 of
 the time for no other reason, so that a forecast counts as right within 10 % of what was found or within `NOISE` of the time, and a
 hint (report) if its range holds what was found, to that noise.
 
@@ -28,8 +28,8 @@ import planner
 from benchmarks import problems, random_lines
 from benchmarks.prices import BRACKET, time_of
 from benchmarks.record import RESULTS, markdown, write_results
-from planner.commands.study.forecast import Forecast, forecast
 from planner.commands.study.settings import Setting
+from planner.commands.study.what_if import Forecast, forecast
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program

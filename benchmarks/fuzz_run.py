@@ -54,7 +54,7 @@ class Kind(NamedTuple):
 def command(*words: str | Path) -> int:
     """Run a command line of the planner; its exit code. Raises Finding for a bug, a warning, a refusal without a sentence."""
     from planner.cli import app
-    from planner.commands.usage import UsageError
+    from planner.commands.app import UsageError
 
     out, err = io.StringIO(), io.StringIO()
     with (

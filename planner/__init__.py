@@ -81,11 +81,11 @@ _HOME = {
 }
 
 VIEWS.update(
-    to_pandas="planner.report.interactive.frame:plan_frame",
+    to_pandas="planner.report.interactive.page:plan_frame",
     plot="planner.report.interactive.figures:PlanFigures",
-    save="planner.report.interactive.files:save",
+    save="planner.report.interactive.page:save",
     report="planner.report.interactive.page:ReportPage",
-    card="planner.report.interactive.card:plan_card",
+    card="planner.report.interactive.page:plan_card",
 )
 
 __all__ = [

@@ -1,6 +1,6 @@
 """The entry point of the command `planner`; the commands themselves are in `planner.commands.app`.
 
-Its exit codes are in `planner.commands.exit_codes`.
+Its exit codes are in `planner.commands.terminal`.
 
 Nothing is imported before Ctrl-C has its handler, so that an interrupt during the imports ends like any other.
 """
@@ -22,9 +22,8 @@ OBJECTS = 10_000
 
 def main() -> None:
     """Entry point of the command `planner`."""
-    from planner.commands.exit_codes import NOT_SOLVED
     from planner.commands.interrupt import end_at_interrupts, no_more_interrupts
-    from planner.commands.memory import is_of_memory
+    from planner.commands.terminal import NOT_SOLVED, is_of_memory
 
     end_at_interrupts()
     gc.set_threshold(OBJECTS)

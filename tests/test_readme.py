@@ -112,6 +112,6 @@ def test_every_folder_of_the_package_is_on_the_page_of_the_algorithm() -> None:
 def test_lines_of_the_output_are_those_of_plan() -> None:
     """The labels of the example's output, as the code prints them."""
     tables = (ROOT / "planner" / "report" / "rows.py").read_text(encoding="utf-8")
-    optimum = (ROOT / "planner" / "report" / "optimum.py").read_text(encoding="utf-8")
+    optimum = (ROOT / "planner" / "report" / "rows.py").read_text(encoding="utf-8")
     for label in ("cycle time", "stopping at every block", "corners", "verdict", "held by"):
         assert f'"{label}"' in tables + optimum, label

@@ -42,8 +42,8 @@ EXPLAINED = {
     ("planner/base/compiling.py", "pickle"),
     ("planner/nc/language/compiled.py", "compile"),
     ("planner/nc/language/compiled.py", "exec"),
-    ("planner/commands/study/workers.py", "joblib"),
-    ("planner/commands/study/workers.py", "distributed"),
+    ("planner/commands/study/sweep.py", "joblib"),
+    ("planner/commands/study/sweep.py", "distributed"),
 }
 
 # Most files have none of these letters, and parsing them all would take seconds.

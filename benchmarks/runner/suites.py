@@ -22,7 +22,7 @@ from planner.machine import Machine, load_machine
 from planner.machine.kinematics import at_tip
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.report.interactive.tip_path import tip_path
+from planner.report.interactive.points import tip_path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))

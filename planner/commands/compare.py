@@ -10,7 +10,6 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import METHODS, method_name
-from planner.commands.exit_codes import BAD_INPUT, FAILED, NOT_SOLVED
 from planner.commands.options import (
     DEFAULT_MACHINE,
     ForceOption,
@@ -23,7 +22,7 @@ from planner.commands.options import (
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import guarded, memory_used_up, say, show
+from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, guarded, memory_used_up, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:

@@ -76,8 +76,7 @@ def export_command(
         return
     if tolerance is not None:
         raise InputError(f"--tolerance is for programs; --for {for_} takes every setpoint as it is")
-    from planner.controls.export.pvt import WITHIN, write_pvt
-    from planner.controls.export.stream import write_stream
+    from planner.controls.export.stream import WITHIN, write_pvt, write_stream
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     if within is not None and for_ is not For.pvt:

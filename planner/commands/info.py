@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from planner.commands.exit_codes import BAD_INPUT
-from planner.commands.options import DEFAULT_MACHINE, Job, JsonOption, MachineOption, takes_reading
-from planner.commands.terminal import guarded, say, show
+from planner.base.errors import InputError
+from planner.base.files import readable
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    ForceOption,
+    Job,
+    JsonOption,
+    MachineOption,
+    takes_reading,
+)
+from planner.commands.terminal import BAD_INPUT, guarded, say, show
 from planner.nc.reading import Reading
 
 
@@ -30,3 +40,42 @@ def info_command(
         show(info_table(found))
     if found.unsupported:
         raise typer.Exit(BAD_INPUT)
+
+
+@guarded
+@takes_reading
+def expand_command(
+    job: Job,
+    machine: MachineOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="the file to write (default: print the program)"),
+    ] = None,
+    force: ForceOption = False,
+    *,
+    reading: Reading,
+) -> None:
+    """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
+    if force and output is None:
+        raise InputError("--force has no effect without a file to write; name one with -o FILE")
+    from planner.machine import load_machine
+    from planner.nc.language.flat import flat_program
+    from planner.nc.reader import load, source_name
+
+    if output is not None and output.exists() and not force:
+        raise InputError("the file exists; give another name or --force", source=str(output))
+    data = load(job)
+    found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=source_name(job))
+    text = data if found is None else readable(found[0]).encode()
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_bytes(text)
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
+    if found is None:
+        say(f"{output}: nothing to expand, the program is copied")
+    else:
+        assert found[1].expansion is not None
+        say(f"{output}: {found[1].expansion.rows:,} lines executed, {len(found[1]):,} blocks")

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from planner.commands.exit_codes import INTERRUPTED
+from planner.commands.terminal import INTERRUPTED
 
 CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # of a terminal, where a progress bar may be drawn
 

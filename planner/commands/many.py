@@ -23,10 +23,9 @@ from typing import Any
 from planner.base.errors import InputError
 from planner.base.files import STDIN
 from planner.base.threads import cores
-from planner.commands.exit_codes import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED
 from planner.commands.interrupt import interrupts_raise
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import say, show
+from planner.commands.terminal import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED, say, show
 
 # By the exit code of a program's process.
 OUTCOMES = {
@@ -204,8 +203,7 @@ def _report(rows: Sequence[Done], as_json: bool) -> None:
         ]  # fmt: skip
         say(json.dumps({"programs": programs}, indent=2, allow_nan=False))
         return
-    from planner.report.programs import programs_table
-    from planner.report.tables import assumed_lines
+    from planner.report.tables import assumed_lines, programs_table
 
     for row in rows:
         for line in assumed_lines(row.summary.get("assumptions", ())):

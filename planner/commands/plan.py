@@ -11,7 +11,6 @@ import typer
 
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import OPTIMAL, users_of
-from planner.commands.exit_codes import FAILED
 from planner.commands.options import (
     DEFAULT_MACHINE,
     CornerOption,
@@ -32,7 +31,7 @@ from planner.commands.options import (
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import guarded, say, show
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.exit_codes import FAILED
 from planner.commands.options import ForceOption, JsonOption
-from planner.commands.terminal import guarded, say
+from planner.commands.terminal import FAILED, guarded, say
 
 if TYPE_CHECKING:
     from planner.motion.pulses import AxisPulses

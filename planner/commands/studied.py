@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import inspect
+import json
+from collections import Counter
 from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING, Any, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.exit_codes import FAILED, NOT_SOLVED
 from planner.commands.options import (
     DEFAULT_MACHINE,
     Job,
+    JsonOption,
     MachineOption,
+    QuietOption,
+    ThreadsOption,
     ToleranceOption,
     takes_planning,
     takes_reading,
     taking,
 )
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
     from planner.commands.study.variant import StudiedJob
 else:
     StudiedJob = Any  # of the commands' arguments: the module is loaded when a command runs
+
 
 _JOB: dict[str, Any] = {
     "job": get_args(Job),
@@ -68,3 +76,114 @@ def end_with(outcomes: Collection[str]) -> None:
     """End the command with exit code 0 if all plans passed, 1 if one failed its verdict, 3 if one has no motion."""
     if set(outcomes) != {"passed"}:
         raise typer.Exit(FAILED if set(outcomes) <= {"passed", "failed"} else NOT_SOLVED)
+
+
+@guarded
+@takes_studied_job
+def what_if_command(
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="another value, such as axes.y.jerk=4e5, y.velocity=+10%, tolerance=20um or feed=1.2; repeat it for more",
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+    threads: ThreadsOption = None,
+    quiet: QuietOption = False,
+    *,
+    studied: StudiedJob,
+) -> None:
+    """Plan a program as it is, with each --set alone, and with all of them; beside it what prices foretell.
+
+    The exit code is 0 if all plans passed, 1 if one failed its verdict, 3 if one has no motion.
+    """
+    if not changes:
+        raise InputError("nothing to change: name a setting and its value, such as --set axes.y.jerk=4e5")
+    from planner.commands.study.settings import parse_setting
+    from planner.commands.study.tables import what_if_dict, what_if_table
+    from planner.commands.study.what_if import what_if
+    from planner.report.tables import assumed_lines
+
+    settings = [parse_setting(text, studied.machine, studied.present_tolerance) for text in changes]
+    with ProgressBar(quiet=quiet) as progress:
+        rows = what_if(studied, settings, lambda label, stage, done: progress(f"{label}: {stage}", done))
+    if as_json:
+        say(json.dumps(what_if_dict(studied, rows), indent=2, allow_nan=False))
+    else:
+        show(*assumed_lines(studied.program.assumptions), what_if_table(studied, rows, title_of(studied)))
+    end_with({it.row.outcome for it in rows})
+
+
+@guarded
+@takes_studied_job
+def sweep_command(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="where points, table and picture are kept")
+    ],
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            "--vary",
+            metavar="NAME=RANGE",
+            help="values of a setting: FIRST:LAST:COUNT, with :log for equal ratios, or A,B,C; such as tolerance=0.005:0.1:10:log; "
+            "repeat it for all combinations",
+        ),
+    ],
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            "--cluster",
+            metavar="ADDRESS",
+            help="plan on a Dask cluster: its scheduler, such as tcp://host:8786",
+        ),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="begin anew in a directory that holds something else")
+    ] = False,
+    as_json: JsonOption = False,
+    threads: ThreadsOption = None,
+    quiet: QuietOption = False,
+    *,
+    studied: StudiedJob,
+) -> None:
+    """Plan a program with every combination of values; what is done is kept, and the same command goes on with it.
+
+    The exit code is 0 if all plans passed, 1 if one failed its verdict, 3 if one has no motion.
+    """
+    if cluster is not None and threads is not None:
+        raise InputError("--threads is for processes of this machine; a cluster has the workers that it has")
+    from planner.commands.study.points import SweepFolder
+    from planner.commands.study.settings import grid_of, parse_varied
+    from planner.commands.study.sweep import sweep
+    from planner.commands.study.tables import sweep_table
+    from planner.commands.study.written import write_sweep
+    from planner.report.tables import assumed_lines
+
+    varied = [parse_varied(text, studied.machine, studied.present_tolerance) for text in vary]
+    for point in grid_of(varied)[:1]:
+        studied.changed(point)
+    inputs = {
+        "program": studied.program.source,
+        "machine": studied.machine.name,
+        "tolerance_mm": studied.tolerance,
+        **studied.how,
+    }
+    folder = SweepFolder(output, studied, inputs)
+    folder.open(force=force)
+    with ProgressBar(quiet=quiet) as progress:
+        done = sweep(studied, varied, folder, cluster, progress.count)
+    written = write_sweep(done, output)
+    outcomes = Counter(row["outcome"] for row in done.rows)
+    if as_json:
+        say(
+            json.dumps(
+                {"reused": done.reused, "outcomes": outcomes, "points": done.rows}, indent=1, allow_nan=False
+            )
+        )
+    else:
+        show(*assumed_lines(studied.program.assumptions), sweep_table(done, title_of(studied)))
+        for name in written:
+            say(str(output / name))
+    end_with(outcomes)

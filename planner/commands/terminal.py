@@ -1,10 +1,18 @@
-"""How a command reports: messages, tables on standard output, progress on standard error."""
+"""How a command reports: messages, tables on standard output, progress on standard error.
+
+Does a failure come of too little memory? Libraries say so in many ways, and some only that they cannot be loaded.
+
+Under a limit of the address space (`ulimit -v`, batch systems) the first that does not fit is often a shared library: the loader then
+reports a segment that cannot be mapped, and llvmlite only a library that cannot be found.
+"""
 
 from __future__ import annotations
 
 import codecs
+import errno
 import functools
 import io
+import mmap
 import os
 import sys
 import warnings
@@ -15,10 +23,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from planner.base.errors import InputError, NotSolvedError, printable
-from planner.commands.exit_codes import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED, NOT_SOLVED
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+
 
 # Columns where the output is no terminal: rows are for other programs there, and are not cut or folded.
 PIPE_WIDTH = 1000
@@ -73,8 +81,6 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except typer.Exit:
             raise
         except Exception as fault:
-            from planner.commands.memory import is_of_memory
-
             if is_of_memory(fault):
                 say(f"not solved: {memory_used_up(MemoryError(), judging)}", err=True)
                 raise typer.Exit(NOT_SOLVED) from None
@@ -148,3 +154,46 @@ def show(*tables: RenderableType) -> None:
     assert isinstance(console.file, io.StringIO)
     lines = console.file.getvalue().removesuffix("\n").split("\n")
     _write("\n".join(lines if terminal else [line.rstrip() for line in lines]))
+
+
+# What loaders, threads and C++ say, in lower case.
+_SAID = (
+    "failed to map segment",
+    "cannot allocate memory",
+    "bad_alloc",
+    "can't start new thread",
+    "out of memory",
+)
+_LIBRARY = 256 << 20  # bytes: more than the largest library that planning loads (libllvmlite, 130 MB)
+
+
+def is_of_memory(fault: BaseException) -> bool:
+    """Whether an exception, or one that it came of, is of too little memory."""
+    seen: list[BaseException] = []
+    one: BaseException | None = fault
+    while one is not None and one not in seen:
+        seen.append(one)
+        if isinstance(one, MemoryError) or (isinstance(one, OSError) and one.errno == errno.ENOMEM):
+            return True
+        if any(words in str(one).lower() for words in _SAID):
+            return True
+        one = one.__cause__ or one.__context__
+    # Python's own modules end in a SystemError where an allocation in them has failed
+    unclear = any(isinstance(one, (OSError, ImportError, SystemError)) for one in seen)
+    return unclear and not _room_for_a_library()
+
+
+def _room_for_a_library() -> bool:
+    try:
+        mmap.mmap(-1, _LIBRARY).close()
+    except OSError:
+        return False
+    return True
+
+
+FAILED = 1  # planned, but the verdict failed
+BAD_INPUT = 2
+NOT_SOLVED = 3  # or out of memory
+BUG = 70  # EX_SOFTWARE of sysexits.h
+INTERRUPTED = 130  # 128 + SIGINT, what shells report
+BROKEN_PIPE = 141  # 128 + SIGPIPE: the reader of the output has gone

@@ -19,7 +19,6 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
-from planner.commands.exit_codes import FAILED
 from planner.commands.options import (
     DEFAULT_MACHINE,
     JsonOption,
@@ -28,7 +27,7 @@ from planner.commands.options import (
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import guarded, say, show
+from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:

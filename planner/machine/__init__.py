@@ -2,8 +2,7 @@
 
     parts.py    records of the tables of a machine file
     kinematics_data.py  the record of [kinematics]
-    whole.py    `Machine`, the record of all of them
-    faults.py   what is wrong in a record, in words
+    whole.py    `Machine`, the record of all of them, and its faults in words
     files.py    machine files and built-in machines
 
 Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at `Machine.radius`.

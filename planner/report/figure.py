@@ -1,5 +1,5 @@
 """What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py,
-toolpath_figure.py), plotly in notebooks (report/interactive/figures.py) and in pages (html/), for which
+plots.py), plotly in notebooks (report/interactive/figures.py) and in pages (html/), for which
 plotly_figure.py puts it into plotly's words.
 
 A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of
@@ -17,7 +17,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES, ROTARY_AXES
-from planner.planning.job.at_tip import of_axes
+from planner.nc.program import Kind
+from planner.planning.job.at_tip import directions_of, of_axes
 from planner.report.colours import COLOURS, DIM, INK
 from planner.report.word_feed import WordFeed
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from planner.machine import Machine
     from planner.motion.trajectory import Trajectory
     from planner.planning.job.plan import Plan
+
 
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
 QUANTITIES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
@@ -141,3 +143,27 @@ def three(shown: Trajectory) -> FloatArray:
     """(N, 3) x, y, z of samples [mm]; 0 for those that are not among the axes."""
     places = dict(zip(shown.axes, shown.position.T, strict=True))
     return np.stack([places.get(axis, np.zeros(len(shown))) for axis in LINEAR_AXES], axis=1)
+
+
+TOOL = "#D55E00"
+SEEN = 50  # samples looked at for each place: a long motion is not evaluated as a whole
+SHARE = 0.12  # length of a line, of the largest extent of the path [-]
+
+
+def tool_lines(plan: Plan, most: int) -> FloatArray | None:
+    """(n, 2, 3) the tip and a point on the tool on feed moves, at up to `most` places that are as far from each other along the path
+    [mm]; None where the trajectory is not one of the tip. The plan must have a trajectory."""
+    trajectory = plan.trajectory
+    if plan.joints is None or trajectory is None:
+        return None
+    seen = trajectory.rows(np.unique(np.linspace(0, len(trajectory) - 1, SEEN * most).astype(np.int64)))
+    at = np.searchsorted(seen.s, np.linspace(0.0, float(seen.s[-1]), most))
+    places = seen.rows(np.unique(np.minimum(at, len(seen) - 1)))
+    places = places.rows(np.flatnonzero(plan.program.kind[places.block] != Kind.RAPID))
+    directions = directions_of(plan, places)
+    if directions is None:
+        return None
+    linear = [k for k, axis in enumerate(trajectory.axes) if axis in LINEAR_AXES]
+    tip = places.position[:, linear]
+    length = SHARE * float(np.ptp(seen.position[:, linear], axis=0).max())
+    return np.stack([tip, tip + length * directions], axis=1)

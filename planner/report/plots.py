@@ -1,6 +1,10 @@
 """Pictures of a plan, made for paper: fine lines at 200 dpi, units on every axis, colours that colour-blind readers tell apart.
 
-The tool path coloured by feed (report/toolpath_figure.py), and the profiles over time against their limits (report/profiles_figure.py).
+The tool path coloured by feed (report/plots.py), and the profiles over time against their limits (report/profiles_figure.py).
+
+The tool path coloured by feed (viridis), over the programmed path.
+
+An hour of motion has millions of samples; of them one point is kept for each pixel that the motion passes.
 """
 
 from __future__ import annotations
@@ -9,12 +13,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
+from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
+from planner.nc.program import Kind
+from planner.report.figure import TOOL, MotionColumns, flat_view, three, tool_lines
+from planner.report.html.data import programmed_path
 from planner.report.profiles_figure import profiles_figure
-from planner.report.toolpath_figure import toolpath_figure
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
+
 
 STYLE: Any = {
     "font.size": 8.5,
@@ -40,3 +54,114 @@ def write_figures(plan: Plan, directory: Path) -> None:
     with matplotlib.rc_context(STYLE):
         toolpath_figure(plan).savefig(directory / "toolpath.png", bbox_inches="tight")
         profiles_figure(plan).savefig(directory / "profiles.png", bbox_inches="tight")
+
+
+PIXELS = 900  # about the extent of a tool path in pixels
+POINTS_MAX = SIZES.picture_points
+DENSE = SIZES.picture_dense
+POINTS_PROGRAMMED = 10_000_000  # of the programmed path before one is kept for each pixel: 240 MB
+NAMES = "XYZ"
+TOOLS = 240  # places at which the tool is drawn
+GREY, LIGHT = "#8c8c8c", "#b5b5b5"
+DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
+
+
+def toolpath_figure(plan: Plan) -> Figure:
+    """The motion coloured by feed over the programmed path; rapids are dashed. Of a program with the tool centre point on the motion is
+    that of the tip, and the tool's direction is drawn at places of its feed moves."""
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    motion = three(trajectory)
+    view = flat_view(np.ptp(motion, axis=0))
+    shown = [0, 1, 2] if view is None else view
+    keep = one_per_pixel(motion[:, shown])
+    points, columns = motion[keep][:, shown], MotionColumns(plan, trajectory.rows(keep))
+    feed = columns["feed"]
+    rapid = plan.program.kind[columns.shown.block] == Kind.RAPID
+    figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
+    collection = Line3DCollection if view is None else LineCollection
+    around: Any = {"color": "black", "linestyle": "", "zorder": 5}
+    axes.plot(*points[:1].T, label="start", marker="o", markersize=7, markerfacecolor="white", **around)
+    axes.plot(*points[-1:].T, label="end", marker="s", markersize=4, **around)
+    path = programmed_path(plan.toolpath, most=POINTS_PROGRAMMED)[:, shown]
+    axes.plot(*path[one_per_pixel(path)].T, label="programmed", color=LIGHT, linewidth=0.5, zorder=1)
+    if rapid.any():
+        broken = np.where((rapid | np.append(rapid[1:], False))[:, None], points, np.nan)
+        axes.plot(*broken.T, label="rapid", color=GREY, linewidth=0.6, linestyle=DASHED, zorder=2)
+    ends, moving = np.stack([points[:-1], points[1:]], axis=1), ~rapid[1:]
+    line = collection(ends[moving], cmap="viridis", linewidths=1.5 if len(keep) < DENSE else 0.5, zorder=3)
+    line.set_array(0.5 * (feed[:-1] + feed[1:])[moving])
+    if moving.any():
+        line.set_clim(0.0, float(feed[1:][moving].max()))
+    axes.add_collection(line)
+    tools = tool_lines(plan, TOOLS)
+    if tools is not None:
+        of_tools: Any = {"colors": TOOL, "linewidths": 0.4, "alpha": 0.6, "zorder": 2.5, "label": "tool"}
+        axes.add_collection(collection([*tools[:, :, shown]], **of_tools))
+    legend: Any = {"handles": axes.get_legend_handles_labels()[0], "columnspacing": 1.6}
+    legend["ncols"] = len(legend["handles"])
+    if view is not None:
+        _flat_axes(axes, motion, view)
+        figure.legend(loc="outside upper center", **legend)
+        bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
+    else:
+        _solid_axes(axes, motion if tools is None else np.vstack([motion, tools[:, 1]]))
+        figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
+        bar = figure.colorbar(line, cax=figure.add_axes((0.95, 0.22, 0.02, 0.5)))
+    bar.set_label("feed [mm/s]")
+    outline: Any = bar.outline
+    outline.set_linewidth(0.5)
+    return figure
+
+
+def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
+    """A figure of about the path's proportions."""
+    if not flat:
+        figure = Figure(figsize=(6.4, 5.0))
+        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.96), projection="3d", computed_zorder=False)
+    across, up = extent / max(float(extent.max()), 1e-9)
+    figure = Figure(figsize=(1.5 + max(5.0 * across, 2.4), 1.1 + max(5.0 * up, 2.0)), layout="constrained")
+    return figure, figure.add_subplot()
+
+
+def one_per_pixel(points: FloatArray) -> Array:
+    """Indices (k,) of the first and the last of the points (n, 2 or 3), and of every point that enters another pixel (or voxel)."""
+    pixel = max(float(np.ptp(points, axis=0).max()) / PIXELS, 1e-9)
+    while True:
+        pixels = np.floor((points - points.min(axis=0)) / pixel).astype(np.int32)
+        keep = np.flatnonzero((np.diff(pixels, axis=0) != 0).any(axis=1)) + 1
+        if len(keep) <= POINTS_MAX:
+            return np.unique(np.concatenate([[0], keep, [len(points) - 1]]))
+        pixel *= 1.5
+
+
+def _flat_axes(axes: Axes, motion: FloatArray, shown: list[int]) -> None:
+    """The axes of a picture, and as its title what it leaves out."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.04)
+    axes.autoscale_view()
+    axes.set_xlabel(f"{NAMES[shown[0]]} [mm]")
+    axes.set_ylabel(f"{NAMES[shown[1]]} [mm]")
+    (k,) = {0, 1, 2} - {*shown}
+    low, high = motion[:, k].min(), motion[:, k].max()
+    if high > low:
+        title = f"seen along {NAMES[k]} ({NAMES[k]} {low:.4g} to {high:.4g} mm)"
+        axes.set_title(title, color="#555555", fontsize=8)
+
+
+def _solid_axes(axes: Any, motion: FloatArray) -> None:
+    low, high = motion.min(axis=0), motion.max(axis=0)
+    axes.set_proj_type("ortho")
+    axes.view_init(elev=32, azim=-62)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_zlim(low[2], high[2])
+    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.08)
+    for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), NAMES, high - low, strict=True):
+        axis.set_pane_color((1, 1, 1, 0))
+        axis._axinfo["grid"].update(color="#e4e4e4", linewidth=0.5)
+        axis.set_major_locator(
+            matplotlib.ticker.MaxNLocator(max(2, min(6, round(6 * size / (high - low).max()))))
+        )
+        axis.set_label_text(f"{name} [mm]")
+    axes.tick_params(pad=-1)

@@ -18,7 +18,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.report.colours import COLOURS, GREY, LIGHT, limit_colours
 from planner.report.figure import MotionColumns, profile_panels
 from planner.report.html.data import used_limits
-from planner.report.optimum import held_by_rows
+from planner.report.rows import held_by_rows
 from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:

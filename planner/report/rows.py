@@ -1,24 +1,29 @@
 """What is said of a plan and of a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under `told`,
 and the report and the card of a notebook show. Nothing else puts these figures into words.
+
+What a plan says beside its motion: the active limits, what more of them would save, and the corners where tolerance saves most.
+
+The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the terminal and numbers for
+`summary.json`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.base.names import SINGLE_CORNERS
-from planner.base.units import MICROMETRE
-from planner.report.beside import beside_rows
-from planner.report.optimum import held_by_text, price_rows
-from planner.report.times import hours_text
+from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 
 if TYPE_CHECKING:
     from planner.base.arrays import FloatArray
+    from planner.planning.job.beside import Beside
     from planner.planning.job.plan import Plan
+    from planner.sensitivity.records import DearCorners, GridHistory, PriceList
     from planner.verifier import Ringing, Verdict
+
 
 FAULTS_SHOWN = 8  # so that a table fits a terminal of 24 rows
 VERDICT, PASSED, FAILED = "verdict", "passed", "FAILED"
@@ -116,3 +121,173 @@ def ratio_text(value: float) -> str:
     if not np.isfinite(value):
         return "-"
     return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
+
+
+LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
+SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]
+MILLISECOND = 1e-3  # [s]
+NOTHING = "nothing"
+HINT = "a hint only"
+
+
+def held_by_text(grid: GridHistory) -> str:
+    """Active limits with their share of the time: "feed 98 %, jerk.y 41 %, ..."."""
+    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents())
+
+
+def held_by_rows(grid: GridHistory, prices: PriceList | None) -> list[tuple[str, int, str]]:
+    """What is active, for how many per cent of the time, and what more of it saves: "" where that is not known or nothing."""
+    return [(name, percent, _saves(prices, name)) for name, percent in grid.percents()]
+
+
+def _saves(prices: PriceList | None, name: str) -> str:
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    if prices is None or prices.saved.get(name, 0.0) <= 0.0:
+        return ""
+    more = f"{MORE_TOLERANCE / MICROMETRE:g} µm" if name == "tolerance" else f"{100.0 * MORE_LIMIT:g} %"
+    return f"{more} more: {_seconds(prices, name)}"
+
+
+def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
+    """Rows of the table of a plan: what more of each limit saves, what more tolerance saves, and where.
+
+    cycle_time : of the plan [s]
+    """
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    least = SAVED_SHOWN * cycle_time
+    ranked = [name for name, saved in prices.ranked() if name != "tolerance" and saved >= least]
+    ranked = ranked[:LIMITS_SHOWN]
+    told = ", ".join(f"{name} {_seconds(prices, name)}" for name in ranked) or NOTHING
+    if set(ranked) & set(prices.hints):
+        told += "; ranges are hints only"
+    rows = [(f"{100.0 * MORE_LIMIT:g} % more saves", told)]
+    more = f"{MORE_TOLERANCE / MICROMETRE:g} µm more"
+    if prices.tolerance is None:
+        return [*rows, (f"{more} tolerance", "not known on this path")]
+    saved = prices.saved["tolerance"]
+    if saved >= least and "tolerance" in prices.hints:
+        told = f"saves {_seconds(prices, 'tolerance')}, {HINT}"
+    elif saved >= least:
+        told = f"saves {saved:.3g} s"
+    elif saved <= -least:
+        told = f"costs {-saved:.3g} s: corners that share a short leg take room from each other"
+    else:
+        told = f"saves {NOTHING} to speak of"
+    rows.append((f"{more} tolerance", told))
+    if prices.corners is not None and len(prices.corners):
+        rows.append((f"{more} at line", f"saves, in ms, {_by_line(prices.corners)}"))
+    return rows
+
+
+def _by_line(corners: DearCorners) -> str:
+    """What more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop passes again are added up."""
+    passed: dict[int, list[float]] = {}
+    for line, saved in zip(corners.line.tolist(), corners.saved.tolist(), strict=True):
+        passed.setdefault(line, []).append(saved / MILLISECOND)
+    ranked = sorted(passed.items(), key=lambda one: -sum(one[1]))
+    return ", ".join(
+        f"{line}: {sum(saved):.2g}" + (f" at {len(saved)} corners" if len(saved) > 1 else "")
+        for line, saved in ranked
+    )
+
+
+def _seconds(prices: PriceList, name: str) -> str:
+    """What more of a limit saves: a number, or a range where a number would say too much."""
+    if name not in prices.hints:
+        return f"{prices.saved[name]:.3g} s"
+    least, most = prices.ranges[name]
+    return f"{least:.2g} to {most:.2g} s"
+
+
+def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[str, Any]:
+    """`held_by` and `prices` of a plan in numbers; None where they are not known."""
+    return {
+        "held_by": dict(grid.ranked()) if grid is not None else None,
+        "prices": _price_summary(prices) if prices is not None else None,
+    }
+
+
+def _price_summary(prices: PriceList) -> dict[str, Any]:
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+
+    dear = prices.corners
+    return {
+        "limits": prices.limits,
+        "feed": prices.feed,
+        "tolerance": prices.tolerance,
+        "more_limit": MORE_LIMIT,
+        "more_tolerance_mm": MORE_TOLERANCE,
+        "saved_s": prices.saved,
+        "saved_range_s": {name: list(between) for name, between in prices.ranges.items()},
+        "hints": list(prices.hints),
+        "corners": None
+        if dear is None
+        else [
+            {
+                "line": dear.line[k],
+                "position_mm": dear.position[k],
+                "theta_deg": np.rad2deg(dear.theta[k]),
+                "price_s_per_mm": dear.price[k],
+                "saved_s": dear.saved[k],
+            }
+            for k in range(len(dear))
+        ],
+    }
+
+
+def beside_rows(beside: Sequence[Beside], cycle_time: float, dwell: float) -> list[tuple[str, str]]:
+    """Rows of the table of a plan: dwells, what takes time beside the motion, the total, and what is not in it.
+
+    cycle_time : of the motion [s]
+    dwell      : of it, as the program sets it [s]
+    """
+    rows = [("of it dwells", f"{dwell:g} s")] if dwell else []
+    known = [it for it in beside if it.each is not None]
+    if known:
+        seconds = sum(it.seconds for it in known)
+        told = ", ".join(f"{_counted(it)} of {it.each:g} s" for it in known)
+        rows.append(("beside the motion", f"{seconds:g} s: {told}"))
+        total = cycle_time + seconds
+        rows.append(("total", f"{total:.4f} s{hours_text(total)}"))
+    because: dict[str, list[str]] = {}
+    for it in beside:
+        if it.each is None:
+            because.setdefault(it.because, []).append(_counted(it))
+    if because:
+        told = "; ".join(f"{', '.join(counted)} ({why})" for why, counted in because.items())
+        rows.append(("not in the total" if known else "not in the cycle time", told))
+    return rows
+
+
+def _counted(it: Beside) -> str:
+    return f"{it.count:,} {it.what}" + ("s" if it.count > 1 and not it.what.startswith("M") else "")
+
+
+def beside_summary(plan: Plan) -> dict[str, Any]:
+    """What takes time beside the motion: how often, how long each, the sum, and the total with the motion [s]; None where
+    a time is not known. `dwell_s` is part of the cycle time."""
+    beside = plan.beside
+    seconds = sum(it.seconds for it in beside)
+    return {
+        "dwell_s": float(plan.program.dwell.sum()),
+        "counted": [
+            {"what": it.what, "count": it.count, "each_s": it.each, "because": it.because}
+            if it.each is None
+            else {"what": it.what, "count": it.count, "each_s": it.each}
+            for it in beside
+        ],
+        "known_s": seconds,
+        "total_s": None if plan.trajectory is None else plan.trajectory.cycle_time + seconds,
+        "complete": all(it.each is not None for it in beside),
+    }
+
+
+def hours_text(seconds: float) -> str:
+    """A time [s] in hours and minutes, in brackets behind a space; nothing below a minute."""
+    if seconds < SECONDS_PER_MINUTE:
+        return ""
+    minutes, rest = divmod(seconds, SECONDS_PER_MINUTE)
+    hours, minutes = divmod(int(minutes), 60)
+    return f" ({hours} h {minutes} min {rest:.0f} s)" if hours else f" ({minutes} min {rest:.0f} s)"

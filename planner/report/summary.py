@@ -14,9 +14,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.program import ToolPoint
-from planner.report.beside import beside_summary
-from planner.report.optimum import optimum_summary
-from planner.report.rows import plan_rows
+from planner.report.rows import beside_summary, optimum_summary, plan_rows
 
 if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo

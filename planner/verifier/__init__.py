@@ -33,10 +33,9 @@ sharp each check is:
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
 """
 
-from planner.verifier.axes import fit_axes
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import OF_CHORDS, Fault, Kind
-from planner.verifier.given import DERIVATIVES, WHOLE, Given
+from planner.verifier.given import DERIVATIVES, WHOLE, Given, fit_axes
 from planner.verifier.joints import verify_joints
 from planner.verifier.judge import NOT_LIMITED_NAMES, verify
 from planner.verifier.ringing import Ringing

@@ -18,7 +18,7 @@ exceeds it as soon as kappa feed^2 > A(n).
 
 **Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are samples: over a period dt
 the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples fall, and from a cubic, where the machine runs
-these, by a quarter of that (between.py). Hence no chord passes the vertex at more
+these, by a quarter of that (filtered.py). Hence no chord passes the vertex at more
 than
 
     miss + kappa feed^2 dt^2 / 8  <=  eps                            (to second order in dt, as in the paper)
@@ -48,9 +48,9 @@ from planner.base.sizes import SIZES
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
-from planner.verifier.between import bow_share
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import Excess, Fault, Kind, and_more
+from planner.verifier.filtered import bow_share
 from planner.verifier.findings import FAULTS_OF_A_KIND, Look
 from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
+import numpy as np
+
 from planner.base.arrays import FloatArray, freeze
+from planner.base.errors import InputError
+from planner.geometry.toolpath import Toolpath
+from planner.machine import ROTARY_AXES
+from planner.motion.trajectory import Trajectory
+from planner.verifier.stops import STILL
 
 DERIVATIVES = ("velocity", "acceleration", "jerk")
 
@@ -37,3 +45,74 @@ class Given:
 
 
 WHOLE = Given()
+
+
+def fit_axes(
+    trajectory: Trajectory, given: Given, toolpath: Toolpath
+) -> tuple[Trajectory, Given, tuple[str, ...]]:
+    """The trajectory and what is given of it, with the program's axes in its order, and what was done, in sentences.
+
+    An axis of the program that it does not move may be missing: it stands where the program has it. An axis that the program does not
+    have may be there if it stands still, and is left out.
+
+    Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the trajectory moves and the
+    program does not have.
+    """
+    trajectory, given = _at_radius(trajectory, given, toolpath.radius)
+    if trajectory.axes == toolpath.axes:
+        return trajectory, given, ()
+    notes = []
+    for k, letter in enumerate(trajectory.axes):
+        if letter not in toolpath.axes:
+            moved = float(np.ptp(trajectory.position[:, k]))
+            if moved > STILL:
+                raise InputError(
+                    f"the trajectory moves {letter} by {moved:.6g}, an axis that the program and its machine do not have "
+                    f"({' '.join(toolpath.axes)})"
+                )
+            notes.append(f"{letter} stands still; the program and its machine do not have it")
+    samples = len(trajectory)
+    columns: dict[str, list[FloatArray]] = {name: [] for name in ("position", *DERIVATIVES)}
+    rounding = np.zeros(len(toolpath.axes))
+    for k, letter in enumerate(toolpath.axes):
+        if letter in trajectory.axes:
+            own = trajectory.axes.index(letter)
+            for name, column in columns.items():
+                column.append(getattr(trajectory, name)[:, own])
+            rounding[k] = given.position_rounding[own] if len(given.position_rounding) else 0.0
+            continue
+        stands = _standing(toolpath, k)
+        if stands is None:
+            raise InputError(
+                f"column '{letter}' is missing: the program moves {letter}; found are the axes {' '.join(trajectory.axes)}"
+            )
+        notes.append(f"{letter} is missing, and stands at {stands:g} as in the program")
+        for name, column in columns.items():
+            column.append(np.full(samples, stands if name == "position" else 0.0))
+    fitted = dataclasses.replace(
+        trajectory,
+        axes=toolpath.axes,
+        **{name: np.stack(column, axis=1) for name, column in columns.items()},  # type: ignore[arg-type]
+    )
+    return fitted, dataclasses.replace(given, position_rounding=rounding), tuple(notes)
+
+
+def _at_radius(trajectory: Trajectory, given: Given, radius: float) -> tuple[Trajectory, Given]:
+    """The trajectory with its angles as lengths at another radius [mm]."""
+    if trajectory.radius == radius or not set(trajectory.axes) & set(ROTARY_AXES):
+        return dataclasses.replace(trajectory, radius=radius), given
+    scale = np.array([radius / trajectory.radius if a in ROTARY_AXES else 1.0 for a in trajectory.axes])
+    columns = {name: getattr(trajectory, name) * scale for name in ("position", *DERIVATIVES)}
+    if len(given.position_rounding):
+        given = dataclasses.replace(given, position_rounding=np.asarray(given.position_rounding) * scale)
+    return dataclasses.replace(trajectory, radius=radius, **columns), given
+
+
+def _standing(toolpath: Toolpath, axis: int) -> float | None:
+    """Where the axis stands [mm], or None if the program moves it."""
+    place = float(toolpath.start[0, axis])
+    arcs = toolpath.arcs
+    still = (toolpath.start[:, axis] == place).all() and (toolpath.end[:, axis] == place).all()
+    flat = not any(getattr(arcs, name)[:, axis].any() for name in ("e1", "e2", "drift"))
+    flat &= not np.ptp(toolpath.curves.points[:, :, axis], axis=1).any()
+    return place if still and flat else None

@@ -11,11 +11,10 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier import contour, error_allocation, findings, samples
-from planner.verifier.between import bow_share
 from planner.verifier.exact import exact_faults
 from planner.verifier.excess import Kind
 from planner.verifier.extruder import extruder_seen
-from planner.verifier.filtered import after_filters
+from planner.verifier.filtered import after_filters, bow_share
 from planner.verifier.given import DERIVATIVES, WHOLE, Given
 from planner.verifier.held import thread_checks, thread_faults
 from planner.verifier.limits import NORMAL_NAME, limits_of

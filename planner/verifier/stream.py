@@ -51,7 +51,7 @@ class Observed:
     gap_max: float = 0.0
 
     def take(self, t: FloatArray, position: FloatArray, skip: int) -> None:
-        """Note the ends and periods of samples, of which `skip` were there before."""
+        """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` of them were there before."""
         if not self.samples:
             self.first, self.t_first = position[0].copy(), float(t[0])
         self.last, self.t_last = position[-1].copy(), float(t[-1])

@@ -79,7 +79,7 @@ class Worst:
     def keep(
         self, row: int, seen: tuple[float, float, float, int], time: float, at: FloatArray, piece: int
     ) -> None:
-        """The worst of a quantity is now ratio, value, limit and how it was `seen`, there."""
+        """Ratio, value, limit and how it was `seen` are now the worst of a quantity, there: at (A,) [mm]."""
         self.row[row], self.time[row], self.at[row], self.piece[row] = seen, time, at, piece
 
 
@@ -124,5 +124,5 @@ def differences(
 
 
 def less_error(difference: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """The size of a difference, less its error."""
+    """(n, K) the size of a difference, less its error, both (n, K)."""
     return np.maximum(np.abs(difference[0]) - difference[1], 0.0)

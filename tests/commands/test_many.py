@@ -16,7 +16,7 @@ from hand_made import SQUARE
 
 from planner.base.errors import InputError
 from planner.commands.many import folders_of
-from planner.report.programs import programs_table
+from planner.report.tables import programs_table
 
 ROOT = Path(__file__).resolve().parents[2]
 

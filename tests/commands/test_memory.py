@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from planner.commands import memory
-from planner.commands.exit_codes import NOT_SOLVED
+from planner.commands import terminal
 from planner.commands.many import plan_many
+from planner.commands.terminal import NOT_SOLVED
 from tests.commands.command_line import run
 
 
@@ -33,12 +33,12 @@ def chained() -> Exception:
     ids=["MemoryError", "ENOMEM", "threads", "library"],
 )
 def test_what_comes_of_too_little_memory(fault: Exception) -> None:
-    assert memory.is_of_memory(fault)
+    assert terminal.is_of_memory(fault)
 
 
 @pytest.mark.parametrize("fault", [ValueError("x"), OSError(errno.ENOENT, "x"), KeyError("memory")])
 def test_other_faults_are_bugs(fault: Exception) -> None:
-    assert not memory.is_of_memory(fault)
+    assert not terminal.is_of_memory(fault)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space")
@@ -46,7 +46,7 @@ def test_a_library_that_is_not_found_under_a_limit(tmp_path: Path) -> None:
     """Llvmlite says that its library cannot be found, and no more."""
     code = (
         "import resource\n"
-        "from planner.commands.memory import is_of_memory\n"
+        "from planner.commands.terminal import is_of_memory\n"
         "assert not is_of_memory(OSError('Could not find'))\n"
         "resource.setrlimit(resource.RLIMIT_AS, (200 << 20, 200 << 20))\n"
         "assert is_of_memory(OSError('Could not find'))\n"
@@ -60,7 +60,7 @@ def test_a_command_that_runs_out_of_memory_is_no_bug(tmp_path: Path, monkeypatch
     def fail(*_: object, **__: object) -> None:
         raise ImportError("libarrow.so: failed to map segment from shared object")
 
-    monkeypatch.setattr("planner.report.export.summary", fail)
+    monkeypatch.setattr("planner.report.summary.summary", fail)
     done = run("plan", tmp_path / "job.ngc", "--method", "stop")
     assert done.exit_code == NOT_SOLVED
     assert "the memory is used up" in done.output

@@ -20,7 +20,7 @@ from planner.planning.job.plan import Plan
 from planner.report.export import write_plan
 from planner.report.html.data import samples_of
 from planner.report.html.saved import saved_plan
-from planner.report.interactive.card import plan_card
+from planner.report.interactive.page import plan_card
 from planner.report.profiles_figure import profiles_figure
 from planner.report.rows import verdict_rows
 from planner.report.tables import plan_table

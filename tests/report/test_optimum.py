@@ -13,7 +13,7 @@ from test_tables import text
 import planner
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
-from planner.report.optimum import held_by_text, price_rows
+from planner.report.rows import held_by_text, price_rows
 from planner.report.summary import summary
 from planner.report.tables import plan_table
 from planner.sensitivity.records import DearCorners, PriceList

@@ -10,7 +10,7 @@ from hand_made import make_plan
 from matplotlib.figure import Figure
 from quick import slow_but
 
-from planner.report import plots, profiles_figure, toolpath_figure
+from planner.report import plots, profiles_figure
 
 PROGRAMS = {
     "flat": "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n",
@@ -62,11 +62,11 @@ def test_the_envelope_keeps_every_peak() -> None:
 def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 500_000)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    keep = toolpath_figure.one_per_pixel(circle)
+    keep = plots.one_per_pixel(circle)
     assert keep[0] == 0
     assert keep[-1] == len(circle) - 1
-    assert len(keep) < 8 * toolpath_figure.PIXELS
-    assert np.linalg.norm(np.diff(circle[keep], axis=0), axis=1).max() < 2.0 * 1.5 / toolpath_figure.PIXELS
+    assert len(keep) < 8 * plots.PIXELS
+    assert np.linalg.norm(np.diff(circle[keep], axis=0), axis=1).max() < 2.0 * 1.5 / plots.PIXELS
 
 
 def test_the_constraint_that_fills_a_column_wins() -> None:

@@ -10,8 +10,8 @@ import pytest
 
 import planner
 from benchmarks import problems
-from planner.commands.study.forecast import forecast
 from planner.commands.study.settings import Setting
+from planner.commands.study.what_if import forecast
 from planner.feedrate.solution import Status
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn

@@ -7,7 +7,7 @@ from motions import JERK_FREE, Moves, along, chain, helix, machine, polyline, re
 from planner.base.errors import InputError
 from planner.report.trajectory_file import read_trajectory
 from planner.verifier import Given, verify
-from planner.verifier.axes import fit_axes
+from planner.verifier.given import fit_axes
 
 M = machine()
 POINTS = [(0, 0, 0), (9, 0, 0), (9, 7, 0), (2, 11, 0)]

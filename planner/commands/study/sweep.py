@@ -1,17 +1,28 @@
-"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table and a picture."""
+"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table and a picture.
+
+Who plans the points of a sweep: processes of this machine (joblib), or the workers of a Dask cluster.
+
+Both call `planned_point` with the same job and hand the rows back as they come; the process that asks writes the files, so that workers
+need no file system in common. A point whose worker died is given to another one: by Dask, up to `DEATHS` times; a local process that
+dies ends the sweep, and the points so far are kept.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from typing import Any
 
 import numpy as np
 
-from planner.commands.study.points import PASSED, SweepFolder
-from planner.commands.study.ranges import Varied, grid_of
+from planner.base.errors import InputError, NotSolvedError
+from planner.base.packages import import_needed
+from planner.base.threads import threads
+from planner.commands.study.points import PASSED, SweepFolder, planned_point
+from planner.commands.study.settings import Setting, Varied, grid_of
 from planner.commands.study.variant import StudiedJob
-from planner.commands.study.workers import planned_here, planned_on_cluster
 
 # Columns of the table behind those of the settings.
 TEXTS = ("outcome", "sentence", "held_by")
@@ -67,3 +78,88 @@ def times_of(done: Sweep) -> np.ndarray[Any, np.dtype[np.float64]]:
     shape = tuple(len(one.values) for one in done.varied)
     times = [row.get("cycle_time_s") if row["outcome"] == PASSED else None for row in done.rows]
     return np.array(times, dtype=np.float64).reshape(shape)
+
+
+Point = tuple[Setting, ...]
+DEATHS = 10  # workers that may die over one point before it is given up: it may be the point that kills them
+WAIT = 10.0  # for an answer of the scheduler [s]
+
+
+def planned_here(job: StudiedJob, points: Sequence[Point]) -> Iterator[tuple[Point, dict[str, Any]]]:
+    """Rows of points, as they are planned by processes of this machine, one for each core.
+
+    Raises NotSolvedError if one of them dies.
+    """
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    count = min(threads(), len(points))
+    if count <= 1:
+        yield from (_planned(job, point) for point in points)
+        return
+    try:
+        yield from Parallel(n_jobs=count, return_as="generator_unordered", batch_size=1)(
+            delayed(_planned)(job, point) for point in points
+        )
+    except TerminatedWorkerError:
+        raise NotSolvedError(
+            "a process of the sweep was ended from outside, perhaps because the memory is used up; the points so far are kept: "
+            "the same command goes on with them, --threads N takes fewer processes"
+        ) from None
+
+
+def planned_on_cluster(
+    address: str, job: StudiedJob, points: Sequence[Point]
+) -> Iterator[tuple[Point, dict[str, Any]]]:
+    """Rows of points, as they are planned by the workers of the Dask cluster whose scheduler has this address.
+
+    Raises InputError if there is no scheduler, NotSolvedError if it goes away, or if a point is given up because its workers died.
+    """
+    distributed = import_needed("distributed", "--cluster")
+    # how it tries to reach a scheduler that has gone, in pages; what came of it is said below
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=WAIT, set_as_default=False)
+    except (OSError, ValueError) as fault:
+        raise InputError(f"--cluster {address}: no scheduler answers there ({fault})") from None
+    try:
+        with client:
+            yield from _planned_by(client, distributed, address, job, points)
+    except distributed.KilledWorker as fault:
+        raise NotSolvedError(
+            f"more than {DEATHS} workers died over one point; the points so far are kept ({fault})"
+        ) from None
+    except (CancelledError, distributed.comm.CommClosedError):
+        raise NotSolvedError(
+            f"--cluster {address}: the scheduler has gone, and with it what it was asked for; the points so far are kept: with a new "
+            "scheduler the same command goes on with them"
+        ) from None
+
+
+def _planned_by(
+    client: Any, distributed: Any, address: str, job: StudiedJob, points: Sequence[Point]
+) -> Iterator[tuple[Point, dict[str, Any]]]:
+    if not client.scheduler_info()["workers"]:
+        raise InputError(
+            f"--cluster {address}: its scheduler has no workers; start some with: dask worker {address}"
+        )
+    client.run_on_scheduler(_allow_deaths, deaths=DEATHS)
+    # a task, and not scattered: what dies with a worker the scheduler then makes again
+    shared = client.submit(_same, job, pure=False)
+    tasks = [client.submit(_planned, shared, point, pure=False) for point in points]
+    for done in distributed.as_completed(tasks, loop=client.loop):
+        yield done.result()
+        done.release()
+
+
+def _planned(job: StudiedJob, point: Point) -> tuple[Point, dict[str, Any]]:
+    return point, planned_point(job, point)
+
+
+def _same(job: StudiedJob) -> StudiedJob:
+    return job
+
+
+def _allow_deaths(deaths: int, dask_scheduler: Any = None) -> None:
+    """Runs in the scheduler."""
+    dask_scheduler.allowed_failures = max(deaths, dask_scheduler.allowed_failures)

@@ -17,9 +17,8 @@ from planner.commands.study.variant import StudiedJob
 from planner.report.summary import json_ready
 
 if TYPE_CHECKING:
-    from planner.commands.study.forecast import Forecast
     from planner.commands.study.sweep import Sweep
-    from planner.commands.study.what_if import WhatIf
+    from planner.commands.study.what_if import Forecast, WhatIf
 
 REASONS_SHOWN = 5  # why points did not pass
 

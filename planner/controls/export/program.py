@@ -4,7 +4,7 @@ grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smo
 with F words that keep the axes within their limits in its bends; how far apart its points should be depends on how they look ahead
 and on the time of a line. Their times are predicted by short models (models.py), for the program as it is and for the planned path
 with chords of several widths (`SHARES` of what is allowed); the fastest is written. LinuxCNC rounds corners itself and has a model and
-candidates of its own (for_linuxcnc.py); benchmarks/results/controls.md says how they did.
+candidates of its own (candidates.py); benchmarks/results/controls.md says how they did.
 
 Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners of LinuxCNC add up to
 it at most. A plan that uses all of it leaves no room; one with a tenth less does.
@@ -19,12 +19,18 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.units import MICROMETRE
-from planner.controls.export import for_linuxcnc
-from planner.controls.export.candidates import AS_IT_IS, Candidate, Candidates, standing
-from planner.controls.export.controls import CONTROLS
-from planner.controls.export.header import FIRST_RUN, assumptions
+from planner.controls.export.candidates import (
+    AS_IT_IS,
+    Candidate,
+    Candidates,
+    best_first,
+    linuxcnc_candidates,
+    standing,
+)
+from planner.controls.export.controls import CONTROLS, LINUXCNC
 from planner.controls.export.models import CONTROLS as MODELS
 from planner.controls.export.models import predicted_time
+from planner.controls.export.output import FIRST_RUN, assumptions
 from planner.planning.job.plan import Plan
 
 SHARES = (
@@ -70,9 +76,9 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
             source=plan.program.source,
         )
     job = Candidates(plan, CONTROLS[control], tolerance)
-    linuxcnc = control == for_linuxcnc.NAME
-    found = for_linuxcnc.candidates(job) if linuxcnc else _candidates(job)
-    order = for_linuxcnc.best_first(found) if linuxcnc else sorted(found, key=lambda one: one.time)
+    linuxcnc = control == LINUXCNC.name
+    found = linuxcnc_candidates(job) if linuxcnc else _candidates(job)
+    order = best_first(found) if linuxcnc else sorted(found, key=lambda one: one.time)
     chosen, data, notes = _first_written(job, order)
     file = f"{control}.ngc" if linuxcnc else f"{control}.gcode"
     (directory / file).write_bytes(data)

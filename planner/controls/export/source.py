@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 from pathlib import Path
 
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
-from planner.controls.export.rows import Source, rows_of
+from planner.controls.export.controls import Control, is_command, is_setting, takes_move
+from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word, rows_of, sets_tools
+from planner.machine import Machine
+from planner.nc import codes
+from planner.nc.lexer import without_leader
 from planner.nc.points import are_points
 from planner.nc.program import FEED_MOVES, Program, plain
 from planner.nc.reader import parse_program
-from planner.nc.reading import AUTO
+from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC
 from planner.nc.text import program_text
 from planner.nc.writer import FEED_MIN, round_down
 from planner.planning.job.plan import Plan
@@ -103,4 +108,145 @@ def _words(place: np.ndarray) -> str:
     return " ".join(
         f"{letter}{plain(round(float(value), DECIMALS + 3) + 0.0)}"
         for letter, value in zip("XYZ", place, strict=True)
+    )
+
+
+SAME_FEED = 1e-6  # by its size: what writing a program out rounds
+SAME_DWELL = 1e-9  # [s], the rounding of milliseconds
+# The words of commands that stand alone on their lines.
+_OWN = {
+    **dict.fromkeys(("G0", "G1"), "XYZEF"),
+    **dict.fromkeys(("G2", "G3"), "XYZIJREF"),
+    **dict.fromkeys(("M3", "M4"), "S"),
+    "G4": "P",
+    "G92": "XYZE",
+}
+_PAREN = re.compile(rb"^[^;\n]*\(", re.MULTILINE)
+_SLASH = re.compile(rb"^\s*/", re.MULTILINE)
+_NUMBER = re.compile(rb"^\s*N\s*\d", re.MULTILINE | re.IGNORECASE)
+
+
+def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> str:
+    """Why the control cannot be given the program as it is, with the first line; "" if it can.
+
+    source : the rows that are executed: of the text, or of the expanded program
+    text   : the program as it is
+    """
+    program, linuxcnc = source.program, control.name == LINUXCNC
+    if linuxcnc and _reads_otherwise(source, text, machine):
+        return "LinuxCNC reads it otherwise than it was planned"
+    for holds, why in (
+        (source.data != text and not linuxcnc, "it has parameters, loops or calls"),
+        (_SLASH.search(text) and not linuxcnc, "lines begin with /, which this control does not leave out"),
+        (not control.paren and _PAREN.search(text), "it has comments in parentheses"),
+        (program.reading.ignore and not linuxcnc, "words were left out by --ignore"),
+        (without_leader(text)[1], "there is text before the first %"),
+        (not control.number and _NUMBER.search(text), "its lines have numbers"),
+    ):
+        if holds:
+            return why
+    fed = False
+    for row in source.rows:
+        mode = any(
+            codes.G_GROUP[code] == "feed mode" for code in row.g()
+        )  # which takes F back, also G94 after G94
+        fed = (fed and not mode) or row.value("F") is not None
+        if not fed and any(program.kind[k] in FEED_MOVES for k in range(row.first, row.last)):
+            return f"line {row.line}: a feed move without an F word before it, or after G93, G94 or G95"
+        why = _row_why_not(row, source, control)
+        if why:
+            return f"line {row.line}: {why}"
+    return ""
+
+
+def _row_why_not(row: Row, source: Source, control: Control) -> str:
+    if row.text:
+        return "" if is_command(row.text, control) else f"{row.text!r} is no command of this control"
+    for other in row.others:
+        if not _is_known(other, source, control):
+            return f"{''.join(map(str, other))} is not known"
+    for word in row.words:
+        arc = word.code in codes.ARCS and control.name == "marlin"
+        known_code = word.letter not in "GM" or (
+            (word.code in control.g or arc) if word.letter == "G" else word.code // 10 in control.m
+        )
+        if not known_code:
+            return f"{word} is not known"
+        if not control.one_command and word.letter not in "GM" and word.letter not in control.letters:
+            return f"{word}: letter {word.letter} is not known"
+    if G4 in row.g() and _dwells_otherwise(row, source, control):
+        return "the P of G4 lasts otherwise there"
+    if control.one_command:
+        return _line_why_not(row)
+    return _rs274_why_not(row, source) if control.name == LINUXCNC else _grbl_why_not(row, source, control)
+
+
+def _is_known(words: list[Word], source: Source, control: Control) -> bool:
+    """Whether the control knows a code that is none of moves and modes."""
+    name = f"{words[0].letter}{codes.number(words[0].code)}"
+    left_out = control.percent and (name[0] == "%" or name in source.program.reading.ignore)
+    return left_out or is_setting(words, control)
+
+
+def _dwells_otherwise(row: Row, source: Source, control: Control) -> bool:
+    word = row.value("P")
+    lasts = 0.0 if word is None else word.value * (MILLISECOND if control.milliseconds else 1.0)
+    return abs(lasts - source.dwell(row)) > SAME_DWELL
+
+
+def _line_why_not(row: Row) -> str:
+    """What keeps a line from being one command with the words that are its own."""
+    commands = [word for word in row.words if word.letter in "GM"] + [other[0] for other in row.others]
+    if not row.words and len(commands) <= 1:
+        return ""
+    if len(commands) != 1 or row.words[0].letter not in "GM":
+        return "a line holds one command, which comes first"
+    first = row.words[0]
+    own = _OWN.get(f"{first.letter}{codes.number(first.code)}", "")
+    alien = next((word for word in row.words[1:] if word.letter not in own), None)
+    return f"{alien} beside {first}, which does not take it" if alien is not None else ""
+
+
+def _grbl_why_not(row: Row, source: Source, control: Control) -> str:
+    if row.motion in codes.ARCS and not takes_move(row, control, source.program.reading):
+        return "an arc with P, or with absolute centres"
+    if sets_tools(row):
+        return "G10 or G43.1 with more than grbl's"
+    if row.inch != row.inch_before and row.value("F") is not None:
+        return "F beside G20 or G21, which grbl reads in the new units"
+    length = sum(len(word.text) + 1 for word in row.words)
+    return f"longer than {control.line_max} characters" if length > control.line_max else ""
+
+
+def _rs274_why_not(row: Row, source: Source) -> str:
+    """What LinuxCNC's interpreter refuses, and the reader takes."""
+    letters = [word.letter for word in row.words if word.letter not in "GM"]
+    if len(set(letters)) < len(letters) or any("e" in word.text.lower() for word in row.words):
+        return "a letter twice, or a number with an exponent"
+    if row.motion in codes.ARCS:
+        centre = ["IJK"["XYZ".index(axis)] for axis in row.plane]
+        off = any(letter in "IJK" and letter not in centre for letter in letters)
+        if off or source.program.reading.arc_centres == ABSOLUTE:
+            return "an arc with absolute centres, or with one off its plane"
+    if {G10, G92, *HOMES} & set(row.g()) and any(codes.G_GROUP[code] == "motion" for code in row.g()):
+        return "two codes that use the coordinates"
+    own = "".join(codes.WORDS.get((word.letter, word.code), "") for word in row.words if word.letter in "GM")
+    own += codes.WORDS.get(("G", row.motion), "")
+    unused = next((word for word in row.words if word.letter in "DEH" and word.letter not in own), None)
+    return f"{unused} without a code that uses it" if unused is not None else ""
+
+
+def _reads_otherwise(source: Source, text: bytes, machine: Machine) -> bool:
+    """Whether the text is another program in LinuxCNC's own language."""
+    program = source.program
+    reading = dataclasses.replace(program.reading, strict=False, dialect=LINUXCNC, arc_centres=INCREMENTAL)
+    try:
+        again = parse_program(text, machine, reading, source=program.source)
+    except InputError:
+        return True
+    return not (
+        again.axes == program.axes
+        and same_places(again, program)
+        and np.allclose(again.dwell, program.dwell, rtol=0.0, atol=SAME_DWELL)
+        and np.allclose(again.feed, program.feed, rtol=SAME_FEED, atol=0.0)
     )

@@ -3,7 +3,7 @@
 Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own DecompressionStream. Texts
 of the program and of names are data as well, and the page shows them as text, so that nothing in a program is ever run.
 
-The first picture needs none of that: it is in the page as SVG (picture.py), and the header is filled before plotly's script, some five
+The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's script, some five
 megabytes, is run and the columns are unpacked.
 """
 
@@ -15,14 +15,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
-from planner.report.colours import limit_colours
-from planner.report.figure import AGAINST, MotionColumns, profile_panels, three
+from planner.report.colours import CIVIDIS, limit_colours
+from planner.report.figure import (
+    AGAINST,
+    TOOL,
+    MotionColumns,
+    highest_feed,
+    profile_panels,
+    three,
+    tool_lines,
+)
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
-from planner.report.html.picture import path_picture
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
 from planner.report.replace import check_file
 from planner.report.rows import plan_rows
@@ -30,6 +37,7 @@ from planner.report.summary import json_ready, summary
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
+
 
 REPORT = "report.html"
 PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
@@ -122,3 +130,57 @@ def _corners(plan: Plan) -> dict[str, list[Any]]:
         "eq20": found.feed_paper[seen].tolist(),
         "gain": found.gain[seen].tolist(),
     }
+
+
+TOOLS = 120  # places at which the tool is drawn
+POINTS = 3000  # of the motion: several for each pixel of its width
+
+
+def path_picture(plan: Plan, size: float) -> str:
+    """The motion seen along its thinnest direction, coloured by feed, as SVG, with the tool's direction if it is one of the tip. The
+    plan must have a trajectory.
+
+    size : of the longer side [px]
+    """
+    trajectory = plan.trajectory
+    assert trajectory is not None
+    rows = np.unique(np.linspace(0, len(trajectory) - 1, min(POINTS, len(trajectory))).astype(np.int64))
+    shown = trajectory.rows(rows)
+    position = three(shown)
+    across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
+    points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
+    tools = tool_lines(plan, TOOLS)
+    ends = np.zeros((0, 2, 2)) if tools is None else tools[:, :, across] * [1.0, -1.0]
+    everything = np.vstack([points, ends.reshape(-1, 2)])
+    low, extent = everything.min(axis=0), np.ptp(everything, axis=0)
+    scale = size / max(float(extent.max()), 1e-9)
+    points, ends = ((place - low) * scale + 4.0 for place in (points, ends))
+    width, height = extent * scale + 8.0
+    columns = MotionColumns(plan, shown)
+    feed = columns["feed"]
+    highest = highest_feed(feed, columns["programmed"])
+    colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
+    lines = "".join(
+        f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
+    )
+    lines += "".join(
+        f'<polyline points="{_points(points[first : last + 1])}" stroke="{CIVIDIS[colour[first]]}"/>'
+        for first, last in _runs(colour)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+        f'height="{height:.0f}" role="img" '
+        f'aria-label="path coloured by feed" fill="none" stroke-width="1.6" stroke-linecap="round">{lines}</svg>'
+    )
+
+
+def _runs(colour: Array) -> list[tuple[int, int]]:
+    """First and last point of the lines of one colour, each up to the first point of the next."""
+    starts = np.flatnonzero(np.append(True, np.diff(colour) != 0))
+    ends = np.append(starts[1:], len(colour) - 1)
+    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
+
+
+def _points(points: FloatArray) -> str:
+    """Points (n, 2) as SVG writes them."""
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

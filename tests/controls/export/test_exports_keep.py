@@ -17,8 +17,7 @@ from benchmarks.export_judge import OFFSETS, STARTS, alike, interpreted, path, r
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS
-from planner.controls.export.header import FIRST_RUN
-from planner.controls.export.program import write_program
+from planner.controls.export.program import FIRST_RUN, write_program
 from planner.machine import Machine
 from planner.nc.reading import Reading
 from planner.planning.job.plan import Plan

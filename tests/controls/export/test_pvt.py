@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from planner.base.errors import InputError
-from planner.controls.export.pvt import PERIODS_MAX, longest_interval, write_pvt
+from planner.controls.export.stream import PERIODS_MAX, longest_interval, write_pvt
 from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program

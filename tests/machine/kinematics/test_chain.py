@@ -12,7 +12,7 @@ import pytest
 from planner.base.units import RAD_PER_DEG
 from planner.machine.kinematics.chain import Chain
 from planner.machine.kinematics_data import KinematicsData
-from planner.verifier.kinematics import tip_and_direction
+from planner.verifier.joints import tip_and_direction
 from tests.machine.kinematics import linuxcnc
 
 POINT = {"x_rot_point": 12.0, "y_rot_point": -7.0, "z_rot_point": 31.0}

@@ -12,7 +12,7 @@ from planner.machine import Machine
 from planner.machine.kinematics import at_tip, kinematics_of
 from planner.motion.chain_setpoints import joint_setpoints
 from planner.planning.job.plan import Plan
-from planner.verifier.kinematics import tip_and_direction
+from planner.verifier.joints import tip_and_direction
 from tests.machine.kinematics.five_axis import table_machine, tip_program
 
 FAST = 1e4  # a feed that holds nothing [mm/s]

@@ -8,7 +8,7 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.machine.kinematics import at_tip, kinematics_of
-from planner.report.interactive.tip_path import tip_path
+from planner.report.interactive.points import tip_path
 from tests.machine.kinematics.five_axis import table_machine
 
 MACHINE = table_machine(tool_length=60.0)

@@ -64,7 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     compare.set_defaults(do=_compare)
     listed = commands.add_parser("list", help="suites, ways and the other scripts, with what each is for")
     listed.set_defaults(do=_list)
-    commands.add_parser("campaign", help="random jobs, judged twice (benchmarks/campaign.py)")
+    commands.add_parser("campaign", help="random jobs, judged twice (benchmarks/campaign)")
     return parser
 
 

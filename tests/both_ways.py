@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.machine import Axis, Fir, Machine
 from planner.nc.program import Program
 from planner.report.export import write_plan

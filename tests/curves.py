@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine

@@ -1,4 +1,4 @@
-"""A few inputs of each kind of benchmarks/fuzz.py; what it counts, keeps and takes up again; and what it sees in a page."""
+"""A few inputs of each kind of benchmarks/fuzz; what it counts, keeps and takes up again; and what it sees in a page."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import fuzz, fuzz_tally
+from benchmarks.fuzz import __main__ as fuzz
 from benchmarks.fuzz import new_input, outcome, run
-from benchmarks.fuzz_corpus import Corpus, Input, write_input
-from benchmarks.fuzz_coverage import Tracer, count_lines
-from benchmarks.fuzz_kinds import KINDS
-from benchmarks.fuzz_pages import MARKER, Page, check_page
-from benchmarks.fuzz_run import Finding, Kind, Place, command
+from benchmarks.fuzz import tally as fuzz_tally
+from benchmarks.fuzz.corpus import Corpus, Input, write_input
+from benchmarks.fuzz.coverage import Tracer, count_lines
+from benchmarks.fuzz.kinds import KINDS
+from benchmarks.fuzz.pages import MARKER, Page, check_page
+from benchmarks.fuzz.run import Finding, Kind, Place, command
 
 INPUTS = 5
 TRACED = """X = 1
@@ -78,7 +79,7 @@ def letters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> argparse.Namespa
     monkeypatch.setitem(KINDS, "letters", a_kind(tmp_path / "letters_by_test.py"))
     monkeypatch.setattr(fuzz_tally, "RESULTS", tmp_path)
     monkeypatch.setattr("benchmarks.record.RESULTS", tmp_path)
-    monkeypatch.setattr("benchmarks.fuzz_corpus.ROOT", tmp_path)
+    monkeypatch.setattr("benchmarks.fuzz.corpus.ROOT", tmp_path)
     yield argparse.Namespace(minutes=10.0, corpus=tmp_path / "corpus")
     sys.modules.pop("letters_by_test")
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.growth import fitted_slope
+from benchmarks.cost.growth import fitted_slope
 from benchmarks.runner.rows import MODEL, SKIPPED, Row
 
 REFERENCE = "optimal"

@@ -30,8 +30,11 @@ class Script:
 
 
 def scripts(folder: Path = HERE) -> list[Script]:
-    """All modules of the folder but the packages' own."""
-    return [_script(file) for file in sorted(folder.glob("*.py")) if not file.stem.startswith("__")]
+    """All modules of the folder's families."""
+    files = sorted(file for file in folder.glob("*/*.py") if file.parent.name != "runner")
+    return [
+        _script(file) for file in files if file.stem != "__init__" or "def main" in file.read_text("utf-8")
+    ]
 
 
 def _script(file: Path) -> Script:
@@ -43,7 +46,7 @@ def _script(file: Path) -> Script:
     default = re.findall(r"\"--name\", default=\"([A-Za-z0-9_-]+)\"", text)
     names = dict.fromkeys(default or [*written, *named])
     return Script(
-        name=file.stem,
+        name=file.parent.name + ("" if file.stem.startswith("__") else f".{file.stem}"),
         says=first,
         results=tuple(f"{name}.md" for name in names),
         runs='if __name__ == "__main__"' in text,
@@ -65,10 +68,10 @@ def listed() -> str:
     found = scripts()
     lines += ["", "Other scripts (python -m benchmarks.NAME):"]
     lines += [
-        f"  {one.name:18} {one.says}" + (f" -> {', '.join(one.results)}" if one.results else "")
+        f"  {one.name:24} {one.says}" + (f" -> {', '.join(one.results)}" if one.results else "")
         for one in found
         if one.runs
     ]
     lines += ["", "Imported by the others:"]
-    lines += [f"  {one.name:18} {one.says}" for one in found if not one.runs]
+    lines += [f"  {one.name:24} {one.says}" for one in found if not one.runs]
     return "\n".join(lines)

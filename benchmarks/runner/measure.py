@@ -20,7 +20,7 @@ from types import FrameType
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from benchmarks.runner import nasty
 from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from benchmarks.runner.rows import (

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.machine import Machine
 from planner.nc.program import Program
 

@@ -61,7 +61,7 @@ def along_splines(solver: str) -> Callable[[Program, Machine, float | None], Pla
 
 
 def _copp(*, linear: bool) -> ThirdOrderSolver:
-    from benchmarks import copp_solver
+    from benchmarks.solvers import copp_solver
 
     if copp_solver.copp() is None:
         raise NotHere("copp-py is not installed (pip install '.[bench]')")

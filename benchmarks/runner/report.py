@@ -102,7 +102,8 @@ def report_of(name: str, results: Results, pictures: Iterable[Path] = ()) -> str
     parts += ["## Processor time [s]", CPU_NOTE, _cpu_times(jobs, ways)]
     if reasons := _reasons(rows):
         parts += ["## Without a passing motion", reasons]
-    parts += [f"![{picture.stem}]({picture.name})" for picture in pictures]
+    if pictures:  # beside this file, but not in the repository: the same command makes them
+        parts.append(f"Pictures, by `python -m benchmarks report`: {', '.join(one.name for one in pictures)}.")
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 

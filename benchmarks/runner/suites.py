@@ -1,6 +1,6 @@
 """Suites: sets of jobs as data. Jobs are made by the generators of `benchmarks`, and only when they are planned.
 
-The machine is that of problems.py where nothing else is said: 100 mm/s, 2000 mm/s2 and 2e5 mm/s3 on every axis, 0.05 mm, 1 ms.
+The machine is that of jobs/problems.py where nothing else is said: 100 mm/s, 2000 mm/s2 and 2e5 mm/s3 on every axis, 0.05 mm, 1 ms.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import axes_campaign, five_axis, growth, long_jobs, planned_ngc, problems, random_lines
-from benchmarks.random_paths import COPP_LIMITS, CURVES, copp_spline
+from benchmarks.campaign import axes as axes_campaign
+from benchmarks.controls import planned_ngc
+from benchmarks.cost import growth, long_jobs
+from benchmarks.jobs import five_axis, problems, random_lines
 from benchmarks.runner import grids, nasty
+from benchmarks.solvers.random_paths import COPP_LIMITS, CURVES, copp_spline
 from planner.base.names import METHODS
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine, load_machine
@@ -183,7 +186,7 @@ def relief() -> list[Job]:
 
 
 def axes7() -> list[Job]:
-    """The random jobs of axes_campaign.py that have seven axes, and the splines of copp's own tests as 1,000 lines."""
+    """The random jobs of campaign/axes.py that have seven axes, and the splines of copp's own tests as 1,000 lines."""
     seeds = [seed for seed in range(200) if len(axes_campaign.job(seed)[1].axes) == AXES][:AXES_JOBS]
     return [
         Job(
@@ -222,7 +225,7 @@ def copp_machine() -> Machine:
 
 
 def five_axes() -> list[Job]:
-    """The S-shaped test piece of five_axis.py, judged at the tip with the limits of all joints."""
+    """The S-shaped test piece of jobs/five_axis.py, judged at the tip with the limits of all joints."""
     return [
         Job(
             name=f"S piece of {points}",
@@ -239,7 +242,7 @@ def _s_piece(points: int, machine: Machine) -> Program:
 
 
 def random() -> list[Job]:
-    """The first random jobs of random_lines.py, each on a machine of its own."""
+    """The first random jobs of jobs/random_lines.py, each on a machine of its own."""
     return [
         Job(
             name=f"seed {seed}",

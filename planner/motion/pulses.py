@@ -11,7 +11,7 @@ position and is never added up. The numbers of pulses per period are n_k = c_k -
 between two counts from sending pulses up and down.
 
 The paper floors the long axis' pulses, n'_x = floor(T V_x), and carries the short axis' remainder as a time (eq. (10)-(12)): the first
-loses up to a pulse per period, the second drifts when the speed changes (benchmarks/pulse_variants.py).
+loses up to a pulse per period, the second drifts when the speed changes (benchmarks/solvers/pulse_variants.py).
 """
 
 from __future__ import annotations

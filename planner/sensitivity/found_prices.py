@@ -31,7 +31,7 @@ from planner.sensitivity.records import PlacePrices, PriceList
 from planner.sensitivity.savings import more_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
-# By how much a plan made again is faster or slower for no other reason [share of the time] (benchmarks/found_prices.py).
+# By how much a plan made again is faster or slower for no other reason [share of the time] (benchmarks/solvers/found_prices.py).
 UNREST = 2e-4
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
 TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5

@@ -38,7 +38,7 @@ POWER = {
     **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
     **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},
 }
-WITHIN = 0.1  # how far a change foretold to 10 % more of a limit may be off [-] (benchmarks/found_prices.py)
+WITHIN = 0.1  # how far a change foretold to 10 % more of a limit may be off [-] (benchmarks/solvers/found_prices.py)
 ROUNDING = 1e-9  # of sums over steps [-]
 # How far a saving may be off and still be told as a number [-, share of the time].
 HINT, HINT_LEAST = 0.15, 1e-4

@@ -65,9 +65,11 @@ def test_ages_are_counted_in_commits_to_the_planner() -> None:
 
 def test_first_lines_are_read() -> None:
     found = made_of(
-        "Made by `python -m benchmarks.solver_sizes` at fa4f8f9, written on 2026-11-22T10:46:54+00:00 (x86_64)"
+        "Made by `python -m benchmarks.solvers.solver_sizes` at fa4f8f9, written on 2026-11-22T10:46:54+00:00 (x86_64)"
     )
-    assert found == Made(by="`python -m benchmarks.solver_sizes`", commit="fa4f8f9", date="2026-11-22")
+    assert found == Made(
+        by="`python -m benchmarks.solvers.solver_sizes`", commit="fa4f8f9", date="2026-11-22"
+    )
     assert made_of("# A title") is None
 
 

@@ -14,12 +14,12 @@ from campaign_program import MACHINE, TEXT
 
 from benchmarks.__main__ import main
 from benchmarks.campaign import SUMMARY, kept_rows
-from benchmarks.campaign_course import course
-from benchmarks.campaign_jobs import fingerprint, job, job_from
-from benchmarks.campaign_judge import Motion, faults, filtered
-from benchmarks.campaign_rows import blocks_of, motion_of, outcome, row_of
-from benchmarks.campaign_table import BEGIN, END, PAGE, paragraph, with_paragraph
-from benchmarks.campaign_tally import LEAST, Tally, wrongs
+from benchmarks.campaign.course import course
+from benchmarks.campaign.jobs import fingerprint, job, job_from
+from benchmarks.campaign.judge import Motion, faults, filtered
+from benchmarks.campaign.rows import blocks_of, motion_of, outcome, row_of
+from benchmarks.campaign.table import BEGIN, END, PAGE, paragraph, with_paragraph
+from benchmarks.campaign.tally import LEAST, Tally, wrongs
 from benchmarks.record import planner_state
 from planner.nc.reader import parse_program
 from planner.planning.job.plan import Plan

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from campaign_program import MACHINE, TEXT
 
-from benchmarks.campaign_course import course
-from benchmarks.campaign_judge import matched
-from benchmarks.campaign_laws import (
+from benchmarks.campaign.course import course
+from benchmarks.campaign.judge import matched
+from benchmarks.campaign.laws import (
     ALLOWED,
     broken,
     changed,
@@ -20,7 +20,7 @@ from benchmarks.campaign_laws import (
     scaled_machine,
     split,
 )
-from benchmarks.campaign_rows import blocks_of
+from benchmarks.campaign.rows import blocks_of
 from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.planning.methods.registry import plan

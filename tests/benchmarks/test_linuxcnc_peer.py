@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from benchmarks.runner import linuxcnc
 from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from benchmarks.runner.measure import outcome

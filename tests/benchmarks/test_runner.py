@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import problems
 from benchmarks.__main__ import main
+from benchmarks.jobs import problems
 from benchmarks.runner.judged import NotApplicable, NotHere
 from benchmarks.runner.measure import Calibration, Protocol, measured, outcome
 from benchmarks.runner.rows import ERROR, NOT_APPLICABLE, OVER_LIMIT, SKIPPED, SOLVED, Row, read

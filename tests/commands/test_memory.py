@@ -1,4 +1,4 @@
-"""Too little memory is told as that, whatever library notices it (found by benchmarks/faults.py)."""
+"""Too little memory is told as that, whatever library notices it (found by benchmarks/faults)."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_command_that_runs_out_of_memory_is_no_bug(tmp_path: Path, monkeypatch
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space")
 @pytest.mark.parametrize("megabytes", [60, 64, 140, 200])
 def test_libraries_that_do_not_fit_are_no_traceback(megabytes: int, tmp_path: Path) -> None:
-    """Found by benchmarks/faults.py: what planner imports may already be too large."""
+    """Found by benchmarks/faults: what planner imports may already be too large."""
     (tmp_path / "job.ngc").write_text("G1 X1 F600\n")
     code = (
         "import resource\n"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from whole_plans import smooth_path, solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.allocation import (
     allocate,
     error_rate,

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from whole_plans import evaluate_corner, smooth_path
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner

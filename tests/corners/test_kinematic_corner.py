@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from whole_plans import evaluate_corner, smooth_path
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.corners import kinematic
 from planner.corners.bezier import BezierCorner

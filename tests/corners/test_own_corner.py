@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from whole_plans import evaluate_corner
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.corners.blend import error_from_middle
 from planner.corners.own import PolynomialCorner

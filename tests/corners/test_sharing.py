@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from whole_plans import smooth_path
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.sharing import share_legs

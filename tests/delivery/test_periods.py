@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from quick import slow_but
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.delivery import mending, periods
 from planner.delivery.periods import ABOVE, USED, missed, with_less_tolerance
 from planner.geometry.build import toolpath_from_program

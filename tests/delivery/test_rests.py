@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.setpoints import trajectory_of
+from benchmarks.judge.setpoints import trajectory_of
 from planner.base.arrays import FloatArray
 from planner.delivery.rests import HALVINGS, STEPS, Mean, mean_of_copies, mean_of_filters
 from planner.machine import Mode

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.jerk_campaign import faults
-from benchmarks.random_paths import long_path
+from benchmarks.solvers.jerk_campaign import faults
+from benchmarks.solvers.random_paths import long_path
 from planner.base.threads import use_threads
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import held, solver

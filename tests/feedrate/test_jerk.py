@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from random_problems import in_units, make_problem
 
-from benchmarks import problems
-from benchmarks.jerk_campaign import small_problem
-from benchmarks.random_paths import random_path
+from benchmarks.jobs import problems
+from benchmarks.solvers.jerk_campaign import small_problem
+from benchmarks.solvers.random_paths import random_path
 from planner.base.point_to_point import rest_to_rest_times
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners

@@ -1,10 +1,10 @@
-"""The first problems of the campaign (benchmarks/jerk_campaign.py): every one is solved, and every answer holds."""
+"""The first problems of the campaign (benchmarks/solvers/jerk_campaign.py): every one is solved, and every answer holds."""
 
 from __future__ import annotations
 
 import pytest
 
-from benchmarks.jerk_campaign import faults, small_problem
+from benchmarks.solvers.jerk_campaign import faults, small_problem
 from planner.feedrate.jerk.solver import JerkLimited
 
 

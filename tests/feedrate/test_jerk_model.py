@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.random_paths import random_path
+from benchmarks.solvers.random_paths import random_path
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import (
     BY_P,

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.jerk_campaign import faults, small_problem
-from benchmarks.random_paths import long_path, random_path
+from benchmarks.solvers.jerk_campaign import faults, small_problem
+from benchmarks.solvers.random_paths import long_path, random_path
 from planner.base.threads import use_threads
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk import part, solver

@@ -9,7 +9,7 @@ import pytest
 from oracles import needs_toppra
 from random_problems import random_problem
 
-from benchmarks.jerk_campaign import small_problem
+from benchmarks.solvers.jerk_campaign import small_problem
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.lagrangian import lagrangian

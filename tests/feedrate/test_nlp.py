@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from whole_plans import smooth_path
 
-from benchmarks import problems
-from benchmarks.jerk_campaign import small_problem
+from benchmarks.jobs import problems
+from benchmarks.solvers.jerk_campaign import small_problem
 from planner.base.point_to_point import rest_to_rest_times
 from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.constraints.problem import FeedrateProblem

@@ -13,7 +13,7 @@ from random_problems import circle, in_units, line, make_problem, random_problem
 from scipy.optimize import linprog
 from whole_plans import solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.problem import FeedrateProblem

@@ -10,7 +10,7 @@ import pytest
 from random_problems import in_units, line, reversed_problem
 from scipy.integrate import quad
 
-from benchmarks.random_paths import nurbs, random_path
+from benchmarks.solvers.random_paths import nurbs, random_path
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reference.near_rest import NEAR

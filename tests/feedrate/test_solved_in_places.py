@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.jerk_campaign import faults
-from benchmarks.random_paths import long_path
+from benchmarks.solvers.jerk_campaign import faults
+from benchmarks.solvers.random_paths import long_path
 from planner.base.threads import use_threads
 from planner.feedrate.jerk import solver
 from planner.feedrate.jerk.again import ranges_of

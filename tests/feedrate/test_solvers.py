@@ -10,8 +10,8 @@ from quick import slow_but
 from random_problems import in_units
 from whole_plans import smooth_path
 
-from benchmarks import problems
-from benchmarks.random_paths import random_path
+from benchmarks.jobs import problems
+from benchmarks.solvers.random_paths import random_path
 from planner import plan
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError

@@ -11,7 +11,7 @@ from quick import slow_but
 from random_problems import circle, line, random_problem
 from whole_plans import solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability, controllable_sets
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios

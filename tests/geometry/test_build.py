@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.geometry.build import COORDINATE_MAX, REVERSAL_ANGLE, toolpath_from_program, turning_angle
 from planner.geometry.legs import leg_point, leg_tangent, legs_of

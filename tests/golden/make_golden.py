@@ -13,7 +13,7 @@ sys.path.insert(0, str(HERE.parent))
 import numpy as np  # noqa: E402
 from whole_plans import CORNERS, solve  # noqa: E402
 
-from benchmarks import problems  # noqa: E402
+from benchmarks.jobs import problems  # noqa: E402
 
 
 def results() -> dict[str, Any]:

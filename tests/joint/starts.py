@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.run import TubeRun, tube_runs_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rest_motion import along_x
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.joint import stages

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from starts import MACHINE, PROGRAMS, begun
 
-from benchmarks import problems, random_lines, tube_solvers
+from benchmarks.jobs import problems, random_lines
+from benchmarks.solvers import tube_solvers
 from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
 from planner.joint import own, rows

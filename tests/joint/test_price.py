@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.joint import price
 from planner.joint.guess import Guess, guess_from

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from starts import begun
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.joint.guess import Cut
 from planner.joint.motion import CLOSED_EVERY, closed_at_nodes, integrated
 from planner.joint.outcome import TubeSolution

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.joint import run as run_module
 from planner.joint.checks import bend_of

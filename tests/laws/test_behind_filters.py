@@ -11,7 +11,7 @@ import pytest
 from quick import slow_but
 from scipy.spatial import cKDTree
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.delivery import mending
 from planner.machine import Fir
 from planner.nc.reader import parse_program

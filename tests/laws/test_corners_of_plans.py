@@ -9,7 +9,7 @@ import pytest
 from quick import slow_but
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.delivery import mending
 from planner.feedrate.constraints import chord_error, normal_limit
 from planner.machine import Machine

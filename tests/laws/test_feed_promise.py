@@ -1,6 +1,7 @@
 """A feed word is a promise: no block is left sooner than its length at its F takes, by every method, whatever the tolerance.
 
-The check shares nothing with the verifier (benchmarks/passages.py); on a straight line the sum of L/F bounds the time from below too.
+The check shares nothing with the verifier (benchmarks/judge/passages.py); on a straight line the sum of L/F bounds the time from
+below too.
 """
 
 import re
@@ -10,8 +11,8 @@ import pytest
 from quick import slow_but
 
 import planner
-from benchmarks.feed_promise import KEPT, METHODS, case, outcome, row
-from benchmarks.passages import Motion, saved
+from benchmarks.judge.feed_promise import KEPT, METHODS, case, outcome, row
+from benchmarks.judge.passages import Motion, saved
 from planner.machine import Axis, load_machine
 
 

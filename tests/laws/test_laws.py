@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from quick import slow_but
 from whole_plans import CORNERS, Solved, solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.geometry.build import turning_angle
 from planner.machine import Axis, Machine

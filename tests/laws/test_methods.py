@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from quick import slow_but
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.machine import Axis, Machine
 from planner.nc.program import Program
 from planner.planning.methods.registry import METHODS, plan

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from quick import slow_but
 
-from benchmarks import problems
-from benchmarks.one_meaning import agrees, row
-from benchmarks.setpoints import averaged, within
+from benchmarks.jobs import problems
+from benchmarks.judge.one_meaning import agrees, row
+from benchmarks.judge.setpoints import averaged, within
 from planner.machine import Fir
 from planner.nc.reader import parse_program
 from planner.planning.methods.registry import plan

@@ -165,7 +165,7 @@ def test_linuxcncs_own_configurations_say_the_same(name: str, file: str) -> None
     ],
 )
 def test_numbers_that_no_machine_has(key: str, value: float, said: str) -> None:
-    """Found by benchmarks/fuzz.py: their powers are no numbers, and ended as a bug."""
+    """Found by benchmarks/fuzz: their powers are no numbers, and ended as a bug."""
     axis = {"velocity": 1.0, "acceleration": 1.0, "jerk": 1.0}
     of_x = {name: value if name == key else each for name, each in axis.items()}
     top = {"dt": 0.001, "tolerance": 0.01} | ({key: value} if key in ("dt", "tolerance") else {})

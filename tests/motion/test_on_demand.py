@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base import threads
 from planner.base.sizes import USUAL
 from planner.motion import on_demand, timing

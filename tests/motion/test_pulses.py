@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pyarrow import csv, parquet
 from typer.testing import CliRunner
 
-from benchmarks import problems
-from benchmarks.pulse_variants import SLOPES, VARIANTS, deviations, speeds
+from benchmarks.jobs import problems
+from benchmarks.solvers.pulse_variants import SLOPES, VARIANTS, deviations, speeds
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.cli import app

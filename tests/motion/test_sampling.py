@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from whole_plans import smooth_path
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.elements import ElementTable, element_length, element_point
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import sample_path

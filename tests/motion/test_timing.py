@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from oracles import needs_ruckig
 from whole_plans import CORNERS, Solved, smooth_path, solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program

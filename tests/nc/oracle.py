@@ -1,8 +1,8 @@
 """LinuxCNC's own interpreter as an oracle: asked where it is installed, and its recorded answers to programs of the project everywhere.
 
-`benchmarks/linuxcnc_canon.py` asks it, in a process of its own. Its answers to random programs of the project are kept, with their
-texts, in `linuxcnc_answers.json.gz`; `python -m benchmarks.linuxcnc_answers` makes that file, and test_random_agreement.py checks that
-it is current where LinuxCNC is there. Numbers are kept to DIGITS digits.
+`benchmarks/controls/linuxcnc_canon.py` asks it, in a process of its own. Its answers to random programs of the project are kept,
+with their texts, in `linuxcnc_answers.json.gz`; `python -m benchmarks.controls.linuxcnc_answers` makes that file, and
+test_random_agreement.py checks that it is current where LinuxCNC is there. Numbers are kept to DIGITS digits.
 """
 
 from __future__ import annotations

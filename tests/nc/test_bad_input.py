@@ -199,7 +199,7 @@ def test_files_that_cannot_be_read(read, tmp_path: Path) -> None:
         read(binary)
 
 
-# Found by benchmarks/fuzz.py, the first one in a file of 408 bytes: each took 5 to 50 s, and twice as long for one more.
+# Found by benchmarks/fuzz, the first one in a file of 408 bytes: each took 5 to 50 s, and twice as long for one more.
 @pytest.mark.parametrize(
     "data",
     [

@@ -1,4 +1,4 @@
-"""Mutated programs of every dialect end in a program or in a message (benchmarks/fuzz.py reads many more of them)."""
+"""Mutated programs of every dialect end in a program or in a message (benchmarks/fuzz reads many more of them)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.fuzz_programs import a_machine, a_reading, load_programs, mutant, outcome
+from benchmarks.fuzz.programs import a_machine, a_reading, load_programs, mutant, outcome
 
 COUNT = 400
 

@@ -18,12 +18,12 @@ from random_splines import random_splines
 from random_together import together
 from test_agreement import MACHINE, assert_same_motion, offsets_in_inches, random_program
 
-from benchmarks import linuxcnc_answers
+from benchmarks.controls import linuxcnc_answers
 from planner.base.errors import InputError
 from planner.nc.reader import parse_program
 
 KINDS = {**OF_ONE_KIND, "moves": random_program, "splines": random_splines, "together": together}
-COUNT = 60  # of each kind; benchmarks/random_programs.py reads thousands
+COUNT = 60  # of each kind; benchmarks/reading/random_programs.py reads thousands
 EARLY = 0.02  # share of programs that only LinuxCNC refuses for an arc that begins early, at most: 1 of 650 was seen
 GOUGES = 0.04  # share of programs that only the reader refuses, at most: 23 of 1500 were seen
 
@@ -98,7 +98,7 @@ def test_random_programs_of_a_kind_agree(kind: str, tmp_path: Path) -> None:
 
 @needs_oracle
 def test_the_recorded_answers_are_current(tmp_path: Path) -> None:
-    """They are LinuxCNC's to these programs (python -m benchmarks.linuxcnc_answers makes them)."""
+    """They are LinuxCNC's to these programs (python -m benchmarks.controls.linuxcnc_answers makes them)."""
     programs = linuxcnc_answers.programs()
     assert list(programs) == list(recorded())
     for kind, (texts, setup) in programs.items():

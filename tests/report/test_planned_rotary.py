@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import nc_programs
+from benchmarks.reading import nc_programs
 from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.nc.writer import retimed

@@ -162,7 +162,7 @@ def test_a_damaged_archive_is_closed_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("at", "damage", "said"),
     [
-        (6, b"\xcf", "zip file version 20.7"),  # found by benchmarks/fuzz.py: a bug
+        (6, b"\xcf", "zip file version 20.7"),  # found by benchmarks/fuzz: a bug
         (8, b"\x01", "encrypted"),
         (10, b"\x63", "compression"),
     ],

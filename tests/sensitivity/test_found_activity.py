@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.nc.reader import parse_program
 from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.commands.study.settings import Setting
 from planner.commands.study.what_if import forecast
 from planner.feedrate.solution import Status

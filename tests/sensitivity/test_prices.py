@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.assemble import feedrate_problem

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
-from benchmarks.prices import compared
+from benchmarks.jobs import problems
+from benchmarks.solvers.prices import compared
 from planner import JointLimit, PathLimit
 from planner.machine.user_limit import Place, ScaledLimit
 from planner.nc.reader import parse_program

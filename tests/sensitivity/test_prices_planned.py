@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
-from benchmarks.prices import compared, with_more
+from benchmarks.jobs import problems
+from benchmarks.solvers.prices import compared, with_more
 from planner.nc.reader import parse_program
 from planner.sensitivity import savings
 from planner.sensitivity.path_prices import UNREST, WORTH, path_prices

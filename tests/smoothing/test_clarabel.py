@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from test_corridor_problem import objective, random_corridor
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.base.threads import use_threads
 from planner.nc.program import Program

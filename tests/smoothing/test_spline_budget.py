@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.budget import error_rate
 from planner.corners.smooth import round_corners

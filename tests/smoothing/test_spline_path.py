@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_polylines import random_polyline
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program

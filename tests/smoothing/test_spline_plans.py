@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_polylines import random_polyline
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.nc.reader import parse_program
 from planner.planning.methods.optimal import OptimalMethod
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.threads import use_threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners

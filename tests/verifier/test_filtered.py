@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from benchmarks import problems
-from benchmarks.setpoints import behind, between, trajectory_of
+from benchmarks.jobs import problems
+from benchmarks.judge.setpoints import behind, between, trajectory_of
 from planner.delivery import filtered_setpoints
 from planner.delivery.filtered_setpoints import FilteredSetpoints
 from planner.machine import Fir

@@ -7,7 +7,7 @@ import pytest
 from judging import M, fault, judge
 from motions import along, rest_to_rest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.run_in import run_in
 from planner.machine import Fir, Mode

@@ -13,7 +13,7 @@ from judging import judge
 from motions import Moves, along, chain, helix, rest_to_rest, straight
 from motions import machine as machine_with
 
-from benchmarks.setpoints import trajectory_of
+from benchmarks.judge.setpoints import trajectory_of
 from planner import JointLimit, PathLimit
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners

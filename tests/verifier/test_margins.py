@@ -12,7 +12,7 @@ import pytest
 from judging import M
 from motions import Moves, chain, machine, polyline, sample, stay
 
-from benchmarks.setpoints import trajectory_of
+from benchmarks.judge.setpoints import trajectory_of
 from planner.nc.program import PathControl
 from planner.verifier import Given, verify
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.machine import Mode
 from planner.motion.filters import residual_vibration
 from planner.motion.trajectory import Trajectory
@@ -109,7 +109,7 @@ def test_modes_that_turn_often_in_a_period_are_bounded(damping):
 
 
 def test_a_mode_of_gigahertz_takes_no_time():
-    """Found by benchmarks/fuzz.py, in settings of Klipper: a second's motion was shaken for minutes."""
+    """Found by benchmarks/fuzz, in settings of Klipper: a second's motion was shaken for minutes."""
     began = time.process_time()
     (ringing,) = ringing_of(motion(0.001), machine(Mode(frequency=3.6e9, damping=0.1)))
     assert np.isfinite(ringing.during).all()

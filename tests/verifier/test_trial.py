@@ -1,10 +1,11 @@
-"""The trial of benchmarks/verifier_trial.py, on one plan: every kind of fault is proved and found, every correct motion passes."""
+"""The trial of benchmarks/judge/verifier_trial.py, on one plan: every kind of fault is proved and found, every correct motion
+passes."""
 
 import pytest
 
-from benchmarks.foreign import PROGRAMS
-from benchmarks.mutations import KINDS
-from benchmarks.verifier_trial import correct_of, faults_of
+from benchmarks.judge.foreign import PROGRAMS
+from benchmarks.judge.mutations import KINDS
+from benchmarks.judge.verifier_trial import correct_of, faults_of
 
 
 @pytest.mark.slow

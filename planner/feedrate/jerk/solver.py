@@ -25,7 +25,7 @@ many cores as planner/base/threads.py says; the kernels let go of Python's lock.
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
 at rest; else, or where even that fails, the profile stops: at the end of the window before, if the motion comes from there, or after
 the plain start, which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
-Of 16,390 windows of small problems (benchmarks/jerk_campaign.py) 19 converged from the plain start only, and 7 from none.
+Of 16,390 windows of small problems (benchmarks/solvers/jerk_campaign.py) 19 converged from the plain start only, and 7 from none.
 
 **Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece down by lam >= 1
 divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics exact; with the smallest lam that

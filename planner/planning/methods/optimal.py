@@ -3,13 +3,13 @@ geometry and feed together, without a path parameter (free.py).
 
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 
-The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no round
-has reshaped, with a motion that need not be fit for delivery (at_once.py). Runs of which it leaves something, or the job where that is
-most of it, are planned again: it begins on the plan of the first splines; where it leaves much of that, or the path of a small job
-doubles back within the tolerance, the splines are reshaped and it begins there once more; the fastest plan is taken, and that of effort
-"quick" where no other is faster. With a limit of the normal acceleration it goes on with reshaped splines at once:
-from a plan on the first ones it ended up to 1e-2 slower than these without it (`benchmarks.joint_campaign --hard`). Rounds of reshaping
-alone end up to 5e-2 slower (docs/joint.md).
+The search for geometry and feed together ends where it ends from any start nearby, so it begins on the first splines, which no
+round has reshaped, with a motion that need not be fit for delivery (at_once.py). Runs of which it leaves something, or the job
+where that is most of it, are planned again: it begins on the plan of the first splines; where it leaves much of that, or the path
+of a small job doubles back within the tolerance, the splines are reshaped and it begins there once more; the fastest plan is taken,
+and that of effort "quick" where no other is faster. With a limit of the normal acceleration it goes on with reshaped splines at
+once: from a plan on the first ones it ended up to 1e-2 slower than these without it (`benchmarks.solvers.joint_campaign --hard`).
+Rounds of reshaping alone end up to 5e-2 slower (docs/joint.md).
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ RIVAL_POINTS = SIZES.rivals_planned
 RIVAL_ESTIMATE = 3 * RIVAL_POINTS  # by the closed form, which may say three times as many (tested)
 FIR = "fir"  # the shape that is compared: "auto" has planned Bezier corners itself
 # On a grid of so many times the usual resolution a jerk-limited motion takes up to 1.009 times as long as on the usual one (60 shapes
-# on random jobs of benchmarks/random_lines.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
+# on random jobs of benchmarks/jobs/random_lines.py): one that takes more than `CHANCE` times the best there is not the fastest [-].
 COARSER, CHANCE = 25.0, 1.03
 # A rival that is faster by less is taken for the same motion without the grid's error: what holds it and what limits cost is what the
 # plan says of itself [-].

@@ -36,7 +36,7 @@ What is tried more than once:
 Inside a solve, windows of the interior-point method have retries of their own (feedrate/jerk/solver.py); inside a shape, sites whose
 certificate fails are tightened (smoothing/relax.py; in a round of reshaping smoothing/combined.py, twice at most). Around the loop, a
 job is planned again with less tolerance where chords between samples leave it, and with shares of the tolerance on machines with
-filters (planning/job/method.py). How often these fire, and what plans lose without them, `python -m benchmarks.ablation` shows.
+filters (planning/job/method.py). How often these fire, and what plans lose without them, `python -m benchmarks.net.ablation` shows.
 """
 
 from __future__ import annotations

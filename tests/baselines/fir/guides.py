@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.baselines.fir.leg_guide import LegGuide, guide_of_legs
 from planner.baselines.fir.schedule import Schedule

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from guides import distance_to_polyline, guide_through, machine_of
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import guide_of_path
 from planner.baselines.fir.chord_speeds import promised
 from planner.baselines.fir.columns import per_leg

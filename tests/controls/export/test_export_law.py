@@ -1,5 +1,5 @@
 """The law of exports: wherever the machine stands and whatever its work offsets are, an exported program passes the places that its
-program passes, in order, within the tolerance; `python -m benchmarks.exports` tries thousands of programs."""
+program passes, in order, within the tolerance; `python -m benchmarks.controls.exports` tries thousands of programs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks.export_judge import OFFSETS, STARTS, alike, filament, path, readable, unknown_words
-from benchmarks.export_programs import AXIS, TOLERANCE, machine, random_print, random_program
-from benchmarks.export_rows import judged, of_file
+from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, filament, path, readable, unknown_words
+from benchmarks.controls.export_programs import AXIS, TOLERANCE, machine, random_print, random_program
+from benchmarks.controls.export_rows import judged, of_file
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS, OPTIONS
@@ -229,8 +229,8 @@ def test_random_programs_hold_what_exports_may_lose() -> None:
 
 @pytest.mark.slow
 def test_real_programs(shared_dir: Path) -> None:
-    """The smallest ones; `benchmarks.exports --programs` has all. What is written reads back on the same places; what is not is refused
-    by its line."""
+    """The smallest ones; `benchmarks.controls.exports --programs` has all. What is written reads back on the same places; what is
+    not is refused by its line."""
     mill = load_machine("mill")
     files = [
         file

@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks.export_judge import OFFSETS, STARTS, alike, interpreted, path, readable, unknown_words
+from benchmarks.controls.export_judge import (
+    OFFSETS,
+    STARTS,
+    alike,
+    interpreted,
+    path,
+    readable,
+    unknown_words,
+)
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_table
 from planner.corners.smooth import round_corners

@@ -11,7 +11,7 @@ from quick import slow_but
 from scipy.special import ellipe, ellipk
 from whole_plans import CORNERS, Solved, smooth_path, solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.corners.bezier import BezierCorner

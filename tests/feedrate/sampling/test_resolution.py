@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from whole_plans import smooth_path, solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.corners.kinematic import KinematicCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import RESOLUTION, sample_path

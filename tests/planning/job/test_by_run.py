@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import points_on
 from planner.geometry.toolpath import Joint

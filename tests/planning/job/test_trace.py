@@ -10,7 +10,7 @@ import pytest
 from hand_made import SQUARE
 from typer.testing import CliRunner
 
-from benchmarks.random_lines import job
+from benchmarks.jobs.random_lines import job
 from planner.cli import app
 from planner.planning.job.trace import Step, Trace
 from planner.planning.methods.optimal import OptimalMethod

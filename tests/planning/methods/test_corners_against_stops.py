@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.machine import Machine
 from planner.machine.parts import Fir
 from planner.nc.program import Program

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.nc.reader import parse_program
 from planner.planning.methods import at_once, from_plan
 from planner.planning.methods.at_once import AtOnce

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.machine import Mode
 from planner.motion.filters import damped_period, residual_vibration

@@ -13,7 +13,7 @@ from curves import circle, curve_named, strong, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import ChordGuide, guide_of_curve
 from planner.baselines.fir.spline_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs

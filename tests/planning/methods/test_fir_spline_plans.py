@@ -8,7 +8,7 @@ from curves import circle, curve_named, strong, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_point, arc_sagitta, chorded

@@ -9,7 +9,7 @@ import pytest
 from quick import slow_but
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.names import NORMAL, QUICK
 from planner.corners.bezier import kappa_max
 from planner.corners.smooth import CLOSE

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from whole_plans import solve
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.reachability import Reachability
 from planner.planning.methods.registry import plan

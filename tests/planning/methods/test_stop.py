@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.point_to_point import rest_to_rest_times
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.geometry.build import toolpath_from_program
@@ -126,7 +126,7 @@ def test_looser_limits_never_make_an_arc_take_longer(radius, sweep, velocity, ac
 
 
 def test_an_arc_with_an_acceleration_far_beyond_its_jerk_takes_seconds():
-    """Found by benchmarks/fuzz.py: a quarter of a circle was planned at 0.003 mm/s, half an hour of samples for the verifier."""
+    """Found by benchmarks/fuzz: a quarter of a circle was planned at 0.003 mm/s, half an hour of samples for the verifier."""
     machine = problems.machine(velocity=100.0, acceleration=9e7, jerk=1.0)
     path = toolpath_from_program(parse_program("G21 G17 G90 F900\nG1 X5 Y1\nG2 X9 Y5 R4\n"), machine)
     times = rest_to_rest_times(path.length, *block_limits(path, machine))

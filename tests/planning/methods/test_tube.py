@@ -11,7 +11,7 @@ import pytest
 from quick import slow_but
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError, NotSolvedError
 from planner.feedrate.solution import Status
 from planner.joint.nlp import LEGS_MAX, TubeNLP

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from quick import slow_but
 
-from benchmarks.random_lines import job
+from benchmarks.jobs.random_lines import job
 from benchmarks.runner.figures_of_merit import ALLOWED, beaten
 from benchmarks.runner.measure import outcome
 from benchmarks.runner.rows import ERROR, METHOD, Row

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
-from benchmarks.campaign_laws import mirrored, reversed_program, split
+from benchmarks.campaign.laws import mirrored, reversed_program, split
+from benchmarks.jobs import problems
 from planner.machine import Axis, Fir, Machine
 from planner.nc.reader import parse_program
 from planner.planning.job.trace import Trace

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner import plan
 from planner.base.errors import InputError
 from planner.base.names import EFFORTS as NAMES

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from quick import slow_but
 
-from benchmarks import problems
-from benchmarks.growth import relief
+from benchmarks.cost.growth import relief
+from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.assemble import feedrate_problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import problems, random_lines
+from benchmarks.jobs import problems, random_lines
 from planner.base.errors import InputError, NotSolvedError
 from planner.machine import Axis, Fir, Machine, Mode
 from planner.motion.shaping import shaper_of

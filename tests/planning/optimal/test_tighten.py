@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks import problems
-from benchmarks.random_paths import random_path
+from benchmarks.jobs import problems
+from benchmarks.solvers.random_paths import random_path
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.assemble import feedrate_problem

@@ -1,4 +1,4 @@
-"""A page of a folder whose files are not those of a plan any more: refused with the file and the key (found by benchmarks/fuzz.py)."""
+"""A page of a folder whose files are not those of a plan any more: refused with the file and the key (found by benchmarks/fuzz)."""
 
 from __future__ import annotations
 

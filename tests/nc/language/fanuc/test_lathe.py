@@ -161,7 +161,7 @@ def test_a_surface_speed_is_in_feet_or_metres(unit: str) -> None:
 
 END_INSIDE = "G71 P10 Q20 D1.\nN10 G0 X20\nM30\nN20 G1 Z-5\nM30"
 REFUSED = {
-    # all found by benchmarks/fuzz.py: on a machine with further axes they were a bug, and a program that ended there was lost
+    # all found by benchmarks/fuzz: on a machine with further axes they were a bug, and a program that ended there was lost
     "an end in the profile": (END_INSIDE, "ends inside the profile"),
     "the end of the file in the profile": (END_INSIDE.replace("M30", "%", 1), "ends inside the profile"),
     "a fault in the profile": ("G71 P10 Q20 D1.\nN10 G0 X20\n#1=[1/0]\nN20 G1 Z-5\nM30", "division by zero"),
@@ -182,7 +182,7 @@ REFUSED = {
     "half of G90": ("G90 U-1\nZ-10\nM30", "needs X or U, and Z or W"),
     "a wrong taper": ("G94 U-1 Z-10 I1\nM30", "does not use I"),
     "G92 without a lead": ("F2.\nG92 X10 Z-10\nU1\nM30", "needs the lead"),
-    # found by benchmarks/fuzz.py: the second line repeated a thread without a lead
+    # found by benchmarks/fuzz: the second line repeated a thread without a lead
     "G92 without a lead, and on": ("T0101\nG0 U1 W2\nG92 X30 Z-10\nX29 Z-11\nM30", "needs the lead"),
     "G92 without room": ("S500 M3\nG0 X20 Z0\nG92 X10 W0 F1\nM30", "room in z"),
     "G50 X": ("G50 X100 Z100\nU1\nM30", "sets a position"),

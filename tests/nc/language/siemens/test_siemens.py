@@ -173,7 +173,7 @@ def test_exact_stops_and_units() -> None:
         (
             "G1 X9 F100 RND=2\nX5",
             "<text>:2:1: .*takes more of a move than there is",
-        ),  # benchmarks/fuzz.py: a bug
+        ),  # benchmarks/fuzz: a bug
         ("G1 X1 F100 RND=2\nY1", "<text>:2:1: .*takes more of a move than there is"),
         ("CIP X1 Y1 I1=2 J1=2", "points of CIP lie on a line"),
         ("G1 X1 F100\nCT X3", "lies straight ahead"),

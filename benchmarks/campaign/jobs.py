@@ -1,0 +1,336 @@
+"""The jobs of the campaign: from a number a random program, machine, tolerance, interpolation period and method.
+
+Programs of eleven sources: of lines and arcs in three axes (jobs/random_lines.py), of up to nine axes (axes.py), of everything that
+moves in one program and of points on a curve (programs.py), and those that are compared with LinuxCNC's interpreter: cycles,
+offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
+random_splines.py, random_together.py).
+
+Most jobs are small, so that many can be made: a few blocks and some hundred samples; one in `LARGE` has up to `BLOCKS` and `SAMPLES`. A
+job whose motion would have more samples than it may gets a larger period, and then faster limits and feeds, which make the same motion
+in less time; dwells are cut.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib
+import itertools
+import re
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.campaign import axes as axes_campaign
+from benchmarks.campaign.programs import BLOCKS, dense, mixed
+from benchmarks.jobs import random_lines
+from planner.base.errors import InputError
+from planner.machine import ROTARY_AXES, Axis, Fir, Machine, Mode
+from planner.nc.program import Program
+from planner.nc.reader import parse_program
+
+TESTS = Path(__file__).resolve().parents[2] / "tests" / "nc"
+SAMPLES = 2000  # of a motion from stop to stop, about
+SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
+    (30, 400),
+    4.0,
+    30,
+)  # of a usual job, the blocks on the mean above 2, and one in so many is larger
+# Of jobs with more axes or blocks than these only a share is planned in the ways that take tens of seconds for them.
+AXES_OF_SLOW, BLOCKS_OF_SLOW, SHARE_OF_SLOW = 4, 8, 0.1
+SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
+PERIOD_MAX = 0.008  # [s]
+DWELL_MAX = 0.05  # [s]
+DRAWS = 60  # of a program until one has few blocks and moves; the least one counts where none has
+VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
+STREAM = 41  # of random numbers
+FIRST_SEEDS = 20  # by whose jobs the draws are known again
+DIGITS = 6  # of their numbers
+PERIODS = (0.00025, 0.0005, 0.001, 0.001, 0.002, 0.004, 0.008)  # [s]
+QUICK: dict[str, Any] = {"effort": "quick"}
+# Methods with their settings, and how often each is drawn.
+METHODS: tuple[tuple[float, str, dict[str, Any]], ...] = (
+    (36, "optimal", QUICK),
+    (4, "optimal", {}),
+    (3, "optimal", {"corner": "bezier"}),
+    (3, "optimal", {"corner": "fir"}),
+    (3, "optimal", {"corner": "kinematic"}),
+    (3, "optimal", {"geometry": "spline"} | QUICK),
+    (3, "optimal", QUICK | {"shaped": True}),
+    (6, "second-order", {}),
+    (2, "second-order", {"corner": "bezier"}),
+    (8, "kinematic", {}),
+    (7, "stop", {}),
+    (5, "bezier", {}),
+    (5, "fir", {}),
+    (2, "fir-plain", {}),
+    (3, "fir-spline", {}),
+    (1, "fir-spline-plain", {}),
+    (2, "tube", {}),
+)
+SLOW = (("optimal", {}), ("optimal", QUICK | {"shaped": True}), ("tube", {}))
+SOURCES = {
+    "lines and arcs": 18,
+    "axes": 14,
+    "mixed": 26,
+    "dense": 10,
+    "compensated": 5,
+    "cycles": 6,
+    "offsets": 4,
+    "feeds": 4,
+    "lathe": 4,
+    "splines": 5,
+    "together": 2,
+}
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job:
+    """What is planned: a program, or the message with which it was refused, on a machine.
+
+    machine   : it is planned on; `drawn`, the one from which it was made quicker for some `samples` (`_short`)
+    tolerance : that is given beside program and machine [mm], or None
+    """
+
+    seed: int
+    source: str
+    text: str
+    program: Program | None
+    refusal: str
+    machine: Machine
+    drawn: Machine
+    samples: int
+    method: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    tolerance: float | None = None
+
+    @property
+    def way(self) -> str:
+        """Method and settings in a word."""
+        return "/".join(
+            [self.method, *(str(value) if key != "shaped" else key for key, value in self.settings.items())]
+        )
+
+    def data(self) -> dict[str, Any]:
+        """As JSON has it, for tests that are to stay when seeds draw other jobs. Programs that have no text are not in it."""
+        keys = ("seed", "source", "method", "settings", "tolerance", "samples")
+        machine = self.drawn.model_dump(mode="json", exclude_defaults=True)
+        return {key: getattr(self, key) for key in keys} | {
+            "machine": machine,
+            "text": self.text.splitlines(),
+        }
+
+
+def fingerprint() -> str:
+    """A word for what seeds draw: another one where the first of them draw other jobs.
+
+    Numbers count with `DIGITS` digits: powers and sines differ in their last bit between processors.
+    """
+    drawn = [
+        (made.text, repr(made.machine), made.way, made.tolerance) for made in map(job, range(FIRST_SEEDS))
+    ]
+    rounded = re.sub(r"\d+\.\d+(e[-+]?\d+)?", lambda number: f"{float(number[0]):.{DIGITS}g}", repr(drawn))
+    return hashlib.sha256(rounded.encode()).hexdigest()[:12]
+
+
+def job_from(data: dict[str, Any]) -> Job:
+    """The job of `Job.data`."""
+    drawn, text = Machine.model_validate(data["machine"]), "\n".join(data["text"])
+    program, machine = _short(
+        parse_program(text, drawn, source=f"{data['source']} job"), drawn, data["samples"]
+    )
+    return Job(**data | {"text": text, "program": program, "refusal": "", "machine": machine, "drawn": drawn})
+
+
+def job(seed: int) -> Job:
+    """The job of that number: the first that can be drawn whose machine has limits that there may be."""
+    for attempt in itertools.count():
+        try:
+            return _job(seed, np.random.default_rng([STREAM, seed, attempt]))
+        except ValueError:  # of an axis that is refused
+            continue
+    raise AssertionError
+
+
+def _job(seed: int, rng: Rng) -> Job:
+    names, weights = list(SOURCES), np.array([*SOURCES.values()], dtype=float)
+    source = names[rng.choice(len(names), p=weights / weights.sum())]
+    shares = np.array([share for share, _, _ in METHODS])
+    _, method, settings = METHODS[rng.choice(len(METHODS), p=shares / shares.sum())]
+    large = bool(rng.random() < 1.0 / LARGE)
+    most = int(min(2 + rng.exponential(BLOCKS / 3 if large else SMALL_BLOCKS), BLOCKS))  # of most draws
+    samples = SAMPLES if large else int(rng.integers(*SMALL_SAMPLES))
+    text, machine, program, refusal = _drawn(source, rng)
+    for _ in range(DRAWS - 1):
+        if program is None or 0 < len(program) <= most:
+            break
+        other = _drawn(source, rng)
+        if other[2] is None or len(program) == 0 or 0 < len(other[2]) < len(program):
+            text, machine, program, refusal = other
+    wide = program is not None and (len(machine.axes) > AXES_OF_SLOW or len(program) > BLOCKS_OF_SLOW)
+    if (method, settings) in SLOW and wide and rng.random() > SHARE_OF_SLOW:
+        method, settings = "optimal", QUICK
+    if settings.get("shaped"):
+        modes = tuple(
+            Mode(frequency=float(10 ** rng.uniform(0.7, 2.0)), damping=float(rng.uniform(0, 0.2)))
+            for _ in range(rng.integers(1, 3))
+        )
+        machine = machine.model_copy(update={"modes": modes})
+    tolerance = float(10 ** rng.uniform(-3.0, 0.0)) if rng.random() < 0.3 else None
+    if program is not None and len(program) > BLOCKS:
+        program, refusal = None, f"{len(program)} blocks are too many for this campaign"
+    drawn = machine
+    if program is not None:
+        program, machine = _short(program, machine, samples)
+    return Job(
+        seed=seed, source=source, text=text, program=program, refusal=refusal, machine=machine, drawn=drawn,
+        samples=samples, method=method, settings=dict(settings), tolerance=tolerance,
+    )  # fmt: skip
+
+
+def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
+    """Text, machine, and program or refusal."""
+    if source == "lines and arcs":
+        program, _ = random_lines.job(int(rng.integers(1 << 30)))
+        return "", machine_of(rng, "xyz"), program, ""
+    if source == "axes":
+        text, other = axes_campaign.job(int(rng.integers(1 << 30)))
+        machine = machine_of(rng, "".join(other.axes))
+    else:
+        machine = machine_of(rng, "xyz" if source in ("mixed", "dense") and rng.random() < 0.8 else "xyzabc")
+        text = _text(source, rng, machine)
+        if rng.random() < SHARE_OF_NARROW:
+            linear = _linear(machine)
+            try:
+                return text, linear, parse_program(text, linear, source=f"{source} job"), ""
+            except InputError:  # it may be that the program moves a rotary axis
+                pass
+    try:
+        return text, machine, parse_program(text, machine, source=f"{source} job"), ""
+    except InputError as fault:
+        return text, machine, None, str(fault)
+
+
+def _linear(machine: Machine) -> Machine:
+    """The machine without its rotary axes."""
+    axes = {letter: axis for letter, axis in machine.axes.items() if letter not in ROTARY_AXES}
+    return machine.model_copy(update={"axes": axes})
+
+
+def _text(source: str, rng: Rng, machine: Machine) -> str:
+    if source == "mixed":
+        return mixed(rng, machine)
+    if source == "dense":
+        return dense(rng)
+    if str(TESTS) not in sys.path:
+        sys.path.insert(0, str(TESTS))
+    if source == "splines":
+        return str(importlib.import_module("random_splines").random_splines(rng))
+    if source == "together":
+        return str(importlib.import_module("random_together").together(rng))
+    return str(importlib.import_module("random_nc").KINDS[source](rng))
+
+
+# ---- machines ----------------------------------------------------------------------------------------------------------------
+
+
+def machine_of(rng: Rng, letters: str) -> Machine:
+    """A machine with limits over decades, and sometimes filters, vibration modes, a normal acceleration, a largest feed."""
+    velocity, acceleration = 10 ** rng.uniform(1.0, 3.0), 10 ** rng.uniform(2.0, 4.5)
+    delay = 10 ** rng.uniform(-3.0, -0.7)  # acceleration / jerk [s]
+    apart = rng.uniform(0.0, 0.6)  # of the axes, in decades to both sides
+    axes = {}
+    for letter in letters:
+        own = 10 ** rng.uniform(-apart, apart, 3)
+        a = acceleration * own[1]
+        axes[letter] = Axis(velocity=velocity * own[0], acceleration=a, jerk=a / (delay * own[2]))
+    more: dict[str, Any] = {}
+    if rng.random() < 0.2:
+        more["feed_max"] = 10 ** rng.uniform(0.5, 2.5)
+    if rng.random() < 0.2:
+        more["normal_acceleration"] = acceleration * 10 ** rng.uniform(-1.0, 0.3)
+    if rng.random() < 0.3:
+        more["blend_rapids"] = True
+    if rng.random() < 0.15:
+        more["path_control"] = str(rng.choice(["exact_path", "exact_stop"]))
+    if set(letters) & set("abc"):
+        more["rotary_radius"] = 10 ** rng.uniform(0.5, 2.5)
+    if rng.random() < 0.15:
+        lag = {"phase_lag_max": rng.uniform(5.0, 60.0)} if rng.random() < 0.3 else {}
+        more["fir"] = Fir(time_constants=tuple(10 ** rng.uniform(-3.0, -1.3, rng.integers(1, 4))), **lag)
+    if rng.random() < 0.15:
+        more["modes"] = tuple(
+            Mode(frequency=10 ** rng.uniform(0.5, 2.2), damping=rng.uniform(0.0, 0.3))
+            for _ in range(rng.integers(1, 3))
+        )
+    if rng.random() < 0.1 and set(letters) == set("xyz"):
+        axes["e"] = Axis(velocity=velocity, acceleration=acceleration, jerk=acceleration / delay)
+    return Machine(
+        name="random", dt=float(rng.choice(PERIODS)), tolerance=float(10 ** rng.uniform(-3.0, 0.0)),
+        feed_default=10.0, axes=axes, tools={str(n): {"length": 5.0 * n, "diameter": 1.0 * n} for n in range(1, 5)}, **more,
+    )  # fmt: skip
+
+
+def _short(program: Program, machine: Machine, samples: int) -> tuple[Program, Machine]:
+    """The job with a larger period, faster limits and shorter dwells, if its motion would have more samples than that."""
+    program = dataclasses.replace(program, dwell=np.minimum(program.dwell, DWELL_MAX))
+    time = duration(program, machine)
+    dt = float(np.clip(time / samples, machine.dt, PERIOD_MAX))
+    machine = machine.model_copy(update={"dt": dt})
+    faster = time / (samples * dt)
+    for _ in range(2):  # the second time for what the limits do not allow
+        if faster > 1.0:
+            program, machine = quicker(program, machine, faster)
+            faster = duration(program, machine) / (samples * dt)
+    return program, machine
+
+
+def quicker(program: Program, machine: Machine, by: float) -> tuple[Program, Machine]:
+    """The same motion in a time that is shorter by a factor: feeds, velocities, accelerations and jerks by its powers, as
+    far as a machine goes."""
+    axes = {
+        letter: Axis(
+            velocity=max(min(a.velocity * by, VELOCITY_MAX), a.velocity),
+            acceleration=max(min(a.acceleration * by**2, ACCELERATION_MAX), a.acceleration),
+            jerk=max(min(a.jerk * by**3, JERK_MAX), a.jerk),
+            wrapped=a.wrapped,
+        )
+        for letter, a in machine.axes.items()
+    }
+    update: dict[str, Any] = {"axes": axes}
+    if machine.feed_max is not None:
+        update["feed_max"] = machine.feed_max * by
+    if machine.normal_acceleration is not None:
+        update["normal_acceleration"] = machine.normal_acceleration * by**2
+    return dataclasses.replace(program, feed=program.feed * by), machine.model_copy(update=update)
+
+
+def duration(program: Program, machine: Machine) -> float:
+    """How long the program takes from stop to stop, about [s]."""
+    position = np.vstack([program.start, program.end])
+    way = np.abs(np.diff(position, axis=0))
+    for k, block in enumerate(program.arc_block):
+        radius = np.linalg.norm((position[block] - program.arc_center[k])[:3])
+        way[block, :3] = np.maximum(way[block, :3], radius * abs(program.arc_sweep[k]))
+    for block, points in zip(program.splines.block, program.splines.points, strict=True):
+        way[block] += np.abs(np.diff(points, axis=0)).sum(axis=0)
+    rotary = np.array([letter in "abc" for letter in program.axes])
+    angular = np.where(rotary, 180.0 / np.pi, 1.0)
+    total = float(program.dwell.sum())
+    feed = np.where(np.isfinite(program.feed), program.feed, np.inf)
+    total += float((np.linalg.norm(way, axis=1) / feed).sum())
+    for k, letter in enumerate(program.axes):
+        if letter in machine.axes:
+            axis, run = machine.axes[letter], way[:, k] * angular[k]
+            total += float(
+                (
+                    run / axis.velocity + 2 * np.sqrt(run / axis.acceleration) + 3 * np.cbrt(run / axis.jerk)
+                ).sum()
+            )
+    if machine.feed_max is not None:
+        total += float(np.linalg.norm(way, axis=1).sum()) / machine.feed_max
+    return total

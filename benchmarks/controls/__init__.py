@@ -1,0 +1,1 @@
+"""What controls make of programs, and what leaves the planner for them."""

@@ -1,0 +1,1 @@
+"""What planning takes: time and memory."""

@@ -1,0 +1,1 @@
+"""What goes wrong around the planner, and what must not change."""

@@ -1,0 +1,1 @@
+"""The jobs that tests, benchmarks and notebooks share."""

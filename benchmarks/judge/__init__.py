@@ -1,0 +1,1 @@
+"""The verifier and its claims, held against other code."""

@@ -1,0 +1,1 @@
+"""What the planner does, recorded and compared; what it loses without a part."""

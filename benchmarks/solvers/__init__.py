@@ -1,0 +1,1 @@
+"""Solvers compared, and what they cost."""

@@ -103,7 +103,9 @@ def report_of(name: str, results: Results, pictures: Iterable[Path] = ()) -> str
     if reasons := _reasons(rows):
         parts += ["## Without a passing motion", reasons]
     if pictures:  # beside this file, but not in the repository: the same command makes them
-        parts.append(f"Pictures, by `python -m benchmarks report`: {', '.join(one.name for one in pictures)}.")
+        parts.append(
+            f"Pictures, by `python -m benchmarks report`: {', '.join(one.name for one in pictures)}."
+        )
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 

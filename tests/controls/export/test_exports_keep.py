@@ -13,15 +13,8 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks.controls.export_judge import (
-    OFFSETS,
-    STARTS,
-    alike,
-    interpreted,
-    path,
-    readable,
-    unknown_words,
-)
+from benchmarks.controls import export_judge as judge
+from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, path, readable, unknown_words
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS
@@ -348,10 +341,10 @@ def test_interpreted_by_linuxcnc() -> None:
     if shutil.which("rs274") is None:
         pytest.skip("rs274 (Debian package linuxcnc-uspace) is not installed")
     out = "\n".join(exported(MACHINE_MOVES, "linuxcnc"))
-    one, other = (interpreted(text, STARTS[1], OFFSETS[1]) for text in (MACHINE_MOVES, out))
+    one, other = (judge.interpreted(text, STARTS[1], OFFSETS[1]) for text in (MACHINE_MOVES, out))
     assert not isinstance(one, str)
     assert not isinstance(other, str), other
     assert alike(one, other, TOLERANCE)
-    lost = interpreted(out.replace("G53 ", ""), STARTS[1], OFFSETS[1])
+    lost = judge.interpreted(out.replace("G53 ", ""), STARTS[1], OFFSETS[1])
     assert not isinstance(lost, str)
     assert not alike(one, lost, TOLERANCE)

@@ -1,19 +1,8 @@
 """The programmed path, laid out for the matching: pieces between vertices.
 
-A line is one piece. An arc or helix p(x) = center + radius (cos(rate x) e1 + sin(rate x) e2) + drift x is cut into pieces of at
-most `PIECE_ANGLE`, and the points between them are vertices like those of the program: the motion has to pass each of them
-in order, so that a full circle cannot be left out although its ends coincide.
-
-A curve is cut likewise (verifier/curves.py).
-
-The nearest point of an arc piece solves g(x) = (p(x) - q) . p'(x) = 0. Without drift it lies at the polar angle of q; with
-drift Newton's method starts there. With E1 = e1.drift, E2 = e2.drift, DD = drift.drift, w = q - center, c = cos, s = sin:
-
-    g  = R r (s w1 - c w2) - w.drift + R (c E1 + s E2) + x (R r (c E2 - s E1) + DD)
-    g' = R r^2 (c w1 + s w2) + 2 R r (c E2 - s E1) + DD - x R r^2 (c E1 + s E2)
-
-The distance itself is taken from the vector p(x) - q, never from the expanded square, which loses half the digits; at the
-nearest point an error of x enters it only squared.
+A line is one piece. An arc or helix is cut into pieces of at most `PIECE_ANGLE`, and the points between them are
+vertices like those of the program: the motion has to pass each of them in order, so that a full circle cannot be left
+out although its ends coincide. A curve is cut likewise (bends.py).
 """
 
 from __future__ import annotations
@@ -25,23 +14,23 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.verifier.curves import curve_counts, curve_points, reach_curve
+from planner.machine import ROTARY_AXES
+from planner.verifier.bends import apart_on_bend, arc_points, curve_counts, curve_points, reach_bend
 from planner.verifier.kernel import kernel
 
 PIECE_ANGLE = (
     np.pi / 8
 )  # largest turning of an arc piece [rad]: one of its points is passed every 22.5 degrees
-RATIO_ROUNDING = (
-    1e-6  # relative allowance on every limit: values computed in float64, files written with 7 digits
-)
-CONTOUR_ROUNDING = (
-    1e-8  # [mm] allowance on distances: rounding of coordinates up to 1e3 mm after 1e6 mm of path is 1e-10
-)
-PLACE_ROUNDING = 1e-6  # [mm] what "exactly at the point" means: the least digit that NC programs and trajectory files carry
-PERIOD_ROUNDING = 1e-9  # [s] of a sample's time: the least digit that files print; float64 has it up to 1e6 s
-NEWTON_STEPS = 8  # quadratic from the polar angle; four suffice for a helix whose pitch equals its radius
+# Relative allowance on every limit: values computed in float64, files written with 7 digits.
+RATIO_ROUNDING = 1e-6
+# [mm] allowance on distances: rounding of coordinates up to 1e3 mm after 1e6 mm of path is 1e-10.
+CONTOUR_ROUNDING = 1e-8
+# [mm] what "exactly at the point" means: the least digit that NC programs and trajectory files carry.
+PLACE_ROUNDING = 1e-6
+# [s] of a sample's time: the least digit that files print; float64 has it up to 1e6 s.
+PERIOD_ROUNDING = 1e-9
 
-
+STRAIGHT = -1  # row of the arc of a line
 PIECE = np.dtype(
     [
         ("budget", "f8"),
@@ -75,10 +64,6 @@ class ProgramPieces(NamedTuple):
     turn: FloatArray
 
 
-CENTER, E1, E2, DRIFT = range(4)  # in `frame`
-RADIUS, RATE = range(2)  # in `turn`
-
-
 def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPieces:
     """Cut the toolpath into pieces. A segment's budget is the larger of its two joints'.
 
@@ -107,11 +92,13 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
     chord = toolpath.end[segment] - toolpath.start[segment]
     vertex = np.vstack([toolpath.start[segment] + share * chord, toolpath.end[-1:]])
     on_arc = np.flatnonzero(arc >= 0)
-    vertex[on_arc] = _arc_points(toolpath, arc[on_arc], x0[on_arc])
+    vertex[on_arc] = arc_points(frame[arc[on_arc]], turn[arc[on_arc]], x0[on_arc])
     on_curve = np.flatnonzero(arc < -1)
     at = -2 - arc[on_curve]
     vertex[on_curve] = curve_points(frame[at], turn[at], x0[on_curve])[0]
-    _check_consistent(toolpath, vertex[first])
+    ends = toolpath.end.copy()
+    ends[is_arc] = arc_points(frame[row[is_arc]], turn[row[is_arc]], toolpath.length[is_arc])
+    _check_consistent(toolpath, vertex[first], ends)
     vertex[first] = toolpath.start
     at = np.append(first, len(segment))  # the vertices that are joints of the program
     piece = np.zeros(len(segment), dtype=PIECE)
@@ -155,18 +142,7 @@ def widened(pieces: ProgramPieces, factor: float = 1.0, more: float = 0.0) -> Pr
     return pieces._replace(piece=piece, joint=joint)
 
 
-def _arc_points(toolpath: Toolpath, row: Array, x: FloatArray) -> FloatArray:
-    arcs = toolpath.arcs
-    angle = arcs.rate[row] * x
-    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    circle = arcs.radius[row][:, None] * (cos * arcs.e1[row] + sin * arcs.e2[row])
-    return arcs.center[row] + circle + arcs.drift[row] * x[:, None]
-
-
-def _check_consistent(toolpath: Toolpath, computed_start: FloatArray) -> None:
-    rows = np.flatnonzero(toolpath.arc >= 0)
-    computed_end = toolpath.end.copy()
-    computed_end[rows] = _arc_points(toolpath, toolpath.arc[rows], toolpath.length[rows])
+def _check_consistent(toolpath: Toolpath, computed_start: FloatArray, computed_end: FloatArray) -> None:
     for what, gap in (
         ("does not start where its arc does", computed_start - toolpath.start),
         ("does not end where its arc does", computed_end - toolpath.end),
@@ -188,10 +164,8 @@ def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
     Exact on lines; on arcs and curves the distance is, and a and b are to second order about the nearest point.
     """
-    if pieces.piece[i]["arc"] >= 0:
-        return _reach_arc(pieces, i, q, radius)
-    if pieces.piece[i]["arc"] < -1:
-        return reach_curve(pieces, i, q, radius)
+    if pieces.piece[i]["arc"] != STRAIGHT:
+        return reach_bend(pieces, i, q, radius)
     vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
     for n in range(len(q)):
@@ -237,55 +211,44 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
     return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
 
 
-@kernel()
-def _reach_arc(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
-    k, x0, x1 = pieces.piece[i]["arc"], pieces.piece[i]["x0"], pieces.piece[i]["x1"]
-    big, rate, frame = pieces.turn[k, RADIUS], pieces.turn[k, RATE], pieces.frame
-    w1, w2, wd, d1, d2, dd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for n in range(len(q)):
-        w, e1, e2, drift = q[n] - frame[k, CENTER, n], frame[k, E1, n], frame[k, E2, n], frame[k, DRIFT, n]
-        w1 += w * e1
-        w2 += w * e2
-        wd += w * drift
-        d1 += e1 * drift
-        d2 += e2 * drift
-        dd += drift * drift
+def both_apart(
+    pieces: ProgramPieces, piece: Array, position: FloatArray, axes: tuple[str, ...]
+) -> FloatArray:
+    """(2,) largest distance of the linear axes, and of the rotary ones, from the path [mm]; zeros without axes of both
+    kinds.
 
-    middle = 0.5 * (x0 + x1)
-    angle = math.atan2(w2 - d2 * middle, w1 - d1 * middle) - rate * middle
-    angle -= 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-    x = min(max(middle + angle / rate, x0), x1)
-    for _ in range(NEWTON_STEPS):
-        c, s = math.cos(rate * x), math.sin(rate * x)
-        turn = big * rate * (c * d2 - s * d1)
-        pull = big * (c * d1 + s * d2)
-        g = big * rate * (s * w1 - c * w2) - wd + pull + x * (turn + dd)
-        slope = big * rate * rate * (c * w1 + s * w2) + 2.0 * turn + dd - x * rate * rate * pull
-        if (
-            slope <= 0.0
-        ):  # q is beyond the centre: the nearest point of the piece is one of its ends, which x already is
-            break
-        better = min(max(x - g / slope, x0), x1)
-        moved = abs(better - x)
-        x = better
-        if moved <= 1e-13 * (x1 - x0):
-            break
-    c, s = math.cos(rate * x), math.sin(rate * x)
-    distance_sq, g, slope = 0.0, 0.0, 0.0
-    for n in range(len(q)):
-        e1, e2, drift = frame[k, E1, n], frame[k, E2, n], frame[k, DRIFT, n]
-        off = frame[k, CENTER, n] + big * (c * e1 + s * e2) + drift * x - q[n]
-        d = big * rate * (c * e2 - s * e1) + drift
-        distance_sq += off * off
-        g += off * d
-        slope += d * d - off * big * rate * rate * (c * e1 + s * e2)
-    distance = math.sqrt(distance_sq)
-    if distance > radius:
-        return 1.0, 0.0, distance
-    if slope <= 0.0:
-        return 0.0, 1.0, distance
-    # distance^2 + 2 g D + slope D^2 = radius^2 about the nearest point
-    root = math.sqrt(g * g + slope * (radius * radius - distance_sq))
-    low, high = x + (-g - root) / slope, x + (-g + root) / slope
-    span = x1 - x0
-    return max(low - x0, 0.0) / span, min(high - x0, span) / span, distance
+    The contour error is one of all axes in one norm, angles at a radius. Its vector, from the nearest point of the path
+    to the motion, has a part in the linear axes, the error of the tip where the kinematics carry it there, and one in
+    the rotary axes, of which the tool's direction turns by no more. Neither exceeds the whole, so that a motion within
+    the tolerance keeps both tolerances.
+
+    piece    : (n,) the piece that each sample lies on
+    position : (n, A) of the samples [mm]
+    """
+    rotary = np.array([letter in ROTARY_AXES for letter in axes], dtype=bool)
+    if not len(position) or not rotary.any() or rotary.all():
+        return np.zeros(2)
+    counted = [part.astype(np.float64) for part in (~rotary, rotary)]
+    return np.sqrt([_largest_apart(pieces, piece, position, counts) for counts in counted])
+
+
+@kernel()
+def _largest_apart(pieces: ProgramPieces, piece: Array, position: FloatArray, counts: FloatArray) -> float:
+    """Largest square of the distance of samples from their nearest points, in the axes that count (A,)."""
+    largest, vertex = 0.0, pieces.vertex
+    for k in range(len(piece)):
+        i, q = piece[k], position[k]
+        if pieces.piece[i]["arc"] != STRAIGHT:
+            largest = max(largest, apart_on_bend(pieces, i, q, counts))
+            continue
+        along, length_sq, apart_sq = 0.0, 0.0, 0.0
+        for n in range(len(q)):
+            u = vertex[i + 1, n] - vertex[i, n]
+            along += (q[n] - vertex[i, n]) * u
+            length_sq += u * u
+        share = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
+        for n in range(len(q)):
+            at = vertex[i, n] + share * (vertex[i + 1, n] - vertex[i, n])
+            apart_sq += counts[n] * (q[n] - at) ** 2
+        largest = max(largest, apart_sq)
+    return largest

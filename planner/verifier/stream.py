@@ -13,12 +13,11 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
-from planner.verifier.axes_apart import both_apart
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
 from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
 from planner.verifier.matching import Located, Match, match_samples, new_match, nowhere
-from planner.verifier.pieces import ProgramPieces
+from planner.verifier.pieces import ProgramPieces, both_apart
 from planner.verifier.records import Limits, SampleBlock
 from planner.verifier.stops import AtStop
 from planner.verifier.switches import Bounds, Chords
@@ -35,7 +34,7 @@ class Observed:
 
     match       : the state of the matching
     worst       : of the limits, rows as in limits.py
-    apart       : (2,) largest distance of linear and of rotary axes from the path [mm] (axes_apart.py)
+    apart       : (2,) largest distance of linear and of rotary axes from the path [mm]
     first, last : (A,) first and last position [mm]
     gap_max     : longest period [s]
     """

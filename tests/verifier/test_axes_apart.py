@@ -11,8 +11,7 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.verifier import verify
-from planner.verifier.axes_apart import both_apart
-from planner.verifier.pieces import program_pieces
+from planner.verifier.pieces import both_apart, program_pieces
 
 AXIS = {"velocity": 100.0, "acceleration": 2000.0, "jerk": 2e5}
 MACHINE = Machine(name="m", dt=0.001, tolerance=0.01, axes=dict.fromkeys("xyzab", AXIS), rotary_radius=20.0)

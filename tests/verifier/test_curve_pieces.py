@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.nc.reader import parse_program
-from planner.verifier.curves import CURVE_TURN
+from planner.verifier.bends import CURVE_TURN
 from planner.verifier.pieces import PIECE_ANGLE, program_pieces, reach_piece
 
 CONTROL = np.array([[0.0, 0, 0], [8, 0, 0], [10, 4, 0], [12, 12, 0]])

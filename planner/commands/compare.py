@@ -74,28 +74,28 @@ def compare_command(
     from planner.machine import load_machine
     from planner.nc.reader import read_program
     from planner.report.comparison import (
+        SUFFIXES,
         about_job,
-        check_comparison_place,
         comparison_dict,
         comparison_table,
         write_comparison,
     )
+    from planner.report.replace import check_file, write_whole
     from planner.report.tables import assumed_lines
 
+    inputs = [job, Path(machine or DEFAULT_MACHINE)]
     if output is not None:
-        check_comparison_place(output, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+        check_file(output, inputs, suffixes=SUFFIXES, force=force)
     if report is not None:
-        from planner.report.html.comparison_page import check_page_place
-
-        check_page_place(report, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+        check_file(report, inputs, force=force)
     limits = load_machine(machine or DEFAULT_MACHINE)
     program = read_program(job, limits, reading)
     rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
     about = about_job(str(job), limits, tolerance)
     if report is not None:
-        from planner.report.html.comparison_page import write_comparison_page
+        from planner.report.html.comparison_page import comparison_page
 
-        write_comparison_page(report, rows, str(job), limits, program)
+        write_whole(report, comparison_page(rows, str(job), limits, program))
     if output is not None:
         write_comparison(output, rows, about)
     if as_json:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -81,19 +82,15 @@ def export_command(
 
     if within is not None and for_ is not For.pvt:
         raise InputError(f"--within is for pvt; --for {for_} takes every setpoint as it is")
-    if os.path.lexists(output):
-        raise InputError("exists already and is not overwritten; give another name", source=str(output))
-    read = read_trajectory(trajectory_file(plan))
-    trajectory = read.trajectory
-    if len(trajectory.extruder):
-        raise InputError(_NO_EXTRUDER, source=str(plan))
-    machine = read.metadata.get("machine")
-    between = machine.get("interpolation", "linear") if isinstance(machine, dict) else "linear"
-    if for_ is For.stream and between == "cubic":
-        raise InputError(_POSITIONS_ALONE, source=str(plan))
-    new = output.with_name(f".{output.name}.{os.getpid()}")
-    try:
-        new.mkdir(parents=True)
+    with _new_directory(output) as new:
+        read = read_trajectory(trajectory_file(plan))
+        trajectory = read.trajectory
+        if len(trajectory.extruder):
+            raise InputError(_NO_EXTRUDER, source=str(plan))
+        machine = read.metadata.get("machine")
+        between = machine.get("interpolation", "linear") if isinstance(machine, dict) else "linear"
+        if for_ is For.stream and between == "cubic":
+            raise InputError(_POSITIONS_ALONE, source=str(plan))
         if for_ is For.stream:
             write_stream(new, trajectory, unit)
             said = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
@@ -102,13 +99,24 @@ def export_command(
             said = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
             if between != "cubic":
                 said += f'; the verdict is on interpolation = "{between}" between the setpoints'
+    _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
+    say(f"{output}: {said}")
+
+
+@contextmanager
+def _new_directory(output: Path) -> Iterator[Path]:
+    """A directory to fill, which becomes `output` at the end. Raises InputError if that exists or cannot be written."""
+    if os.path.lexists(output):
+        raise InputError("exists already and is not overwritten; give another name", source=str(output))
+    new = output.with_name(f".{output.name}.{os.getpid()}")
+    try:
+        new.mkdir(parents=True)
+        yield new
         new.rename(output)
     except OSError as fault:
         raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
     finally:
         shutil.rmtree(new, ignore_errors=True)
-    _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
-    say(f"{output}: {said}")
 
 
 _POSITIONS_ALONE = (
@@ -133,23 +141,13 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
     from planner.controls.export.program import NO_JERK, write_program
     from planner.report.html.saved import saved_plan
 
-    if os.path.lexists(output):
-        raise InputError("exists already and is not overwritten; give another name", source=str(output))
-    if not plan.is_dir():
-        raise InputError(
-            "give the directory that 'plan -o' wrote: the program is needed too", source=str(plan)
-        )
-    saved, _, _ = saved_plan(plan)
-    allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
-    new = output.with_name(f".{output.name}.{os.getpid()}")
-    try:
-        new.mkdir(parents=True)
+    with _new_directory(output) as new:
+        if not plan.is_dir():
+            said = "give the directory that 'plan -o' wrote: the program is needed too"
+            raise InputError(said, source=str(plan))
+        saved, _, _ = saved_plan(plan)
+        allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
-        new.rename(output)
-    except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
     _say_assumed(saved.program.assumptions)
     say(f"{output / made.file}: {made.sentence}")
     for text in made.assumptions:

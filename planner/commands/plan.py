@@ -36,6 +36,7 @@ from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
+    from planner.planning.job.trace import Trace
 
 INTO_OUTPUT = "into the output directory: name one with -o DIR"
 IN_OUTPUT = "in the output directory: name one with -o DIR"
@@ -136,8 +137,8 @@ def plan_command(
     (job,) = jobs
     from planner import plan
     from planner.planning.job.trace import Trace
-    from planner.report import trace_file
     from planner.report.export import SUMMARY, check_places, write_plan
+    from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary
 
     form = file_format or Format.parquet
@@ -145,7 +146,7 @@ def plan_command(
         inputs = [job, Path(machine or DEFAULT_MACHINE)]
         check_places(output, inputs, file_format=form.value, plots=plot, force=force, report=report)
     if trace is not None:
-        trace_file.check_place(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+        check_file(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
     with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan(
@@ -166,7 +167,7 @@ def plan_command(
             )
 
     if trace is not None:
-        trace_file.write_trace(trace, steps, result)
+        write_whole(trace, json.dumps(_trace(steps, result), indent=1, allow_nan=False) + "\n")
     said = summary(result)
     if written and output is not None:  # with what was not written, and why
         said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]
@@ -181,6 +182,18 @@ def plan_command(
         raise NotSolvedError(f"{result.sentence}{kept}")
     if result.verdict is None or not result.verdict.passed:
         raise typer.Exit(FAILED)
+
+
+def _trace(steps: Trace, plan: Plan) -> dict[str, Any]:
+    """What planning tried, for a file: times in s; `kept` says whether a step was taken over."""
+    return {
+        "program": plan.program.source,
+        "method": plan.method,
+        "corner": plan.corner,
+        "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
+        "sentence": plan.sentence,
+        "steps": steps.as_json(),
+    }
 
 
 def _show(result: Plan, notes: list[str], *, corners: bool) -> None:

@@ -46,12 +46,13 @@ def pulses_command(
     If the pulses follow each other faster than the drives can take, nothing is written and the exit code is 1.
     """
     from planner.motion.pulses import Drive, overrun, pulses_of
-    from planner.report.pulse_file import check_pulse_place, write_pulses
+    from planner.report.pulse_file import SUFFIXES, write_pulses
+    from planner.report.replace import check_file
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     wanted = parse_steps(steps)
     if output is not None:
-        check_pulse_place(output, [trajectory], force=force)
+        check_file(output, [trajectory], suffixes=SUFFIXES, force=force)
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
     trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)

@@ -25,14 +25,12 @@ def report_command(
     """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
     if not os.path.isdir(directory):
         raise InputError("give the directory that 'plan -o' wrote", source=str(directory))
-    from planner.report.html.page import REPORT, check_report_place, report_page
+    from planner.report.html.page import REPORT, report_page
     from planner.report.html.saved import saved_plan
-    from planner.report.replace import replacing_file
+    from planner.report.replace import check_file, write_whole
 
     file = output or directory / REPORT
-    check_report_place(file, force=force)
+    check_file(file, force=force)
     plan, summary, text = saved_plan(directory)
-    page = report_page(plan, text, summary)
-    with replacing_file(file) as new:
-        new.write_text(page, encoding="utf-8")
+    write_whole(file, report_page(plan, text, summary))
     say(str(file))

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import csv
+import functools
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.base.errors import InputError
 from planner.base.files import readable
 from planner.base.units import MICROMETRE
 from planner.feedrate.constraints import normal_limit
 from planner.machine import Machine
-from planner.report.replace import check_file, replacing_file, starts_with
+from planner.report.compare import Row, best_of
+from planner.report.replace import write_whole
 from planner.report.summary import versions
 from planner.report.tables import ratio_text
-
-if TYPE_CHECKING:
-    pass
-from planner.report.compare import Row, best_of
 
 SUFFIXES = (".json", ".csv")
 QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
@@ -33,40 +30,36 @@ QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
 def comparison_table(rows: list[Row], title: str) -> Group:
     """The table for the terminal, followed by the reason for each method that did not pass."""
     best = best_of(rows)
-    shown = [name for name in QUANTITIES if any(name in (row.worst or {}) for row in rows)]
+    columns: list[tuple[str, Callable[[Row], str]]] = [
+        ("cycle\ntime s", lambda row: _number(row.cycle_time, ".4f")),
+        ("ratio to\nbest", lambda row: _number(_to_best(row, best), ".4f")),
+    ]
+    for name in QUANTITIES:
+        if any(name in (row.worst or {}) for row in rows):
+            heading = f"{name.replace('_', chr(10), 1)}\n/ limit"
+            columns.append((heading, functools.partial(_worst, quantity=name)))
+    columns += [
+        ("contour\nµm", lambda row: _number(row.contour_error, ".4g", MICROMETRE)),
+        ("corners\nµm", lambda row: _number(row.vertex_error, ".4g", MICROMETRE)),
+    ]
+    if any(row.after_filters is not None for row in rows):
+        columns.append(("behind\nfilters", lambda row: _number(row.after_filters, ".4g", MICROMETRE)))
+    columns += [
+        ("eq. 18-19\nat most", lambda row: "-" if row.corner_ratio is None else ratio_text(row.corner_ratio)),
+        ("over\neq. 20", lambda row: _number(row.gain, ".3f")),
+    ]
+    if any(row.ringing is not None for row in rows):
+        columns.append(("rings\nµm", lambda row: _number(row.ringing, ".4g", MICROMETRE)))
+    columns.append(("planning\ns", lambda row: _number(row.planning_time, ".3f")))
     table = Table(box=None, pad_edge=False)
     table.add_column("method", no_wrap=True)
-    for name in (
-        "cycle\ntime s",
-        "ratio to\nbest",
-        *(f"{q.replace('_', chr(10), 1)}\n/ limit" for q in shown),
-    ):
-        table.add_column(name, justify="right", no_wrap=True)
-    rings = any(row.ringing is not None for row in rows)
-    filters = any(row.after_filters is not None for row in rows)
-    law = ("eq. 18-19\nat most", "over\neq. 20")
-    more = (["behind\nfilters"] if filters else []), (["rings\nµm"] if rings else [])
-    for name in ("contour\nµm", "corners\nµm", *more[0], *law, *more[1], "planning\ns"):
-        table.add_column(name, justify="right", no_wrap=True)
+    for heading, _ in columns:
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
-    said = []
     for row in rows:
-        table.add_row(
-            row.method,
-            _number(row.cycle_time, ".4f"),
-            _number(_to_best(row, best), ".4f"),
-            *(_worst(row, quantity) for quantity in shown),
-            _number(row.contour_error, ".4g", MICROMETRE),
-            _number(row.vertex_error, ".4g", MICROMETRE),
-            *([_number(row.after_filters, ".4g", MICROMETRE)] if filters else []),
-            "-" if row.corner_ratio is None else ratio_text(row.corner_ratio),
-            _number(row.gain, ".3f"),
-            *([_number(row.ringing, ".4g", MICROMETRE)] if rings else []),
-            _number(row.planning_time, ".3f"),
-            Text(row.outcome, style="green" if row.passed else "bold red"),
-        )
-        if not row.passed:
-            said.append(Text(f"{row.method}: {row.sentence}"))
+        outcome = Text(row.outcome, style="green" if row.passed else "bold red")
+        table.add_row(row.method, *(text(row) for _, text in columns), outcome)
+    said = [Text(f"{row.method}: {row.sentence}") for row in rows if not row.passed]
     free = [f"{row.method} does not limit {', '.join(row.free)}" for row in rows if row.free]
     notes = [Text(f"(in brackets: not limited; {'; '.join(free)})")] if free else []
     return Group(Text(title, style="bold"), table, *notes, *said)
@@ -79,82 +72,51 @@ def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
         **about,
         "versions": versions(),
         "best": best.method if best else None,
-        "methods": [
-            {
-                "method": row.method,
-                "outcome": row.outcome,
-                "sentence": row.sentence,
-                "cycle_time_s": row.cycle_time,
-                "ratio_to_best": _to_best(row, best),
-                "worst": {
-                    q: {"ratio": ratio, "limit": name} for q, (ratio, name) in (row.worst or {}).items()
-                },
-                "not_limited": list(row.free),
-                "contour_error_mm": row.contour_error,
-                "vertex_error_mm": row.vertex_error,
-                "corner_ratio": row.corner_ratio,
-                "gain": row.gain,
-                "after_filters_mm": row.after_filters,
-                "ringing_mm": row.ringing,
-                "planning_time_s": row.planning_time,
-                "summary": row.summary,
-            }
-            for row in rows
-        ],
+        "methods": [row_dict(row, best) for row in rows],
+    }
+
+
+def row_dict(row: Row, best: Row | None) -> dict[str, Any]:
+    """A row of a comparison in numbers, `summary` last; mm and s."""
+    return {
+        "method": row.method,
+        "outcome": row.outcome,
+        "sentence": row.sentence,
+        "cycle_time_s": row.cycle_time,
+        "ratio_to_best": _to_best(row, best),
+        "worst": {q: {"ratio": ratio, "limit": name} for q, (ratio, name) in (row.worst or {}).items()},
+        "not_limited": list(row.free),
+        "contour_error_mm": row.contour_error,
+        "vertex_error_mm": row.vertex_error,
+        "corner_ratio": row.corner_ratio,
+        "gain": row.gain,
+        "after_filters_mm": row.after_filters,
+        "ringing_mm": row.ringing,
+        "planning_time_s": row.planning_time,
+        "summary": row.summary,
     }
 
 
 def comparison_csv(rows: list[Row]) -> str:
-    """The comparison as CSV, one row for each method; a cell is empty where there is no number."""
-    best = best_of(rows)
-    out = io.StringIO()
+    """The comparison as CSV, one row for each method; a field is empty where there is no number."""
+    out, best = io.StringIO(), best_of(rows)
     write = csv.writer(out, lineterminator="\n")
-    limits = [column for q in QUANTITIES for column in (f"{q}_ratio", f"{q}_limit")]
     head = ["method", "outcome", "cycle_time_s", "ratio_to_best"]
     tail = ["not_limited", "contour_error_mm", "vertex_error_mm", "corner_ratio", "gain"]
     tail += ["after_filters_mm", "ringing_mm", "planning_time_s", "sentence"]
-    write.writerow([*head, *limits, *tail])
+    limits = [(q, what) for q in QUANTITIES for what in ("ratio", "limit")]
+    write.writerow([*head, *(f"{q}_{what}" for q, what in limits), *tail])
     for row in rows:
-        worst = [value for q in QUANTITIES for value in (row.worst or {}).get(q, (None, None))]
-        first = [row.method, row.outcome, row.cycle_time, _to_best(row, best)]
-        errors = [
-            row.contour_error,
-            row.vertex_error,
-            row.corner_ratio,
-            row.gain,
-            row.after_filters,
-            row.ringing,
-        ]
-        last = [" ".join(row.free), *errors, row.planning_time, row.sentence]
-        write.writerow([*first, *worst, *last])
+        made = row_dict(row, best) | {"not_limited": " ".join(row.free)}
+        worst = [made["worst"].get(q, {}).get(what) for q, what in limits]
+        write.writerow([*(made[name] for name in head), *worst, *(made[name] for name in tail)])
     return out.getvalue()
-
-
-def check_comparison_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Raise InputError if a comparison cannot be written to a file.
-
-    That is so for a suffix other than .json and .csv, for a directory, for one of the `inputs`, and for a file that is no comparison,
-    unless `force` is set.
-    """
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    check_file(path, inputs, _is_comparison, force=force)
-
-
-def _is_comparison(path: Path) -> bool:
-    if path.suffix == ".csv":
-        return starts_with(path, comparison_csv([]).rstrip())
-    try:
-        return {"best", "methods", "versions"} <= set(json.loads(path.read_bytes()))
-    except (ValueError, RecursionError, TypeError):
-        return False
 
 
 def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None:
     """Write the comparison as JSON or CSV, the whole file or nothing. Raises InputError if it cannot be written."""
-    text = comparison_csv(rows) if path.suffix == ".csv" else _json(comparison_dict(rows, about))
-    with replacing_file(path) as new:
-        new.write_text(readable(text), encoding="utf-8")
+    made = json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False) + "\n"
+    write_whole(path, readable(comparison_csv(rows) if path.suffix == ".csv" else made))
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:
@@ -164,10 +126,6 @@ def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[st
         "machine": machine.model_dump(mode="json", exclude_none=True),
         "tolerance_mm": tolerance,
     }
-
-
-def _json(value: dict[str, Any]) -> str:
-    return json.dumps(value, indent=2, allow_nan=False) + "\n"
 
 
 def _to_best(row: Row, best: Row | None) -> float | None:

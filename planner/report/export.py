@@ -20,6 +20,7 @@ from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.points import SOURCE, points_file
 from planner.planning.job.at_tip import joints_of
 from planner.report.block_feeds import BlockWatch, PlannedBlocks
+from planner.report.judging import KEPT, KEPT_POINTS, KEPT_TEXT
 from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.summary import json_ready, not_limited, summary, tool_point_summary, uniform, versions
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
 
 PLANNED = "planned.ngc"
-KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs that no other file has
 
 
 def write_plan(
@@ -103,12 +103,6 @@ def program_to_keep(plan: Plan) -> dict[str, bytes]:
     if plan.program.text is not None:
         return {KEPT_TEXT: plan.program.text}
     return {KEPT_POINTS: points_file(plan.program)} if plan.program.source == SOURCE else {}
-
-
-def program_file(directory: Path, source: str) -> str:
-    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as points."""
-    kept = [directory / name for name in KEPT if (directory / name).exists()]
-    return str(kept[0]) if kept and source.startswith("<") else source
 
 
 def check_places(

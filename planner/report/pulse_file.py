@@ -9,7 +9,6 @@ appears as a whole: it is written beside its place, forced to disk and renamed.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,33 +16,9 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.motion.pulses import AxisPulses
-from planner.report.replace import check_file, replacing_file, starts_with
+from planner.report.replace import PULSES, replacing_file
 
 SUFFIXES = (".parquet", ".csv")
-COLUMNS = ("t", "axis", "direction", "count", "line")
-
-
-def check_pulse_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Raise InputError if pulses cannot be written to a file.
-
-    That is so for a suffix other than .parquet and .csv, for one of the `inputs`, and for a file that holds no pulses of this package,
-    unless `force` is set.
-    """
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    check_file(path, inputs, _is_pulse_file, force=force)
-
-
-def _is_pulse_file(path: Path) -> bool:
-    from pyarrow import parquet
-
-    if path.suffix == ".csv":
-        return starts_with(path, ",".join(COLUMNS))
-    try:
-        with path.open("rb") as file:
-            return tuple(parquet.read_schema(file).names) == COLUMNS
-    except (OSError, ValueError):
-        return False
 
 
 def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
@@ -65,15 +40,11 @@ def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[
     time = np.concatenate([train.time for train in trains])
     order = np.argsort(time, kind="stable")
     which = np.concatenate([np.full(len(train), k, np.int8) for k, train in enumerate(trains)])[order]
-    table = pa.table(
-        {
-            "t": time[order],
-            "axis": pa.DictionaryArray.from_arrays(which, [train.axis for train in trains]).cast(pa.string()),
-            "direction": np.concatenate([train.direction for train in trains])[order],
-            "count": np.concatenate([train.count for train in trains])[order],
-            "line": np.concatenate([train.line for train in trains])[order],
-        }
-    )
+    axis = pa.DictionaryArray.from_arrays(which, [train.axis for train in trains]).cast(pa.string())
+    columns: dict[str, Any] = {"t": time[order], "axis": axis}
+    for name in PULSES[len(columns) :]:
+        columns[name] = np.concatenate([getattr(train, name) for train in trains])[order]
+    table = pa.table(columns)
     if suffix == ".csv":
         with path.open("wb") as file:
             file.write((",".join(table.column_names) + "\n").encode())

@@ -1,15 +1,13 @@
 """Output files that take their place when all of them are written, `summary.json` last.
 
-The files of a run are written into a hidden directory inside the output directory and forced to disk. Then
-each is renamed into its place, in the order of `OUTPUTS`; files of the run before that the new one lacks
-(another format, no pictures) go in between. A kill before the renames leaves the old set, after them the new
-one. A kill between two renames leaves whole files of two runs, and that can be seen: the `run_id` of the
-trajectory is then not that of `summary.json`, or one of the two is missing.
+The files of a run are written into a hidden directory inside the output directory, forced to disk, and renamed into
+their places in the order of `OUTPUTS`; files of the run before that the new one lacks go in between. A kill before the
+renames leaves the old set, after them the new one, and between two of them whole files of two runs, which can be seen:
+the `run_id` of the trajectory is then not that of `summary.json`, or one of the two is missing.
 
-Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their
-SHA-256, and so does that of a killed run. A lock on the output directory makes a second run wait, and what is
-hidden there under the lock is the leftover of a killed run. Windows and file systems without such locks do
-without.
+Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their SHA-256, and a
+file that stands alone is known by how it begins. A lock on the directory makes a second run wait, and what is hidden
+there under the lock is the leftover of a killed run. Windows and file systems without such locks do without.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ import os
 import shutil
 import sys
 import uuid
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 
 from planner.base.errors import InputError
@@ -32,6 +30,7 @@ if sys.platform != "win32":
 
 SUMMARY = "summary.json"
 CSV_METADATA = "trajectory.meta.json"
+# Every name that a run may write, in the order in which they take their places.
 OUTPUTS = (
     CSV_METADATA,
     "trajectory.parquet",
@@ -44,12 +43,15 @@ OUTPUTS = (
     "profiles.png",
     "report.html",
     SUMMARY,
-)  # every name that a run may write, in the order in which they take their places
+)
+PAGE_MARK = '<meta name="generator" content="feedrate-planner">'
+PULSES = ("t", "axis", "direction", "count", "line")
+CSV_HEADS = (PULSES, ("method", "outcome", "cycle_time_s", "ratio_to_best"))
+JSON_KEYS = ({"best", "methods", "versions"}, {"program", "method", "steps"})  # of comparisons and traces
 HIDDEN = ".planner-" + 12 * "[0-9a-f]"  # pattern of the names of temporaries
 
-_temporaries: dict[
-    int, list[Path]
-] = {}  # of this process, and directories that go unless something is in them
+# Of this process, and directories that go unless something is in them.
+_temporaries: dict[int, list[Path]] = {}
 
 
 def remove_temporaries() -> None:
@@ -153,31 +155,50 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
 
 
 def check_file(
-    path: Path, inputs: Iterable[Path], written_by_us: Callable[[Path], bool], *, force: bool = False
+    path: Path, inputs: Iterable[Path] = (), *, suffixes: tuple[str, ...] = (), force: bool = False
 ) -> None:
-    """Raise InputError if a file cannot be written: a directory, an input, or a file of another kind while
-    `force` is not set.
-
-    written_by_us : says whether a file is of the kind that is to be written
-    """
+    """Raise InputError if a file cannot be written: for another suffix than `suffixes`, a directory, an input, or a file
+    that no command wrote while `force` is not set."""
+    if suffixes and path.suffix not in suffixes:
+        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(suffixes)}", source=str(path))
     with _writing(path):
         if path.is_dir():
             raise InputError("cannot be written: is a directory", source=str(path))
         if path.parent.exists() and not path.parent.is_dir():
             raise InputError(f"cannot be written: {path.parent} is no directory", source=str(path))
         refuse_inputs([path], inputs)
-        if os.path.lexists(path) and not force and not (path.is_file() and written_by_us(path)):
+        if os.path.lexists(path) and not force and not (path.is_file() and _stands_alone(path)):
             raise InputError(
                 "was not written by planner, and is not overwritten; give another name, or --force",
                 source=str(path),
             )
 
 
-def starts_with(path: Path, line: str) -> bool:
-    """Whether the first line of a file is `line`."""
-    start = (line + "\n").encode()
+def write_whole(path: Path, text: str) -> None:
+    """Write a file, the whole of it or nothing. Raises InputError if it cannot be written."""
+    with replacing_file(path) as new:
+        new.write_text(text, encoding="utf-8")
+
+
+def _stands_alone(path: Path) -> bool:
+    """Whether a file is a page, a comparison, a trace or pulses, by its content."""
     with path.open("rb") as stream:
-        return stream.read(len(start)) == start
+        start = stream.read(500)
+    match path.suffix:
+        case ".csv":
+            return start.startswith(tuple(",".join(head).encode() for head in CSV_HEADS))
+        case ".parquet":
+            from pyarrow import parquet
+
+            with contextlib.suppress(OSError, ValueError), path.open("rb") as stream:
+                return tuple(parquet.read_schema(stream).names) == PULSES
+        case ".json":
+            with contextlib.suppress(ValueError, RecursionError, TypeError):
+                names = set(json.loads(path.read_bytes()))
+                return any(names >= keys for keys in JSON_KEYS)
+        case _:
+            return PAGE_MARK.encode() in start
+    return False
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

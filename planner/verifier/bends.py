@@ -184,7 +184,7 @@ def _on_curve(pieces: Any, i: int, u: float, n: int) -> tuple[float, float, floa
 
 @kernel()
 def apart_on_bend(pieces: Any, i: int, q: FloatArray, counts: Array) -> float:
-    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in the axes that count (A,)."""
+    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts` (A,)."""
     x, apart_sq = nearest_on_bend(pieces, i, q), 0.0
     arc = pieces.piece[i]["arc"] >= 0
     for n in range(len(q)):

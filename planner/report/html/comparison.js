@@ -17,12 +17,12 @@
     key.style.color = row.shown ? about.colours[k] : "transparent";
     name.prepend(key);
     if (row.method === about.best) name.style.fontWeight = "600";
-    line.append(name, make("td", fixed(row.cycle_time, 4)), make("td", fixed(row.ratio, 4)));
+    line.append(name, make("td", fixed(row.cycle_time_s, 4)), make("td", fixed(row.ratio_to_best, 4)));
     for (const quantity of quantities) {
-      const ratio = row.worst[quantity], free = row.free.includes(quantity), text = free ? digits(ratio, 4) : fixed(ratio, 4);
+      const ratio = row.worst[quantity]?.ratio, free = row.not_limited.includes(quantity), text = free ? digits(ratio, 4) : fixed(ratio, 4);
       line.append(make("td", free ? `(${text})` : text, !free && ratio > 1 + 1e-6 ? "bad" : ""));
     }
-    line.append(make("td", row.contour_error === null ? "–" : digits(1000 * row.contour_error, 4)), make("td", fixed(row.planning_time, 2)));
+    line.append(make("td", row.contour_error_mm === null ? "–" : digits(1000 * row.contour_error_mm, 4)), make("td", fixed(row.planning_time_s, 2)));
     line.append(make("td", row.outcome, row.outcome === "passed" ? "" : "bad"));
     if (row.shown) line.onclick = () => {
       if (!hidden.delete(k)) hidden.add(k);
@@ -31,7 +31,7 @@
     };
     element("methods").append(line);
     if (row.outcome !== "passed") element("notes").append(make("li", `${row.method}: ${row.sentence}`));
-    if (row.free.length) element("notes").append(make("li", `${row.method} does not limit ${row.free.join(", ")} (in brackets)`));
+    if (row.not_limited.length) element("notes").append(make("li", `${row.method} does not limit ${row.not_limited.join(", ")} (in brackets)`));
   });
 
   const shown = rows.map((_, k) => k).filter((k) => rows[k].shown);

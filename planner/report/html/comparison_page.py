@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +12,10 @@ from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES, Machine
 from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
+from planner.report.comparison import row_dict
 from planner.report.figure import AGAINST, Panel, Series, three
-from planner.report.html.page import is_report
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import fitted_scene, panel_figure
-from planner.report.replace import check_file, replacing_file
 from planner.report.summary import json_ready
 
 if TYPE_CHECKING:
@@ -26,21 +23,6 @@ if TYPE_CHECKING:
     from planner.report.html.data import Samples
 
 SAMPLES_MAX = SIZES.compared_samples
-
-
-def check_page_place(path: Path, inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Raise InputError if the page cannot be written to a file: a directory, an input, or a file that is no page of this package while
-    `force` is not set."""
-    check_file(path, inputs, is_report, force=force)
-
-
-def write_comparison_page(
-    path: Path, rows: list[Row], source: str, machine: Machine, program: Program
-) -> None:
-    """Write the page of a comparison. Raises InputError if it cannot be written, or if plotly is not installed."""
-    page = comparison_page(rows, source, machine, program)
-    with replacing_file(path) as new:
-        new.write_text(page, encoding="utf-8")
 
 
 def comparison_page(rows: list[Row], source: str, machine: Machine, program: Program) -> str:
@@ -80,7 +62,7 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
         "blocks": len(program),
         "best": None if best is None else best.method,
         "colours": colours,
-        "rows": json_ready([_said(row, best) for row in rows]),
+        "rows": json_ready([_row(row, best) for row in rows]),
         "against": AGAINST,
         "profile": panel_figure(panels, "t") if paths else None,
         "view": fitted_scene(np.concatenate(paths)) if paths else None,
@@ -88,22 +70,10 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
     return page_of("comparison", "methods side by side", source, about, columns)
 
 
-def _said(row: Row, best: Row | None) -> dict[str, Any]:
-    """A row of the table."""
-    known = row.cycle_time is not None and best is not None and best.cycle_time
-    return {
-        "method": row.method,
-        "outcome": row.outcome,
-        "sentence": row.sentence,
-        "cycle_time": row.cycle_time,
-        "ratio": row.cycle_time / best.cycle_time if known else None,  # type: ignore[operator,union-attr]
-        "contour_error": row.contour_error,
-        "planning_time": row.planning_time,
-        "free": list(row.free),
-        "worst": {name: ratio for name, (ratio, _) in (row.worst or {}).items()},
-        "held_by": (row.summary or {}).get("held_by"),
-        "shown": row.shown is not None,
-    }
+def _row(row: Row, best: Row | None) -> dict[str, Any]:
+    made = row_dict(row, best)
+    held_by = (made.pop("summary") or {}).get("held_by")
+    return {**made, "held_by": held_by, "shown": row.shown is not None}
 
 
 def _columns(samples: Samples, prefix: str) -> dict[str, Array]:

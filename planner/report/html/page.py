@@ -10,7 +10,6 @@ megabytes, is run and the columns are unpacked.
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +30,6 @@ from planner.report.figure import (
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
-from planner.report.replace import check_file
 from planner.report.rows import plan_rows
 from planner.report.summary import json_ready, summary
 
@@ -43,18 +41,6 @@ REPORT = "report.html"
 PICTURE = 900.0  # longer side of the picture that stands there until the path can be turned [px]
 CORNERS_MAX = SIZES.page_corners
 CALLS_MAX = SIZES.page_calls
-MARK = '<meta name="generator" content="feedrate-planner">'
-
-
-def check_report_place(path: Path, *, force: bool = False) -> None:
-    """Raise InputError if a page cannot be written to a file: a directory, or a file that is no report while `force` is not set."""
-    check_file(path, (), is_report, force=force)
-
-
-def is_report(path: Path) -> bool:
-    """Whether a file is a page of this package."""
-    with path.open("rb") as stream:
-        return MARK.encode() in stream.read(500)
 
 
 def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +13,17 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.feedrate.solution import Status
-from planner.geometry.build import toolpath_from_program
 from planner.machine import machine_from_dict
 from planner.motion.chain_setpoints import tip_of_setpoints
 from planner.nc.points import are_points
 from planner.nc.reader import load, parse_program
-from planner.nc.reading import Reading
-from planner.planning.job.at_tip import Judged, chain_of, judged
+from planner.planning.job.at_tip import chain_of
 from planner.planning.job.plan import Plan
-from planner.report.export import program_file
+from planner.report.judging import FileSays, is_number, judge, program_file
 from planner.report.replace import SUMMARY
 from planner.report.summary import json_ready
-from planner.report.trajectory_reader import read_trajectory
+from planner.report.trajectory_reader import read_trajectory, trajectory_file
 from planner.report.word_feed import WordFeed
-from planner.verifier import NOT_LIMITED_NAMES, fit_axes
 
 
 def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
@@ -39,31 +35,25 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     Raises InputError if a file is missing or damaged, or if the trajectory is not that of the program.
     """
     summary = _summary(directory / SUMMARY)
-    found = [directory / f"trajectory.{suffix}" for suffix in ("parquet", "csv", "npz")]
-    files = [file for file in found if file.exists()]
-    if not files:
-        raise InputError(
-            "there is no trajectory here; write one with: planner plan JOB -o DIR", source=str(directory)
-        )
-    read = read_trajectory(files[0])
+    file = trajectory_file(directory)
+    read = read_trajectory(file)
     if read.metadata.get("run_id") != summary.get("run_id"):
         raise InputError("the trajectory and the summary are of two runs; plan again", source=str(directory))
-    about = _About.of(read.metadata, files[0])
+    says = FileSays.of(read.metadata)
+    if says.wrong or says.machine is None:
+        wrong = ", ".join(f"{name} is {str(read.metadata.get(name))[:40]}" for name in says.wrong[:1])
+        raise InputError(f"its metadata are not those of a plan: {wrong}; plan again", source=str(file))
     source = program_file(directory, summary["program"])
     text = load(source)
-    machine = machine_from_dict(about.machine, source=f"{files[0]} (its own machine)")
-    reading = Reading.saved(read.metadata.get("reading"))
-    program = parse_program(text, machine, reading, source=source)
-    toolpath = toolpath_from_program(program, machine, about.tolerance)
+    machine = machine_from_dict(says.machine, source=f"{file} (its own machine)")
+    program = parse_program(text, machine, says.reading, source=source)
     if len(program) != summary["blocks"]:
         raise InputError(
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",
             source=source,
         )
-    motion, given, _ = fit_axes(read.trajectory, read.given, toolpath)
-    how = Judged(
-        program=program, toolpath=toolpath, machine=machine, given=given, not_limited=about.not_limited
-    )
+    found = judge(read, program, machine, tolerance=says.tolerance, not_limited=says.not_limited)
+    motion, toolpath, machine = found.motion, found.toolpath, found.machine
     chain = chain_of(program, machine)
     trajectory = motion if chain is None else tip_of_setpoints(motion, chain)
     if WordFeed(toolpath).mixed:  # files have the feed that F means
@@ -80,7 +70,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         sentence=summary["sentence"],
         trajectory=trajectory,
         joints=None if chain is None else motion,
-        verdict=judged(motion, how),
+        verdict=found.verdict,
         rounded=None,
         grid=None,
         stop_time=math.inf if stop_time is None else stop_time,
@@ -89,40 +79,6 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         timings=summary["timings_s"],
     )
     return plan, summary, None if are_points(text) else text
-
-
-@dataclass(frozen=True)
-class _About:
-    """What the trajectory says about itself: its machine, tolerance [mm] and quantities that its plan did not limit."""
-
-    machine: dict[str, Any]
-    tolerance: float | None
-    not_limited: tuple[str, ...]
-
-    @classmethod
-    def of(cls, metadata: Mapping[str, Any], file: Path) -> _About:
-        """From the metadata of a file. Raises InputError for what a plan does not write."""
-        machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
-        free = metadata.get("not_limited", [])
-        for right, name in (
-            (isinstance(machine, dict), "machine"),
-            (tolerance is None or (_is_number(tolerance) and 0.0 < tolerance < math.inf), "tolerance_mm"),
-            (
-                isinstance(free, list)
-                and all(isinstance(name, str) and name in NOT_LIMITED_NAMES for name in free),
-                "not_limited",
-            ),
-        ):
-            if not right:
-                raise InputError(
-                    f"its metadata are not those of a plan: {name} is {str(metadata.get(name))[:40]}; plan again",
-                    source=str(file),
-                )
-        return cls(machine or {}, tolerance, tuple(free))
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 # What the summary of a plan has, and of which kind.
@@ -137,8 +93,8 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     "blocks": lambda value: isinstance(value, int),
     "grid_points": lambda value: isinstance(value, int),
     "notes": lambda value: isinstance(value, list) and all(isinstance(note, str) for note in value),
-    "timings_s": lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
-    "stop_time_s": lambda value: value is None or _is_number(value),
+    "timings_s": lambda value: isinstance(value, dict) and all(map(is_number, value.values())),
+    "stop_time_s": lambda value: value is None or is_number(value),
 }
 
 

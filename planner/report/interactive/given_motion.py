@@ -8,15 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.base.errors import InputError
-from planner.geometry.build import toolpath_from_program
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
-from planner.nc.set_limits import limited
-from planner.planning.job.at_tip import Judged, judged
 from planner.planning.methods.registry import DEFAULT_MACHINE
+from planner.report.judging import judge
 from planner.report.trajectory_reader import trajectory_of_columns
-from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
+from planner.verifier import NOT_LIMITED_NAMES, Verdict
 
 
 def verify(
@@ -69,8 +67,4 @@ def verify(
     )
     if not isinstance(program, Program):
         program = read_program(program, machine)
-    machine = limited(machine, program.limits)
-    toolpath = toolpath_from_program(program, machine, tolerance)
-    trajectory, given, _ = fit_axes(read.trajectory, read.given, toolpath)
-    how = Judged(program=program, toolpath=toolpath, machine=machine, given=given, not_limited=not_limited)
-    return judged(trajectory, how)
+    return judge(read, program, machine, tolerance=tolerance, not_limited=not_limited).verdict

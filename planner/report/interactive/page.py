@@ -15,9 +15,9 @@ from planner.base.errors import InputError
 from planner.planning.job.at_tip import joints_of
 from planner.report.colours import COLOURS
 from planner.report.export import check_places, write_plan
-from planner.report.html.page import REPORT, check_report_place, path_picture, report_page
+from planner.report.html.page import REPORT, path_picture, report_page
 from planner.report.planned import source_text
-from planner.report.replace import replacing_file
+from planner.report.replace import check_file, write_whole
 from planner.report.rows import VERDICT, plan_rows
 from planner.report.trajectory_file import trajectory_columns, units
 from planner.report.trajectory_reader import Format
@@ -51,9 +51,8 @@ class ReportPage:
         Raises InputError if it cannot be written, or if a file is in the way that is no report.
         """
         place = Path(file)
-        check_report_place(place, force=force)
-        with replacing_file(place) as new:
-            new.write_text(self.text, encoding="utf-8")
+        check_file(place, force=force)
+        write_whole(place, self.text)
         return place
 
     def open(self) -> Path:

@@ -1,0 +1,167 @@
+"""A trajectory that was read or given, judged; and what its file says about itself."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from planner.base.errors import InputError
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Program
+from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.set_limits import limited
+from planner.planning.job.at_tip import Judged, judged
+from planner.report.trajectory_reader import TrajectoryFile
+from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
+
+KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs that no other file has
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Judgement:
+    """A motion with the axes of a program, what it was judged by, and the verdict.
+
+    notes : what was done to the axes, one sentence each
+    """
+
+    motion: Trajectory
+    toolpath: Toolpath
+    machine: Machine
+    verdict: Verdict
+    notes: tuple[str, ...]
+
+
+def judge(
+    read: TrajectoryFile,
+    program: Program,
+    machine: Machine,
+    *,
+    tolerance: float | None = None,
+    not_limited: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Judgement:
+    """Judge a trajectory that was read against a program and a machine.
+
+    tolerance   : contour error budget [mm]; None for that of the program or the machine
+    not_limited : quantities that are reported and not judged
+    progress    : called now and then with the fraction done (0 to 1)
+
+    Raises InputError for other axes than the program's, and for a program that moves nothing.
+    """
+    machine = limited(machine, program.limits)
+    toolpath = toolpath_from_program(program, machine, tolerance)
+    if not len(toolpath):
+        raise InputError("the program moves nothing: there is nothing to judge", source=program.source)
+    motion, given, notes = fit_axes(read.trajectory, read.given, toolpath)
+    how = Judged(
+        program=program,
+        toolpath=toolpath,
+        machine=machine,
+        given=given,
+        not_limited=not_limited,
+        progress=progress,
+    )
+    verdict = judged(motion, how)
+    return Judgement(motion=motion, toolpath=toolpath, machine=machine, verdict=verdict, notes=notes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileSays:
+    """What a trajectory file says about itself. It is used where nobody says otherwise, always reported, and never a
+    reason to pass.
+
+    machine     : its machine, as in a machine file, or None
+    tolerance   : the tolerance it was planned with [mm], or None
+    not_limited : quantities that its plan did not limit
+    reading     : how its program was read
+    program     : the file of its program; "<text>" and the like where it had none; None where the file does not say
+    wrong       : names of entries that no plan writes so
+    """
+
+    machine: dict[str, Any] | None
+    tolerance: float | None
+    not_limited: tuple[str, ...]
+    reading: Reading = AS_USUAL
+    program: str | None = None
+    wrong: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, metadata: Mapping[str, Any]) -> FileSays:
+        """From the metadata of a file; entries of another type than expected count as missing."""
+        machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
+        free, program = metadata.get("not_limited", []), metadata.get("program")
+        known = isinstance(free, list) and all(isinstance(n, str) and n in NOT_LIMITED_NAMES for n in free)
+        number = float(tolerance) if is_number(tolerance) else math.nan  # type: ignore[arg-type]
+        positive = 0.0 < number < math.inf
+        right = {
+            "machine": isinstance(machine, dict),
+            "tolerance_mm": tolerance is None or positive,
+            "not_limited": known,
+        }
+        return cls(
+            machine=machine if isinstance(machine, dict) else None,
+            tolerance=number if positive else None,
+            not_limited=tuple(n for n in free if isinstance(n, str)) if isinstance(free, list) else (),
+            reading=Reading.saved(metadata.get("reading")),
+            program=program if isinstance(program, str) else None,
+            wrong=tuple(name for name, fits in right.items() if not fits),
+        )
+
+    def program_at(self, trajectory: Path) -> Path:
+        """Where the program is that the file names. Raises InputError if it names none, or if that is not there."""
+        found = None if self.program is None else Path(program_file(trajectory.parent, self.program))
+        if found is None or not os.path.isfile(found):
+            where = "names no program" if found is None else f"names the program {found}, which is not there"
+            raise InputError(f"{where}: planner verify {trajectory} JOB", source=str(trajectory))
+        return found
+
+    def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
+        """What the file says, and whether it was used."""
+        settings = ", ".join(f"{name} {value}" for name, value in self.reading.changed().items())
+        said = []
+        for what, taken, instead in (
+            (self.machine and f"machine {self.machine.get('name')}", machine_taken, "-m is given"),
+            (
+                self.tolerance and f"tolerance {self.tolerance:g} mm",
+                tolerance_taken,
+                "-m or --tolerance is given",
+            ),
+            (
+                settings and f"program read with {settings}",
+                reading_taken,
+                "the command line has its own",
+            ),
+        ):
+            if what:
+                said.append(f"{what} ({'taken' if taken else f'not taken, {instead}'})")
+        if self.not_limited:
+            free = ", ".join(self.not_limited)
+            said.append(f"not limited: {free} (judged all the same, unless --not-limited)")
+        return said
+
+    def remedies(self, verdict: Verdict, unjudged: tuple[str, ...]) -> list[str]:
+        """Sentences for limits that are exceeded and that the plan of the file did not keep."""
+        broken = {name.partition(".")[0] for name, check in verdict.limits.items() if check.broken}
+        return [
+            f"{name} is exceeded; the file says that its plan did not limit it: --not-limited {name} reports it without judging"
+            for name in self.not_limited
+            if name in broken and name not in unjudged
+        ]
+
+
+def program_file(directory: Path, source: str) -> str:
+    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as points."""
+    kept = [directory / name for name in KEPT if (directory / name).exists()]
+    return str(kept[0]) if kept and source.startswith("<") else source
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of JSON is a number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -49,8 +49,7 @@ if TYPE_CHECKING:
     from planner.planning.methods.listing import MethodNames
     from planner.planning.methods.registry import plan
     from planner.report.compare import compare
-    from planner.report.interactive.given_motion import verify
-    from planner.report.interactive.points import path
+    from planner.report.interactive.points import path, verify
     from planner.verifier import Verdict
 
     __version__: str
@@ -66,7 +65,7 @@ _HOME = {
     "Method": "planner.planning.job.method",
     "methods": "planner.planning.methods.listing",
     "path": "planner.report.interactive.points",
-    "verify": "planner.report.interactive.given_motion",
+    "verify": "planner.report.interactive.points",
     "compare": "planner.report.compare",
     "Machine": "planner.machine",
     "load_machine": "planner.machine",
@@ -82,7 +81,7 @@ _HOME = {
 
 VIEWS.update(
     to_pandas="planner.report.interactive.page:plan_frame",
-    plot="planner.report.interactive.figures:PlanFigures",
+    plot="planner.report.interactive.page:PlanFigures",
     save="planner.report.interactive.page:save",
     report="planner.report.interactive.page:ReportPage",
     card="planner.report.interactive.page:plan_card",

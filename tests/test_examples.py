@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = [
     "planner",
-    "planner.report.interactive.given_motion",
+    "planner.report.interactive.points",
     "planner.report.interactive.points",
     "planner.nc.reader",
 ]

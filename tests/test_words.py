@@ -55,7 +55,7 @@ def wrong_words(name: str, module: str) -> set[str]:
 
 def test_words_of_names_are_told_apart() -> None:
     assert wrong_words("first_cell", "baselines/fir/command.py") == {"cell"}
-    assert wrong_words("cells_per_period", "verifier/times.py") == set()
+    assert wrong_words("cells_per_period", "verifier/reading.py") == set()
     assert wrong_words("StraightCourse", "baselines/fir/guide.py") == {"course"}
     assert (
         wrong_words("per_stretch", "baselines/fir/columns.py")

@@ -20,7 +20,7 @@ from benchmarks.fuzz.settings import (
 )
 from benchmarks.fuzz.trajectories import make_trajectory, try_trajectory
 
-_JUDGED = ("planner/report/trajectory_reader.py", "planner/report/digits.py", "planner/verifier")
+_JUDGED = ("planner/report/trajectory_reader.py", "planner/report/trajectory_room.py", "planner/verifier")
 KINDS = {
     "nc": Kind(make_program, try_program, ("planner/nc",), guided=False),
     "hpgl": Kind(

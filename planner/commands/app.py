@@ -7,12 +7,10 @@ from typing import Annotated
 import typer
 
 from planner.commands.compare import compare_command
-from planner.commands.export import export_command
+from planner.commands.export import export_command, pulses_command, report_command
 from planner.commands.info import expand_command, info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
-from planner.commands.pulses import pulses_command
-from planner.commands.report import report_command
 from planner.commands.studied import sweep_command, what_if_command
 from planner.commands.usage import PlainCommand, PlainGroup
 from planner.commands.verify import verify_command

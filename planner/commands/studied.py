@@ -29,7 +29,7 @@ from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
-    from planner.commands.study.variant import StudiedJob
+    from planner.commands.study.settings import StudiedJob
 else:
     StudiedJob = Any  # of the commands' arguments: the module is loaded when a command runs
 
@@ -54,7 +54,7 @@ def _studied_job(
     *, job: Any, machine: str | None, tolerance: float | None, how: dict[str, Any], reading: Reading
 ) -> StudiedJob:
     """The job of a command line, read. Raises InputError, for settings that the method does not use too."""
-    from planner.commands.study.variant import StudiedJob
+    from planner.commands.study.settings import StudiedJob
     from planner.machine import load_machine
     from planner.nc.reader import read_program
     from planner.planning.methods.registry import check_settings
@@ -102,8 +102,7 @@ def what_if_command(
     if not changes:
         raise InputError("nothing to change: name a setting and its value, such as --set axes.y.jerk=4e5")
     from planner.commands.study.settings import parse_setting
-    from planner.commands.study.tables import what_if_dict, what_if_table
-    from planner.commands.study.what_if import what_if
+    from planner.commands.study.what_if import what_if, what_if_dict, what_if_table
     from planner.report.tables import assumed_lines
 
     settings = [parse_setting(text, studied.machine, studied.present_tolerance) for text in changes]
@@ -157,7 +156,7 @@ def sweep_command(
     from planner.commands.study.points import SweepFolder
     from planner.commands.study.settings import grid_of, parse_varied
     from planner.commands.study.sweep import sweep
-    from planner.commands.study.tables import sweep_table
+    from planner.commands.study.what_if import sweep_table
     from planner.commands.study.written import write_sweep
     from planner.report.tables import assumed_lines
 

@@ -13,13 +13,13 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator, model
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
-from planner.machine.kinematics_data import KinematicsData
 from planner.machine.parts import (
     Axis,
     ControlData,
     DialectData,
     Finite,
     Fir,
+    KinematicsData,
     Mode,
     Plotter,
     Positive,

@@ -19,13 +19,12 @@ from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.points import SOURCE, points_file
 from planner.planning.job.at_tip import joints_of
-from planner.report.block_feeds import BlockWatch, PlannedBlocks
 from planner.report.judging import KEPT, KEPT_POINTS, KEPT_TEXT
 from planner.report.planned import LeftOut, planned_program, source_text
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.summary import json_ready, not_limited, summary, tool_point_summary, uniform, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
-from planner.report.word_feed import WordFeed
+from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan

@@ -1,5 +1,5 @@
 """What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py,
-plots.py), plotly in notebooks (report/interactive/figures.py) and in pages (html/), for which
+plots.py), plotly in notebooks (report/interactive/page.py) and in pages (html/), for which
 plotly_figure.py puts it into plotly's words.
 
 A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of

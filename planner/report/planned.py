@@ -26,7 +26,7 @@ from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
 from planner.nc.text import program_text
 from planner.nc.writer import retimed
-from planner.report.block_feeds import ABOVE, PlannedBlocks, feeds_of, planned_blocks
+from planner.report.word_feed import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan

@@ -26,8 +26,7 @@ from planner.base.files import require_ending
 from planner.base.units import RAD_PER_DEG
 from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
-from planner.report.digits import on_grid, rounding
-from planner.report.trajectory_room import npz_shapes, require_room
+from planner.report.trajectory_room import npz_shapes, on_grid, require_room, rounding
 from planner.verifier import DERIVATIVES, Given
 
 Format = Literal["parquet", "csv", "npz"]
@@ -286,7 +285,7 @@ def _extruder(columns: dict[str, Array], t: FloatArray) -> FloatArray:
 
 
 def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:
-    """Times from 0 [s], what of their rounding remains for all and for the last (digits.py), and notes on it."""
+    """Times from 0 [s], what of their rounding remains for all and for the last (trajectory_room.py), and notes on it."""
     if len(given) < 2:
         raise InputError(f"{len(given)} samples; at least 2 are needed", source=source)
     late = np.flatnonzero(np.diff(given.astype(np.float64)) < TIME_STEP_MIN)

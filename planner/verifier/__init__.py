@@ -4,7 +4,7 @@
 that it chooses itself; and nothing else of the package: no sampling of the path, no constraint, no solver. What it checks, and how
 sharp each check is:
 
-    times.py      where it looks between the samples
+    reading.py    where it looks between the samples
     limits.py     velocity, acceleration, jerk per axis, normal acceleration: on the columns and on differences of the delivered
                   positions
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end

@@ -19,9 +19,10 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.verifier.excess import Excess, Fault, Kind, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, Look, line_of
+from planner.verifier.findings import FAULTS_OF_A_KIND, line_of
 from planner.verifier.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
+from planner.verifier.stream import Look
 from planner.verifier.verdict import LimitCheck
 
 WIDER = (4.0, 16.0, 64.0)  # times the budget

@@ -51,13 +51,13 @@ from planner.motion.trajectory import Trajectory
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import Excess, Fault, Kind, and_more
 from planner.verifier.filtered import bow_share
-from planner.verifier.findings import FAULTS_OF_A_KIND, Look
+from planner.verifier.findings import FAULTS_OF_A_KIND
 from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
 from planner.verifier.pieces import ProgramPieces
-from planner.verifier.records import Limits
-from planner.verifier.times import AnyMotion
-from planner.verifier.worst import ROUNDING_ULPS
+from planner.verifier.reading import AnyMotion
+from planner.verifier.stream import Look
+from planner.verifier.worst import ROUNDING_ULPS, Limits
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3

@@ -29,8 +29,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind
-from planner.verifier.findings import Look, line_of
-from planner.verifier.follow import follow
+from planner.verifier.findings import line_of
 from planner.verifier.matching import HELD, LAST, LOST_AFTER, Located
 from planner.verifier.pieces import (
     CONTOUR_ROUNDING,
@@ -40,8 +39,8 @@ from planner.verifier.pieces import (
     program_pieces,
     widened,
 )
-from planner.verifier.records import Limits
-from planner.verifier.stream import BLOCK_SAMPLES
+from planner.verifier.stream import BLOCK_SAMPLES, Look, follow
+from planner.verifier.worst import Limits
 
 
 def exact_faults(

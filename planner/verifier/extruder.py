@@ -23,14 +23,14 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, Look, check_of, joint_times
+from planner.verifier.findings import FAULTS_OF_A_KIND, check_of, joint_times
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
-from planner.verifier.records import SampleBlock
+from planner.verifier.stream import Look
 from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
-from planner.verifier.worst import COLUMN, ROUNDING_ULPS, Worst, differences, less_error
+from planner.verifier.worst import COLUMN, ROUNDING_ULPS, SampleBlock, Worst, differences, less_error
 
 NEAR = 8.0  # within so many tolerances of way E is the programmed one where a joint is passed [-]
 REST = 1e-9  # axes that move less than this between samples rest [mm]

@@ -48,9 +48,8 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier import contour, findings
 from planner.verifier.excess import Kind
-from planner.verifier.findings import Look
-from planner.verifier.follow import follow
 from planner.verifier.pieces import ProgramPieces
+from planner.verifier.stream import Look, follow
 from planner.verifier.verdict import AfterFilters
 
 NOTE = "after the filters"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -13,28 +11,15 @@ from planner.verifier import limits as rows
 from planner.verifier.excess import Excess, Fault, Kind, and_more, of_check
 from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
-from planner.verifier.records import Limits
-from planner.verifier.stream import Observed
+from planner.verifier.stream import Look
 from planner.verifier.verdict import LimitCheck
-from planner.verifier.worst import BACK, DIFFERENCE, Worst
+from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
 
 FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
 
 # A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a motion times are good to
 # 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop exceeds it by far more.
 STOP_ROUNDING = 1e-3
-
-
-@dataclass(frozen=True)
-class Look:
-    """One reading of the motion: the delivered samples (note "") or the dense ones."""
-
-    seen: Observed
-    note: str
-
-    def noted(self, text: str) -> str:
-        """A text with the note of this reading behind it."""
-        return ", ".join(part for part in (text, self.note) if part)
 
 
 def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:

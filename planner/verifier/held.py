@@ -21,8 +21,9 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, Look, joint_times
+from planner.verifier.findings import FAULTS_OF_A_KIND, joint_times
 from planner.verifier.pieces import CONTOUR_ROUNDING, ProgramPieces
+from planner.verifier.stream import Look
 from planner.verifier.verdict import ThreadCheck
 
 MORE = 0.02  # of d, by which a plan on a grid may take longer [-]

@@ -40,9 +40,8 @@ from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.judge import verify
 from planner.verifier.limits import NORMAL_NAME, limits_of, look_at_axes, rows_of
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
-from planner.verifier.records import SampleBlock
 from planner.verifier.verdict import LimitCheck, Verdict
-from planner.verifier.worst import BACK, Worst
+from planner.verifier.worst import BACK, SampleBlock, Worst
 
 # Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints [-].
 NOT_JUDGED = 100.0

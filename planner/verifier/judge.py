@@ -19,9 +19,8 @@ from planner.verifier.given import DERIVATIVES, WHOLE, Given
 from planner.verifier.held import thread_checks, thread_faults
 from planner.verifier.limits import NORMAL_NAME, limits_of
 from planner.verifier.pieces import program_pieces, widened
-from planner.verifier.reading import CHORDS, Reader
+from planner.verifier.reading import CHORDS, AnyMotion, Reader, cells_per_period
 from planner.verifier.ringing import ringing_of
-from planner.verifier.times import AnyMotion, cells_per_period
 from planner.verifier.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*DERIVATIVES, "feed", NORMAL_NAME)
@@ -43,7 +42,7 @@ def verify(
 
     trajectory  : the delivered samples at dt; only its times, positions and their derivatives are used
     toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
-    motion      : what the samples were taken from, to be judged between them too, at times chosen here (times.py); None to judge the
+    motion      : what the samples were taken from, to be judged between them too, at times chosen here (reading.py); None to judge the
                   samples alone
     seed        : of those times; a motion that was changed because of a verdict needs a verdict with another seed
     given       : which columns of the trajectory were delivered, and with how many digits

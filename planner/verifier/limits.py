@@ -37,8 +37,16 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.pieces import RATIO_ROUNDING
-from planner.verifier.records import Limits, SampleBlock
-from planner.verifier.worst import COLUMN, DIFFERENCE, Worst, differences, less_error, position_error
+from planner.verifier.worst import (
+    COLUMN,
+    DIFFERENCE,
+    Limits,
+    SampleBlock,
+    Worst,
+    differences,
+    less_error,
+    position_error,
+)
 
 # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
 FEED_AT_REST = 1e-6

@@ -1,25 +1,40 @@
-"""One reading of a motion: its delivered samples and, in step with them, what lies between."""
+"""One reading of a motion: its delivered samples and, in step with them, what lies between.
+
+Where the judge looks between the samples: at times of its own, which nobody can prepare for.
+
+A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the machine are cut into
+cells, and every cell is looked at once, at a time drawn at random from a generator with a fixed seed:
+
+    every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
+    every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between
+                   the times from cutting corners: with an acceleration a they are off the motion by a h^2/8, which is kept below
+                   `BOW` of the tolerance
+
+so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another seed they share no time
+but the motion's first and last.
+"""
 
 from __future__ import annotations
 
 import functools
 import itertools
 from collections.abc import Callable, Iterator
+from typing import Protocol
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind
-from planner.verifier.findings import Look, measured
+from planner.verifier.findings import measured
 from planner.verifier.given import Given
 from planner.verifier.limits import ACCELERATION
 from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, ProgramPieces
-from planner.verifier.records import Limits
 from planner.verifier.samples import Delivered
-from planner.verifier.stream import Watch
-from planner.verifier.times import AnyMotion, look
+from planner.verifier.stream import Look, Watch
+from planner.verifier.worst import Limits
 
 SIDE_BY_SIDE = SIZES.read_shared
 
@@ -31,7 +46,7 @@ class Reader:
 
     trajectory : the delivered samples, which are looked at chunk by chunk
     motion     : what they were taken from; None to read the samples alone
-    dt, cells  : the machine's period [s], and into how many cells it is divided (times.py)
+    dt, cells  : the machine's period [s], and into how many cells it is divided (`look`)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
     between    : into how many parts the machine's way from sample to sample is divided, and whether it is a cubic
@@ -200,3 +215,62 @@ class Comparison:
             found = f"not the delivered one: {self.axes[axis]} differs at t = {time:.6g} s"
             said.append(Fault(kind=Kind.SAMPLES, name="motion", found=found, time=time))
         return said
+
+
+PER_PIECE = 4  # cells; the planner's own places are three a piece
+PER_PERIOD = 2  # cells: chords between neighbouring times last less than a period, and cut no corner more than the machine's do
+BOW, MOST_PER_PERIOD = 0.01, 16  # [share of the tolerance]; cells, where axes are strong enough for anything
+SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
+CELLS = SIZES.places_at_once
+
+
+class AnyMotion(Protocol):
+    """A motion that can be asked at any time."""
+
+    @property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece on which everything is smooth [s], non-decreasing."""
+        ...
+
+    @property
+    def end(self) -> float:
+        """End of the motion [s]; it begins at 0."""
+        ...
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record that is returned."""
+        ...
+
+
+def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
+    """How many cells a period dt [s] needs for a tolerance [mm] under an acceleration [mm/s2] of all axes together."""
+    gap = float(np.sqrt(8.0 * BOW * tolerance / acceleration))
+    return int(
+        min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD)
+    )  # neighbouring times are up to two cells apart
+
+
+def look(motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD) -> Iterator[Trajectory]:
+    """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
+    draw = np.random.default_rng(seed)
+    edges = np.concatenate([[0.0], motion.t, [motion.end]])
+    begin, lasting = edges[:-1], np.diff(edges)
+    cells = np.maximum(PER_PIECE, np.ceil(per_period * lasting / dt)).astype(np.int64)
+    cells[lasting <= SHORTEST_PIECE] = 0
+    last = np.cumsum(cells)  # the number of cells up to the end of each piece
+    width = lasting / np.maximum(cells, 1)
+    seen, total = -np.inf, int(last[-1])
+    for first in range(0, total, CELLS):
+        beyond = min(first + CELLS, total)
+        low, high = np.searchsorted(last, [first, beyond - 1], side="right")
+        part = slice(low, high + 1)  # the pieces of these cells
+        before = last[part] - cells[part]
+        here = np.minimum(last[part], beyond) - np.maximum(before, first)  # how many cells of each
+        place = np.arange(first, beyond) - np.repeat(before, here) + draw.random(beyond - first)
+        times = np.repeat(begin[part], here) + np.repeat(width[part], here) * place
+        times = np.concatenate([[0.0] if not first else [], times, [motion.end] if beyond == total else []])
+        times = np.maximum.accumulate(np.clip(times, 0.0, motion.end))
+        times = times[np.diff(times, prepend=seen) > 0.0]
+        if len(times):
+            seen = times[-1]
+            yield motion.at(times, dt)

@@ -33,13 +33,13 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind
-from planner.verifier.findings import Look, measured
+from planner.verifier.findings import measured
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import ACCELERATION, JERK
 from planner.verifier.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
-from planner.verifier.records import Limits
 from planner.verifier.stops import STILL
-from planner.verifier.worst import ROUNDING_ULPS
+from planner.verifier.stream import Look
+from planner.verifier.worst import ROUNDING_ULPS, Limits
 
 # A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the
 # machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at least 1000 times.

@@ -6,23 +6,24 @@ first. Three samples are carried over from block to block, for the third differe
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
+from planner.verifier.kernel import kernel
 from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
-from planner.verifier.matching import Located, Match, match_samples, new_match, nowhere
-from planner.verifier.pieces import ProgramPieces, both_apart
-from planner.verifier.records import Limits, SampleBlock
+from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
+from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.stops import AtStop
 from planner.verifier.switches import Bounds, Chords
 from planner.verifier.user_limits import look_at_user_limits
-from planner.verifier.worst import BACK, Worst
+from planner.verifier.worst import BACK, Limits, SampleBlock, Worst
 
 BLOCK_SAMPLES = SIZES.judged_at_once
 COLUMNS = ("t", "position", *DERIVATIVES)
@@ -56,6 +57,18 @@ class Observed:
         self.last, self.t_last = position[-1].copy(), float(t[-1])
         self.samples += len(t) - skip
         self.gap_max = max(self.gap_max, float(np.diff(t[max(skip - 1, 0) :]).max(initial=0.0)))
+
+
+@dataclass(frozen=True)
+class Look:
+    """One reading of the motion: the delivered samples (note "") or the dense ones."""
+
+    seen: Observed
+    note: str
+
+    def noted(self, text: str) -> str:
+        """A text with the note of this reading behind it."""
+        return ", ".join(part for part in (text, self.note) if part)
 
 
 class Watch:
@@ -137,3 +150,49 @@ class Watch:
     def finish(self) -> None:
         """No more samples: judge what had to wait for them."""
         self._feeds.finish()
+
+
+Each = Callable[[FloatArray, FloatArray, Located], None]
+
+
+def follow(
+    parts: Iterable[tuple[FloatArray, FloatArray]],
+    pieces: ProgramPieces,
+    note: str = "",
+    *,
+    each: Each | None = None,
+    search: bool = True,
+) -> Look:
+    """Match a motion with a path.
+
+    parts  : of its samples, in order: times (T,) [s], positions (T, A) [mm]
+    each   : called with times (T,) [s], distance over budget (T,) and places of every part
+    search : whether a motion that was lost is looked for on the pieces ahead; if not, it is lost for good
+    """
+    axes = pieces.vertex.shape[1]
+    seen = Observed(match=new_match(pieces), worst=Worst((), axes))
+    if not search:
+        seen.match.tally[SEARCHED] = SEARCH_MAX
+    free = np.full(axes, np.inf)
+    anywhere = AtStop(free, free, np.zeros(axes))  # the motion need not rest
+    carried_t, carried = np.empty(0), np.empty((0, axes))
+    for new_t, new in parts:
+        t, position = np.concatenate([carried_t, new_t]), np.concatenate([carried, new])
+        skip = len(carried_t)
+        seen.take(t, position, skip)
+        place = nowhere(len(t))
+        match_samples(pieces, seen.match, t, position, skip, 1, position[:0], anywhere, place)
+        if each is not None:
+            ratio = np.empty(len(t))
+            _ratios(pieces, place.piece, position, ratio)
+            each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
+        carried_t, carried = t[-1:], position[-1:]
+    return Look(seen, note)
+
+
+@kernel()
+def _ratios(pieces: ProgramPieces, piece: Array, position: FloatArray, ratio: FloatArray) -> None:
+    """Distance of each position from its piece over the piece's budget, into `ratio` (n,)."""
+    for k in range(len(piece)):
+        _, _, distance = reach_piece(pieces, piece[k], position[k], 0.0)
+        ratio[k] = distance / pieces.piece[piece[k]]["budget"]

@@ -23,11 +23,12 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.series import Series
 from planner.verifier.limits import FEED_AT_REST
-from planner.verifier.records import Limits, SampleBlock
 from planner.verifier.worst import (
     COLUMN,
     DIFFERENCE,
     ROUNDING_ULPS,
+    Limits,
+    SampleBlock,
     Worst,
     differences,
     less_error,

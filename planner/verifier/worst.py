@@ -15,12 +15,13 @@ path and 1 ms it is worth 2e-10 mm, 1e-7 mm/s, 4e-4 mm/s2, 2 mm/s3.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.verifier.excess import Spans, above
-from planner.verifier.records import Limits, SampleBlock
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 COLUMN, DIFFERENCE = 0, 1  # how a value was seen
@@ -126,3 +127,53 @@ def differences(
 def less_error(difference: tuple[FloatArray, FloatArray]) -> FloatArray:
     """(n, K) the size of a difference, less its error, both (n, K)."""
     return np.maximum(np.abs(difference[0]) - difference[1], 0.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Limits:
+    """What the motion is measured against: (3, A) velocity, acceleration, jerk; and the rest.
+
+    linear        : (A,) True on x, y and z, of which the normal acceleration is
+    judged        : (3,) True for the columns velocity, acceleration, jerk that were delivered
+    rounding      : (A,) largest error of a position by its digits [mm]
+    time_rounding : the same of a time [s]
+    normal        : of the normal acceleration [mm/s2], or inf
+    acceleration_at_stop : (A,) inf where acceleration is not limited [mm/s2]
+    user          : the user's limits (user_limits.py)
+    """
+
+    axes: tuple[str, ...]
+    per_axis: FloatArray
+    linear: Array
+    judged: Array
+    rounding: FloatArray
+    time_rounding: float
+    normal: float
+    acceleration_at_stop: FloatArray
+    jerk_limited: bool
+    user: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampleBlock:
+    """Samples n of a motion, those before `skip` for the differences only.
+
+    t         : (n,) [s]; position, velocity, acceleration, jerk: (n, A), zeros where they were not delivered
+    piece     : (n,) the piece of the path that each is on
+    travelled : path length run before [mm]
+    """
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    piece: Array
+    skip: int = 0
+    travelled: float = 0.0
+
+    def travelled_to(self) -> FloatArray:
+        """(n,) path length run at each sample [mm]."""
+        step = np.linalg.norm(np.diff(self.position, axis=0, prepend=self.position[:1]), axis=1)
+        step[: max(self.skip, 1)] = 0.0
+        return self.travelled + np.cumsum(step)

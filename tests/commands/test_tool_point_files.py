@@ -13,11 +13,11 @@ from planner.machine import load_machine
 from planner.machine.kinematics import kinematics_of
 from planner.nc.reader import read_program
 from planner.planning.job.at_tip import directions_of
-from planner.report.block_feeds import planned_blocks
 from planner.report.figure import tool_lines
 from planner.report.html.page import path_picture
 from planner.report.html.saved import saved_plan
 from planner.report.plots import toolpath_figure
+from planner.report.word_feed import planned_blocks
 from tests.commands.command_line import run
 
 TEXT = "G21 G90\nG0 X1 Y2 Z50\nM428\nG1 X2 A3 C5 F600\nX3 A6\nM429\nG0 Z52\nM2\n"

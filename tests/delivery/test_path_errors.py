@@ -12,8 +12,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
-from planner.verifier.follow import follow
 from planner.verifier.pieces import program_pieces, widened
+from planner.verifier.stream import follow
 
 MACHINE = load_machine("router")
 EPS = 0.05

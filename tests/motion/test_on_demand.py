@@ -15,10 +15,10 @@ from planner.motion import on_demand, timing
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.trajectory import COLUMNS, Trajectory
 from planner.report import trajectory_file
-from planner.report.block_feeds import planned_blocks
 from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
-from planner.verifier import reading, times
+from planner.report.word_feed import planned_blocks
+from planner.verifier import reading
 
 METHODS = ("optimal", "stop", "bezier", "fir", "kinematic")
 
@@ -124,7 +124,7 @@ def test_the_verdict_is_the_same_on_any_number_of_threads(monkeypatch):
     monkeypatch.setattr(timing, "SAMPLES_KEPT", 50)
     monkeypatch.setattr(on_demand, "CHUNK", 77)
     monkeypatch.setattr(reading, "SIDE_BY_SIDE", 0)
-    monkeypatch.setattr(times, "CELLS", 350)
+    monkeypatch.setattr(reading, "CELLS", 350)
     verdicts, used = [], []
     together = reading.side_by_side
     monkeypatch.setattr(reading, "side_by_side", lambda *work: (used.append(len(work[0])), together(*work)))

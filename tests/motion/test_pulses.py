@@ -20,8 +20,7 @@ from planner.cli import app
 from planner.motion.pulses import HYSTERESIS, AxisPulses, Drive, overrun, pulses_of
 from planner.motion.trajectory import Trajectory
 from planner.planning.methods.kinematic import KinematicMethod
-from planner.report.pulse_file import write_pulses
-from planner.report.trajectory_file import write_trajectory
+from planner.report.trajectory_file import write_pulses, write_trajectory
 
 OFF_MAX = 0.5 + HYSTERESIS
 

@@ -17,7 +17,7 @@ from planner.nc.writer import retimed
 from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.stop import StopMethod
-from planner.report.block_feeds import RUN_PERIODS, SPREAD, block_feeds, block_times, runs_of_feed
+from planner.report.word_feed import RUN_PERIODS, SPREAD, block_feeds, block_times, runs_of_feed
 
 MACHINE = load_machine("mill")
 PROGRAM = """G21 G90 G17

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.report.digits import on_grid, rounding
+from planner.report.trajectory_room import on_grid, rounding
 
 RNG = np.random.default_rng(5)
 EXACT = np.cumsum(RNG.uniform(-0.1, 0.1, 500))

@@ -14,8 +14,8 @@ from benchmarks.reading import nc_programs
 from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.nc.writer import retimed
-from planner.report.block_feeds import planned_blocks
 from planner.report.planned import planned_program
+from planner.report.word_feed import planned_blocks
 
 MACHINE = planner.load_machine(Path(nc_programs.__file__).parent / "programs" / "mill-xyzabc.toml")
 SOURCE = b"""G21 G17 G90 G94 F1200

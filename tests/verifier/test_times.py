@@ -6,7 +6,7 @@ from motions import JERK_FREE, Asked, Moves, changed, machine, polyline, sample
 
 from planner.motion.timing import WATCHED
 from planner.verifier import Given, verify
-from planner.verifier.times import PER_PERIOD, PER_PIECE, cells_per_period, look
+from planner.verifier.reading import PER_PERIOD, PER_PIECE, cells_per_period, look
 
 M = machine()
 LINE = polyline([(0, 0, 0), (30, 0, 0)], jerk=2e5)
@@ -48,7 +48,7 @@ def test_there_are_more_times_than_the_planner_looks_at_and_others():
 
 @pytest.mark.slow
 def test_chunks_make_no_difference(monkeypatch):
-    from planner.verifier import times as module
+    from planner.verifier import reading as module
 
     asked, toolpath = Asked(LINE, M.dt), Moves().line(30).toolpath(M)
     whole = times(asked)

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.commands.study.settings import Setting
-from planner.commands.study.variant import StudiedJob
+from planner.commands.study.settings import Setting, StudiedJob
 from planner.report.replace import check_output, replacing_file
 from planner.report.summary import json_ready, versions
 

@@ -14,7 +14,8 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +24,11 @@ from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.feedrate.constraints import normal_limit
 from planner.machine import ROTARY_AXES, Machine, machine_from_dict
 from planner.nc.program import Program
+
+if TYPE_CHECKING:
+    from planner.planning.job.plan import Plan
+    from planner.planning.job.stages import Progress
+
 
 TOLERANCE, FEED = "tolerance", "feed"
 G = 9806.65  # standard gravity [mm/s2]
@@ -239,3 +245,42 @@ def grid_of(varied: Sequence[Varied]) -> list[tuple[Setting, ...]]:
         raise InputError(f"{points:,} combinations; there must not be more than {POINTS_MAX:,}")
     settings = [[Setting(name=one.name, value=value) for value in one.values] for one in varied]
     return list(itertools.product(*settings))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StudiedJob:
+    """A program that is planned many times.
+
+    tolerance : contour tolerance that takes precedence over the program's and the machine's [mm], or None
+    how       : method and settings of `planner.plan`: method, geometry, corner, solver, effort, rounds
+    """
+
+    program: Program
+    machine: Machine
+    tolerance: float | None = None
+    how: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def present_tolerance(self) -> float:
+        """The contour tolerance [mm]; NaN if the program has several (G64 P)."""
+        if self.tolerance is not None:
+            return self.tolerance
+        of_block = np.where(np.isnan(self.program.tolerance), self.machine.tolerance, self.program.tolerance)
+        found = np.unique(of_block) if len(of_block) else np.array([self.machine.tolerance])
+        return float(found[0]) if len(found) == 1 else float("nan")
+
+    def changed(self, settings: Sequence[Setting]) -> StudiedJob:
+        """The job with other values of some settings. Raises InputError where they do not go together."""
+        of_job = job_settings(settings)
+        return dataclasses.replace(
+            self,
+            program=with_feed(self.program, of_job.get(FEED, 1.0)),
+            machine=with_settings(self.machine, settings),
+            tolerance=of_job.get(TOLERANCE, self.tolerance),
+        )
+
+    def plan(self, progress: Progress | None = None) -> Plan:
+        """Plan the job. Raises InputError as `planner.plan`."""
+        from planner.planning.methods.registry import plan
+
+        return plan(self.program, self.machine, tolerance=self.tolerance, progress=progress, **self.how)

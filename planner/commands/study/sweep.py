@@ -21,8 +21,7 @@ from planner.base.errors import InputError, NotSolvedError
 from planner.base.packages import import_needed
 from planner.base.threads import threads
 from planner.commands.study.points import PASSED, SweepFolder, planned_point
-from planner.commands.study.settings import Setting, Varied, grid_of
-from planner.commands.study.variant import StudiedJob
+from planner.commands.study.settings import Setting, StudiedJob, Varied, grid_of
 
 # Columns of the table behind those of the settings.
 TEXTS = ("outcome", "sentence", "held_by")

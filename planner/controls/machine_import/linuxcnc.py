@@ -36,8 +36,7 @@ from planner.controls.machine_import.settings import (
     travel_note,
 )
 from planner.machine import ROTARY_AXES
-from planner.machine.kinematics_data import XYZAC, XYZBC
-from planner.machine.parts import AXIS_LIMIT_MAX
+from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
 
 _LETTERS = "xyzabcuvw"  # in the order of LinuxCNC's axes
 # mm in a LINEAR_UNITS and degrees in an ANGULAR_UNITS; a number is units per mm, and per degree (src/emc/ini/emcIniFile.cc).

@@ -34,7 +34,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.machine import Machine
-from planner.machine.kinematics_data import HEAD_HEAD, HEAD_TABLE, KinematicsData
+from planner.machine.parts import HEAD_HEAD, HEAD_TABLE, KinematicsData
 
 LINEAR = ("x", "y", "z")
 Vector = tuple[Any, Any, Any]

@@ -20,7 +20,7 @@ VIEWS: dict[str, str] = {}
 
 
 class Figures(Protocol):
-    """The figures of a plan; what they take and raise is said where they are made (report/interactive/figures.py)."""
+    """The figures of a plan; what they take and raise is said where they are made (report/interactive/page.py)."""
 
     def __call__(self) -> Figure:
         """The path, coloured by feed."""

@@ -19,8 +19,7 @@ from planner.geometry.distance import distance_near
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
 from planner.planning.job.at_tip import of_axes
-from planner.report.block_feeds import planned_blocks
-from planner.report.word_feed import WordFeed
+from planner.report.word_feed import WordFeed, planned_blocks
 
 if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath

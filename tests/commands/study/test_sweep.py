@@ -21,8 +21,7 @@ from typer.testing import CliRunner, Result
 from planner.base.errors import InputError
 from planner.cli import app
 from planner.commands.study.points import PASSED, SweepFolder, planned_point
-from planner.commands.study.settings import Setting, grid_of, parse_varied
-from planner.commands.study.variant import StudiedJob
+from planner.commands.study.settings import Setting, StudiedJob, grid_of, parse_varied
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
 

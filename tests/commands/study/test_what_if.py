@@ -14,8 +14,14 @@ from typer.testing import CliRunner, Result
 
 from planner.base.errors import InputError
 from planner.cli import app
-from planner.commands.study.settings import Setting, parse_setting, setting_names, value_of, with_settings
-from planner.commands.study.variant import StudiedJob
+from planner.commands.study.settings import (
+    Setting,
+    StudiedJob,
+    parse_setting,
+    setting_names,
+    value_of,
+    with_settings,
+)
 from planner.commands.study.what_if import forecast, what_if
 from planner.machine import load_machine
 from planner.nc.reader import parse_program

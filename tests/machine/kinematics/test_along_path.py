@@ -10,7 +10,7 @@ from planner.base.errors import InputError
 from planner.machine.kinematics.along_path import joints_along
 from planner.machine.kinematics.chain import Chain
 from planner.machine.kinematics.expression import expression
-from planner.machine.kinematics_data import KinematicsData
+from planner.machine.parts import KinematicsData
 
 casadi.GlobalOptions.setNumpyMode(-1)  # numpy's functions of its symbols stay symbols
 

@@ -11,7 +11,7 @@ import pytest
 
 from planner.base.units import RAD_PER_DEG
 from planner.machine.kinematics.chain import Chain
-from planner.machine.kinematics_data import KinematicsData
+from planner.machine.parts import KinematicsData
 from planner.verifier.joints import tip_and_direction
 from tests.machine.kinematics import linuxcnc
 

@@ -8,7 +8,7 @@ import pytest
 from planner.base.errors import InputError
 from planner.machine.kinematics.chain import Chain
 from planner.machine.kinematics.directions import rotary_along
-from planner.machine.kinematics_data import KinematicsData
+from planner.machine.parts import KinematicsData
 
 CHAIN = Chain(data=KinematicsData(type="xyzac-trt"), length=0.0)
 TOLERANCE = np.radians(0.1)

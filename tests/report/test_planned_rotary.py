@@ -17,7 +17,7 @@ from planner.nc.writer import retimed
 from planner.report.planned import planned_program
 from planner.report.word_feed import planned_blocks
 
-MACHINE = planner.load_machine(Path(nc_programs.__file__).parent / "programs" / "mill-xyzabc.toml")
+MACHINE = planner.load_machine(Path(nc_programs.__file__).parent.parent / "programs" / "mill-xyzabc.toml")
 SOURCE = b"""G21 G17 G90 G94 F1200
 G1 X10
 X20 A10

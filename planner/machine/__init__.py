@@ -26,6 +26,7 @@ from planner.machine.whole import (
     LINEAR_AXES,
     PARALLEL_AXES,
     ROTARY_AXES,
+    TANGENTIAL,
     WORK_OFFSETS,
     Machine,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "LINEAR_AXES",
     "PARALLEL_AXES",
     "ROTARY_AXES",
+    "TANGENTIAL",
     "WORK_OFFSETS",
     "Axis",
     "ControlData",

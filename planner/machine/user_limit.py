@@ -92,6 +92,9 @@ class PathLimit:
     name: str = ""
     unit: str = "mm"
     turn: ClassVar[float | None] = None
+    counts: ClassVar[tuple[str, ...] | None] = (
+        None  # letters of the axes whose common way it is; None: of all
+    )
 
     def velocity(self, at: Place) -> Any:
         """Largest speed [mm/s] at the places (n,)."""
@@ -143,6 +146,7 @@ class ScaledLimit:
 
     def __init__(self, limit: OwnLimit, quantity: str, factor: float):
         self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
+        self.counts = getattr(limit, "counts", None)
         self._limit, self._which, self._factor = limit, QUANTITIES.index(quantity), factor
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
@@ -203,9 +207,10 @@ def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[F
     table = np.stack(motion)
     columns = [Series(table[:, :, k]) for k in range(len(axes))]
     found = limit.value(Place(axes, columns, table[1]))
+    if found is None:
+        counts = np.isin(axes, getattr(limit, "counts", None) or axes)
+        return along_path(*table[1:, :, counts])[0]
     if not isinstance(found, Series):
-        if found is None:
-            raise ValueError("the length of the path has no derivatives by the position")
         return np.zeros((3, table.shape[1]))  # a constant
     if not np.isfinite(found.derivatives).all():
         worst = int((~np.isfinite(found.derivatives)).any(axis=0).argmax())

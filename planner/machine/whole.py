@@ -36,6 +36,7 @@ PARALLEL_AXES = ("u", "v", "w")  # linear too, beside x, y and z
 ALL_AXES = LINEAR_AXES + ROTARY_AXES + PARALLEL_AXES
 # Distance from a rotary axis at which turning counts as a length, where the machine says none [mm]: half of a workpiece of 100 mm.
 ROTARY_RADIUS = 50.0
+TANGENTIAL = "tangential"  # what the acceleration of x, y and z together is called: "acceleration.tangential"
 EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
@@ -55,6 +56,7 @@ class Machine(Record):
     feed_max            : largest feed along the path [mm/s], or None
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
+    tangential_acceleration : largest acceleration along the path, of x, y and z together [mm/s2], or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
     rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
                           file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
@@ -72,6 +74,7 @@ class Machine(Record):
     feed_max: Positive | None = None
     feed_default: Positive | None = None
     normal_acceleration: Positive | None = None
+    tangential_acceleration: Positive | None = None
     blend_rapids: bool = False
     rotary_radius: Positive | None = None
     fir: Fir | None = None
@@ -190,7 +193,7 @@ class Machine(Record):
 
         Raises InputError for limits without a name, and for a name that is there already.
         """
-        check_names(limits, [*self.axes])
+        check_names(limits, [*self.axes, TANGENTIAL])
         machine = self.model_copy()
         machine._own = tuple(limits)
         return machine

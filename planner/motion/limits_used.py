@@ -10,24 +10,28 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.machine import LINEAR_AXES, Machine
+from planner.feedrate.constraints.limits import NORMAL, Limits
+from planner.machine import LINEAR_AXES
 from planner.machine.user_limit import OwnLimit, Place, along_path, bounds_at, limit_derivatives
 from planner.motion.trajectory import Trajectory
 
-NORMAL_ORDER = 2  # slower by lam, the normal acceleration is less by lam^2
 REST = 1e-6  # [mm/s] below this, the direction of a velocity is rounding
 
 
-def normal_ratios(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
-    """The limit's order and the motion's ratio to it at its T samples (T,), 0 at rest; nothing on machines that name none."""
-    if machine.normal_acceleration is None:
-        return
+def ratios(limits: Limits, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+    """Of every limit that is no axis' own its order and the motion's ratios (T,) to it at its T samples."""
+    if np.isfinite(limits.normal):
+        yield NORMAL.order, _normal(motion) / limits.normal
+    yield from _along(limits.along, motion)
+
+
+def _normal(motion: Trajectory) -> FloatArray:
+    """(T,) normal acceleration of x, y and z, 0 at rest [mm/s2]."""
     v, a = _linear(motion)
     square, along = np.sum(v * v, axis=1), np.sum(v * a, axis=1)
     moving = square > REST**2
     share = np.divide(along, square, out=np.zeros(len(v)), where=moving)
-    across = np.where(moving, np.linalg.norm(a - share[:, None] * v, axis=1), 0.0)
-    yield NORMAL_ORDER, across / machine.normal_acceleration
+    return np.where(moving, np.linalg.norm(a - share[:, None] * v, axis=1), 0.0)
 
 
 def slowest(motion: Trajectory) -> FloatArray:
@@ -47,19 +51,15 @@ def _linear(motion: Trajectory) -> tuple[FloatArray, FloatArray]:
     return motion.velocity[:, of], motion.acceleration[:, of]
 
 
-def user_ratios(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
+def _along(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
     """For every quantity of every limit its order, 1 to 3, and the motion's ratio to it (n,)."""
     columns = (motion.velocity, motion.acceleration, motion.jerk)
     if not limits:
         return
-    path, direction = along_path(*columns)
+    _, direction = along_path(*columns)
     place = Place(motion.axes, list(motion.position.T), direction, motion.block)
     for limit in limits:
         bounds = bounds_at(limit, place, len(motion.t))
-        values = (
-            path
-            if limit.value(place) is None
-            else limit_derivatives(limit, motion.axes, (motion.position, *columns))
-        )
+        values = limit_derivatives(limit, motion.axes, (motion.position, *columns))
         for k in range(3):
             yield k + 1, np.abs(values[k]) / bounds[:, k]

@@ -18,6 +18,7 @@ import numpy as np
 from planner.base.sizes import SIZES
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.limits import LIMITS
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.sampling.path_samples import PathSamples
@@ -94,10 +95,14 @@ def opened(samples: PathSamples, solution: FeedrateSolution, path: SmoothPath) -
 
 
 def more_of(machine: Machine, name: str) -> Callable[[float], Machine]:
-    """A function that makes the machine with a given share more of a limit: "velocity.x" of an axis, or
-    "velocity.NAME" of a limit of one's own, whose bound of that quantity is then so much larger
-    everywhere."""
+    """A function that makes the machine with a given share more of a limit: "velocity.x" of an axis, one with
+    a key of its own in the machine file, or "velocity.NAME" of a limit of one's own, whose bound of that
+    quantity is then so much larger everywhere."""
     quantity, _, of = name.partition(".")
+    keys = {limit.name: limit.key for limit in LIMITS if limit.key}
+
+    def more_of_key(share: float) -> Machine:
+        return machine.model_copy(update={keys[name]: getattr(machine, keys[name]) * (1.0 + share)})
 
     def more(share: float) -> Machine:
         limits = machine.axes[of]
@@ -112,4 +117,6 @@ def more_of(machine: Machine, name: str) -> Callable[[float], Machine]:
             ]
         )
 
+    if name in keys:
+        return more_of_key
     return more if of in machine.axes else more_of_own

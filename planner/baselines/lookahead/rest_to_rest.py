@@ -6,9 +6,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import rest_to_rest_times
-from planner.corners.budget import error_rate, largest_normal
+from planner.corners.budget import error_rate
+from planner.feedrate.constraints.limits import Limits
 from planner.geometry.toolpath import Toolpath
-from planner.machine import Machine
+from planner.machine import LINEAR_AXES, Machine
 
 GOLDEN = float((np.sqrt(5.0) - 1.0) / 2.0)
 GOLDEN_STEPS = 26  # which leave 4e-6 of the range of log v
@@ -22,27 +23,26 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     move, each over the largest component that a unit vector has there (`_components`), must hold for the vector: with kappa v^2 <=
     a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s
     <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N).
+    The tangential acceleration is bounded by the share of the path that is in x, y and z, on curves as if all of it were.
     Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of |r'''| takes the
     place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment takes least time from rest to rest: none of
     these limits makes it longer when it gets larger.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
-    v, a, j = (
-        (machine.limits(q, axes) / np.maximum(direction, AT_REST)).min(axis=1)
-        for q in ("velocity", "acceleration", "jerk")
-    )
+    limits = Limits.of(machine, axes)
+    v, a, j = ((limit / np.maximum(direction, AT_REST)).min(axis=1) for limit in limits.of_axes)
+    linear = np.linalg.norm(direction[:, np.isin(axes, LINEAR_AXES)], axis=1)
+    a = np.minimum(a, limits.tangential / np.maximum(linear, AT_REST))
     curved = ~toolpath.straight
     kappa = toolpath.curvature[curved]
     twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
     twist[on_curve] = np.maximum(twist[on_curve], toolpath.curves.twist[toolpath.curve[curved][on_curve]])
     component = np.maximum(_components(toolpath, curved), AT_REST)
-    v_all, a_all, j_all = (
-        (machine.limits(q, axes) / component).min(axis=1) for q in ("velocity", "acceleration", "jerk")
-    )
+    v_all, a_all, j_all = ((limit / component).min(axis=1) for limit in limits.of_axes)
     half = np.sqrt(0.5)
     budget = toolpath.along[curved] / error_rate(machine)
-    across = np.minimum(half * a_all, np.minimum(budget, largest_normal(machine)))
+    across = np.minimum(half * a_all, np.minimum(budget, limits.normal))
     v[curved] = np.min(
         [
             v_all,
@@ -52,7 +52,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
         ],
         axis=0,
     )
-    a[curved], j[curved] = half * a_all, half * j_all / 2
+    a[curved], j[curved] = np.minimum(half * a_all, limits.tangential), half * j_all / 2
     product = np.full(len(v), np.inf)  # bound of v a_s [mm2/s3]
     product[curved] = half * j_all / (3 * kappa)
     bound = np.flatnonzero(v * a > product)

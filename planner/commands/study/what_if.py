@@ -33,6 +33,7 @@ from planner.base.errors import InputError, NotSolvedError
 from planner.base.units import MICROMETRE
 from planner.commands.study.points import PASSED, TABLE
 from planner.commands.study.settings import FEED, TOLERANCE, Setting, StudiedJob, unit_of, value_of
+from planner.feedrate.constraints.limits import LIMITS
 from planner.machine import Machine
 from planner.report.compare import Row, refused, row_of_plan
 from planner.report.summary import json_ready
@@ -145,11 +146,13 @@ def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: fl
     if setting.name == TOLERANCE:
         return _of_tolerance(prices, setting.value - tolerance)
     axis, _, quantity = setting.name.removeprefix("axes.").partition(".")
-    name = FEED if setting.name == FEED else f"{quantity}.{axis}"
+    of_key = {limit.key: limit.name for limit in LIMITS if limit.key}
+    name = FEED if setting.name == FEED else of_key.get(setting.name, f"{quantity}.{axis}")
     present = value_of(setting.name, machine, tolerance)
     if present is None or name not in (FEED, *prices.limits):
         return None
-    price = prices.feed if name == FEED else prices.limits[name] * _planned_limit(name, machine)
+    planned = present if setting.name in of_key else _planned_limit(name, machine)
+    price = prices.feed if name == FEED else prices.limits[name] * planned
     ratio = setting.value / present
     share = 1.0 - 1.0 / ratio
     if ratio <= 1.0 or name not in prices.ranges:

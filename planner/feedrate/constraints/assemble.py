@@ -9,7 +9,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limit import Cap, Limit
-from planner.feedrate.constraints.limits import ACCELERATION, JERK, LIMITS, VELOCITY
+from planner.feedrate.constraints.limits import LIMITS, Limits
 from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.constraints.own_axes import own_inside, with_own_axes
 from planner.feedrate.constraints.problem import FeedrateProblem
@@ -38,7 +38,7 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
             "this smoothing; leave them out, or use --corner bezier or --method stop"
         )
     grid = OnGrid(samples, machine, measured)
-    caps = _caps(grid)
+    caps, limits = _caps(grid), Limits.of(machine, grid.axes)
     pieces = len(samples.piece) - 1
     problem = FeedrateProblem(
         piece=samples.piece,
@@ -49,9 +49,9 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         d2_right=samples.d2_right,
         d3_left=samples.d3_left,
         d3_right=samples.d3_right,
-        velocity=VELOCITY.of(machine, grid.axes),
-        acceleration=ACCELERATION.of(machine, grid.axes),
-        jerk=JERK.of(machine, grid.axes),
+        velocity=limits.velocity,
+        acceleration=limits.acceleration,
+        jerk=limits.jerk,
         feed_sq_max=caps.feed_sq_max,
         feed_sq_bound=caps.which,
         bound_names=tuple(caps.names),
@@ -59,7 +59,7 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         feed_sq_start=np.zeros(pieces),
         feed_sq_end=np.zeros(pieces),
     )
-    return with_own_axes(problem, samples, machine) if machine.own else problem
+    return with_own_axes(problem, samples, limits) if limits.along else problem
 
 
 def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
@@ -67,7 +67,8 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
     grid = OnGrid(samples, machine)
     found = [bound for limit in LIMITS if (bound := limit.inside(grid)) is not None]
     feed_sq = np.min(found, axis=0)
-    return np.minimum(feed_sq, own_inside(samples, machine)) if machine.own else feed_sq
+    limits = Limits.of(machine, grid.axes)
+    return np.minimum(feed_sq, own_inside(samples, limits)) if limits.along else feed_sq
 
 
 def bounds_of(samples: PathSamples, machine: Machine, limits: Sequence[Limit]) -> FloatArray:

@@ -1,14 +1,15 @@
 """What a limit is to the planner. Every limit is one object in a file of its own; `limits.py` lists them all.
 
-A limit takes part in the feedrate problem (problem.py) in one of two forms, x = feed^2 and u, j acceleration and jerk along the path:
+A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j acceleration and jerk along the path:
 
     a cap    x <= ...  at a grid point. What it comes from says which method the limit has:
                  at_points   the point and the intervals beside it          programmed feed, axis velocity
                  on_side     the curve on one side of the point             normal acceleration, chord and filter error, phase lag
                  at_jumps    a difference of the two sides                  axis acceleration, where a line meets an arc
     a row    |row(r', r'', r'''; x, u, j)| <= limit of the axis, at both ends of every interval      axis acceleration, axis jerk
+    along    both of one function of the path, as the user's limits have them (machine/user_limit.py)      tangential acceleration
 
-Limits of one's own (own.py) are functions of the position with rows of the same two kinds. The judge knows nothing of these objects: it
+The judge knows nothing of these objects: it
 has code of its own for every limit (verifier/), and tests/verifier/test_laws_of_limits.py holds one against the other.
 """
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.machine import Machine
+from planner.machine.user_limit import OwnLimit
 
 if TYPE_CHECKING:
     from planner.feedrate.constraints.on_grid import OnGrid, Side
@@ -55,11 +57,13 @@ class Limit:
     name  : as it is printed; of an axis limit with the axis behind it, see `AxisLimit.called`
     unit  : of what is limited; rad stands for mm on rotary axes
     order : slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and errors, 3 of jerks
+    key   : of the machine file, if its value stands alone there
     """
 
     name: ClassVar[str]
     unit: ClassVar[str]
     order: ClassVar[int]
+    key: ClassVar[str] = ""
 
     def at_points(self, grid: OnGrid) -> Iterator[Cap]:
         """Caps from the points and the intervals beside them."""
@@ -75,6 +79,10 @@ class Limit:
 
     def inside(self, grid: OnGrid) -> FloatArray | None:
         """(P,) bound on feed^2 inside the interval to the right of each point, if that is straight [mm2/s2]; None for none."""
+        return None
+
+    def along(self, machine: Machine, axes: tuple[str, ...]) -> OwnLimit | None:
+        """The limit as a function of the path, with rows like an axis; None where it has none or cannot bind."""
         return None
 
 

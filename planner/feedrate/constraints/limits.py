@@ -2,11 +2,18 @@
 
 A limit that is to be built in is a file like the ones imported here and a line in `LIMITS`; the judge needs code of its own for it
 (verifier/limits.py), and tests/verifier/test_laws_of_limits.py a motion on which the two agree. One of a user's own needs none of
-that: own.py, docs/extending.md.
+that: machine/user_limit.py, docs/extending.md.
+
+`Limits` is what they are on a machine: the grid, the solvers along a path, the joint search and the prices take them from there.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
 from planner.feedrate.constraints.axis_jerk import AxisJerk
 from planner.feedrate.constraints.axis_velocity import AxisVelocity
@@ -16,19 +23,63 @@ from planner.feedrate.constraints.limit import AxisLimit, Limit, RowLimit
 from planner.feedrate.constraints.normal_limit import NormalAcceleration
 from planner.feedrate.constraints.phase_lag import PhaseLag
 from planner.feedrate.constraints.programmed_feed import ProgrammedFeed
+from planner.feedrate.constraints.tangential import TangentialAcceleration, binding
+from planner.machine import Machine
+from planner.machine.user_limit import OwnLimit
 
 FEED, VELOCITY = ProgrammedFeed(), AxisVelocity()
 ACCELERATION, JERK = AxisAcceleration(), AxisJerk()
 CHORD_ERROR, FILTER_ERROR = ChordError(), FilterError()
+NORMAL, TANGENTIAL = NormalAcceleration(), TangentialAcceleration()
 LIMITS: tuple[Limit, ...] = (
     FEED,
     VELOCITY,
-    NormalAcceleration(),
+    NORMAL,
     CHORD_ERROR,
     FILTER_ERROR,
     PhaseLag(),
     ACCELERATION,
     JERK,
+    TANGENTIAL,
 )
 ROWS: tuple[RowLimit, ...] = (ACCELERATION, JERK)  # as rows of the problem, in the order of their indices
 OF_AXES: tuple[AxisLimit, ...] = (VELOCITY, ACCELERATION, JERK)  # with a limit for every axis
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Limits:
+    """What bounds a motion over A axes on a machine, beside its feed and its tolerance.
+
+    axes                         : their letters
+    velocity, acceleration, jerk : (A,) of the axes, in mm or rad
+    normal, tangential           : normal and tangential acceleration [mm/s2]; inf where nothing limits them
+    along                        : those with rows like an axis: built-in ones that can bind, and the user's
+    """
+
+    axes: tuple[str, ...]
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    normal: float
+    tangential: float
+    along: tuple[OwnLimit, ...]
+
+    @classmethod
+    def of(cls, machine: Machine, axes: tuple[str, ...]) -> Limits:
+        """All of them. Raises InputError if the machine lacks one of the axes."""
+        built_in = [row for limit in LIMITS if (row := limit.along(machine, axes)) is not None]
+        acceleration = ACCELERATION.of(machine, axes)
+        return cls(
+            axes=axes,
+            velocity=VELOCITY.of(machine, axes),
+            acceleration=acceleration,
+            jerk=JERK.of(machine, axes),
+            normal=machine.normal_acceleration or np.inf,
+            tangential=binding(machine, axes, acceleration),
+            along=(*built_in, *machine.own),
+        )
+
+    @property
+    def of_axes(self) -> FloatArray:
+        """(3, A) velocity, acceleration and jerk."""
+        return np.stack([self.velocity, self.acceleration, self.jerk])

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from planner.feedrate.constraints.on_grid import Side
 
 NAME = "normal_acceleration"
-ORDER = 2  # slower by lam, it is less by lam^2
 
 
 def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
@@ -29,7 +28,8 @@ def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:
 class NormalAcceleration(Limit):
     """kappa x <= A, on machines that name A."""
 
-    name, unit, order = NAME, "mm/s2", ORDER
+    name, unit, order = NAME, "mm/s2", 2
+    key = NAME
 
     def on_side(self, side: Side, machine: Machine) -> Iterator[Cap]:
         if machine.normal_acceleration is not None:

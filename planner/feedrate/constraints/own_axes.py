@@ -13,20 +13,19 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
-from planner.feedrate.constraints.limits import VELOCITY
+from planner.feedrate.constraints.limits import VELOCITY, Limits
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.own_rows import own_rows
 from planner.feedrate.sampling.path_samples import PathSamples
-from planner.machine import Machine
 
 
-def with_own_axes(problem: FeedrateProblem, samples: PathSamples, machine: Machine) -> FeedrateProblem:
-    """The problem with the machine's own limits as further axes; the margin says what is found between the points.
+def with_own_axes(problem: FeedrateProblem, samples: PathSamples, limits: Limits) -> FeedrateProblem:
+    """The problem with the limits `along` as further axes; the margin says what is found between the points.
 
     Raises NotSolvedError where a limit changes faster than the grid follows, InputError for a bound that is not positive and for a
     joint without derivatives.
     """
-    rows = own_rows(samples, machine)
+    rows = own_rows(samples, limits)
     if rows.margin.max() >= 1.0:
         line = int(samples.path.toolpath.line[samples.segment[int(rows.margin.argmax())]])
         all_names = ", ".join(rows.names)
@@ -67,11 +66,11 @@ def with_own_axes(problem: FeedrateProblem, samples: PathSamples, machine: Machi
     )
 
 
-def own_inside(samples: PathSamples, machine: Machine) -> FloatArray:
-    """(P,) what the machine's own limits allow of feed^2 inside the interval to the right of each point; inf where nothing
+def own_inside(samples: PathSamples, limits: Limits) -> FloatArray:
+    """(P,) what the limits `along` allow of feed^2 inside the interval to the right of each point; inf where nothing
     limits, and where a piece ends [mm2/s2]."""
     at = samples.intervals
-    own = own_rows(samples, machine).feed_sq_max.min(axis=1)
+    own = own_rows(samples, limits).feed_sq_max.min(axis=1)
     inside = np.full(len(samples), np.inf)
     inside[at] = np.maximum(own[at], own[at + 1])
     return inside

@@ -20,9 +20,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.corners.elements import element_point, to_arc_length
+from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.sampling.grid import JERK_SHARE, MARGIN_SAFETY
 from planner.feedrate.sampling.path_samples import PathSamples
-from planner.machine import Machine
 from planner.machine.user_limit import OwnLimit, Place, bounds_at, limit_derivatives
 
 # Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-]; it costs as much as the grid's
@@ -79,14 +79,14 @@ def _points(legs, corners, spans, element, w, axes):
     return out
 
 
-def own_rows(samples: PathSamples, machine: Machine, resolution: float = np.inf) -> OwnRows:
-    """The rows of the machine's own limits; `resolution` is the share of the limits that they may leave the chord by (module text)."""
+def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> OwnRows:
+    """The rows of the limits `along`; `resolution` is the share of the limits that they may leave the chord by (module text)."""
     axes = samples.path.toolpath.axes
     at = samples.intervals
     middle = 0.5 * (samples.w0[at] + samples.w1[at])
     inside = _points(*samples.table, samples.element[at], middle, len(axes))
-    real = _real_bounds(samples, machine, at, inside)
-    columns = [_Column.of(limit, samples, at, inside, real) for limit in machine.own]
+    real = _real_bounds(samples, limits, at, inside)
+    columns = [_Column.of(limit, samples, at, inside, real) for limit in limits.along]
     stacked = {
         name: np.stack([getattr(column, name) for column in columns], axis=1)
         for name in (
@@ -106,7 +106,7 @@ def own_rows(samples: PathSamples, machine: Machine, resolution: float = np.inf)
         coarse[at] |= column.coarse(resolution)
     coarse[at] &= samples.s[at + 1] - samples.s[at] > LEAST
     return OwnRows(
-        names=tuple(limit.name for limit in machine.own),
+        names=tuple(limit.name for limit in limits.along),
         least=np.stack([column.least for column in columns], axis=1),
         error=error,
         coarse=coarse,
@@ -123,10 +123,9 @@ class _Real:
     jerk: FloatArray
 
 
-def _real_bounds(samples: PathSamples, machine: Machine, at: Array, inside: FloatArray) -> _Real:
+def _real_bounds(samples: PathSamples, limits: Limits, at: Array, inside: FloatArray) -> _Real:
     """Bounds at the middle of the intervals `at`, generous ones."""
-    axes = samples.path.toolpath.axes
-    velocity, acceleration, jerk = (machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk"))
+    velocity, acceleration, jerk = limits.of_axes
     d1, d3 = np.abs(inside[:, 1]), np.linalg.norm(inside[:, 3], axis=1)
     curve = np.linalg.norm(inside[:, 2], axis=1)
     strong = float(np.linalg.norm(acceleration))
@@ -164,10 +163,8 @@ class _Column:
         middle = tuple(inside[:, k] for k in range(4))
         block = _block(samples)
         here, between = (Place(axes, list(p[0].T), p[1], b) for p, b in ((right, block), (middle, block[at])))
-        q_left, q_right, q_mid = (_along(limit, axes, p, here) for p in (left, right, middle))
+        q_left, q_right, q_mid = (_along(limit, axes, p) for p in (left, right, middle))
         bound, bound_mid = bounds_at(limit, here, points), bounds_at(limit, between, len(at))
-        if limit.value(here) is None:
-            q_left, q_right = _unit(points), _unit(points)
         a, b = at, at + 1
         real_sq = np.zeros(points)
         for end in (a, b):
@@ -231,18 +228,14 @@ def _block(samples: PathSamples) -> Array:
     return block
 
 
-def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray], here: Place) -> FloatArray:
-    """(3, n) q', q'', q'''."""
-    if limit.value(here) is None:
-        return _unit(len(motion[0]))
-    return limit_derivatives(limit, axes, motion)
-
-
-def _unit(count: int) -> FloatArray:
-    """q = s."""
-    rows = np.zeros((3, count))
-    rows[0] = 1.0
-    return rows
+def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
+    """(3, n) q', q'', q''' by the arc length; of the length of the path without rounding."""
+    found = limit_derivatives(limit, axes, motion)
+    if limit.value(Place(axes, list(motion[0].T), motion[1])) is None:
+        whole = np.isin(axes, getattr(limit, "counts", None) or axes)
+        alone = ~(np.abs(np.stack(motion[1:])[:, :, ~whole]) > 0.0).any(axis=(0, 2))
+        found[:, alone] = [[1.0], [0.0], [0.0]]
+    return found
 
 
 def _between(

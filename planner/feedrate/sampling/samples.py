@@ -27,9 +27,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
-from planner.corners.budget import largest_normal
 from planner.corners.elements import element_table
 from planner.corners.smooth import SmoothPath
+from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.sampling.calm import Calm, calm, quiet_way
 from planner.feedrate.sampling.grid import Intervals, divide, evaluate, grade
 from planner.feedrate.sampling.own_rows import own_rows
@@ -71,14 +71,15 @@ def sample_path(
     if resolution is None:
         resolution = RESOLUTION if np.count_nonzero(path.d) <= MANY_CORNERS else COARSE_RESOLUTION
     table = element_table(path)
-    velocity, acceleration = machine.limits("velocity", axes), machine.limits("acceleration", axes)
+    of_machine = Limits.of(machine, axes)
+    velocity, acceleration = of_machine.velocity, of_machine.acceleration
     jerk, longest, shortest = np.full(len(axes), np.inf), np.inf, np.inf
     if third_order:
-        jerk = machine.limits("jerk", axes)
+        jerk = of_machine.jerk
         delay = float((acceleration / jerk).min())
         longest = ARC_PERIOD * delay
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
-    acceleration = np.minimum(acceleration, largest_normal(machine))
+    acceleration = np.minimum(acceleration, of_machine.normal)
     where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
         where_calm = calm(path, table, (velocity, acceleration, jerk))
@@ -100,9 +101,9 @@ def sample_path(
         segment=grid.segment,
         **evaluate(table, grid, limits)._asdict(),
     )
-    if machine.own:
+    if of_machine.along:
         for _ in range(HALVINGS_OF_OWN):
-            coarse = own_rows(samples, machine, resolution).coarse
+            coarse = own_rows(samples, of_machine, resolution).coarse
             if not coarse.any():
                 break
             samples = _halved(samples, np.flatnonzero(coarse), limits)

@@ -6,6 +6,7 @@ import dataclasses
 from functools import partial
 
 from planner.corners.smooth import CornerShape
+from planner.feedrate.constraints.limits import Limits
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
@@ -60,10 +61,11 @@ def pricing_of(best: OnPath, machine: Machine) -> Pricing | None:
 
 
 def _prices(best: OnPath, machine: Machine) -> PriceList | None:
-    """The prices of its limits. With limits of one's own the tolerance of splines has no price: the machine alone pulls at their
+    """The prices of its limits. With limits that are no axis' the tolerance of splines has no price: the machine alone pulls at their
     shapes."""
     by_site = None
+    along = Limits.of(machine, best.path.toolpath.axes).along
     # what the corridor of the splines costs
-    if best.shape is not None and len(best.path.spline) and not machine.own:
+    if best.shape is not None and len(best.path.spline) and not along:
         by_site = SitePrices(place=best.shape.splines.sites.place, price=corridor_prices(best))
     return path_prices(best.samples, best.problem, best.solution, machine, by_site)

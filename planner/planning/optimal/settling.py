@@ -15,14 +15,15 @@ from planner.delivery.filters import FLOOR_STEP, Behind, runs_within, stops_betw
 from planner.delivery.pacing import runs_of, slower_runs, standing_longer
 from planner.delivery.path_errors import SPARE as SPARE_ERROR
 from planner.delivery.rests import mean_of_copies
+from planner.feedrate.constraints.limits import Limits
 from planner.geometry.toolpath import Joint
-from planner.motion.limits_used import slowest
+from planner.motion.limits_used import ratios, slowest
 from planner.motion.shaping import ShapedMotion, Shaper
 from planner.motion.timing import Motion, in_chunks, inside_pieces
 from planner.planning.job.job import Job
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again
-from planner.planning.optimal.tighten import beside_axes, fastest_inside, tightened
+from planner.planning.optimal.tighten import fastest_inside, tightened
 
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
 # D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
@@ -59,12 +60,8 @@ class Settling:
         self.behind, self._mean = Behind(job.toolpath, machine), mean_of_copies(shaper)
         self.filters = machine.fir.time_constants if machine.fir else ()
         self.seen = self.shaper.length + sum(self.filters)  # what D is made of, back from a time [s]
-        self.limits = {
-            "velocity": job.machine.limits("velocity", job.toolpath.axes),
-            "acceleration": job.machine.limits("acceleration", job.toolpath.axes),
-        }
-        if self.order.jerk_limited:
-            self.limits["jerk"] = job.machine.limits("jerk", job.toolpath.axes)
+        self.limits = Limits.of(job.machine, job.toolpath.axes)
+        self.quantities = ("velocity", "acceleration", *(("jerk",) if self.order.jerk_limited else ()))
         self.feed = np.full(int(job.toolpath.block[-1]) + 1, np.inf)
         self.feed[job.toolpath.block] = job.toolpath.feed
 
@@ -132,14 +129,15 @@ class Settling:
         times = np.append(inside_pieces(delivered)[1], peaks)
         times = times[times < delivered.end]
         dt = self.job.machine.dt
-        if self.job.machine.normal_acceleration is not None:
+        if np.isfinite(self.limits.normal):
             times = np.concatenate([times, *(slowest(chunk) for chunk in in_chunks(delivered, dt, times))])
         for chunk in in_chunks(delivered, dt, times):
             worst = np.ones(len(chunk))
-            for order, (name, limit) in enumerate(self.limits.items(), start=1):
-                worst = np.maximum(worst, (np.abs(getattr(chunk, name)) / limit).max(axis=1) ** (1.0 / order))
-            for order, ratio in beside_axes(self.job.machine, chunk):
-                if order <= len(self.limits):
+            for order, name in enumerate(self.quantities, start=1):
+                ratio = np.abs(getattr(chunk, name)) / getattr(self.limits, name)
+                worst = np.maximum(worst, ratio.max(axis=1) ** (1.0 / order))
+            for order, ratio in ratios(self.limits, chunk):
+                if order <= len(self.quantities):
                     worst = np.maximum(worst, ratio ** (1.0 / order))
             # D is on the block at the mean delay, as near as the shaper leaves it to the path
             worst = np.maximum(worst, chunk.feed / self.feed[chunk.block])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,13 +19,13 @@ from planner.base.kernels import njit
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.delivery.pacing import runs_of, slower_runs
+from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.motion import limits_used
+from planner.motion.limits_used import ratios
 from planner.motion.time_law import TimeLaw
 from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
-from planner.motion.trajectory import Trajectory
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again
@@ -53,8 +52,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
     """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
     middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
     them."""
-    axes = toolpath.axes
-    limits = np.array([machine.limits(q, axes) for q in ("velocity", "acceleration", "jerk")])
+    every = Limits.of(machine, toolpath.axes)
+    limits = every.of_axes
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
     programmed[toolpath.block] = toolpath.feed
     factor = np.zeros(len(motion.law.t))
@@ -68,7 +67,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         worst = np.empty(len(shown))
         motions = (seen.velocity, seen.acceleration, seen.jerk)
         _worst(seen.feed / programmed[seen.block], motions, limits, smooth[shown], worst)
-        for order, ratio in beside_axes(machine, seen):
+        for order, ratio in ratios(every, seen):
             most = _with_peaks(ratio.reshape(times.shape), smooth[shown])
             worst = np.maximum(worst, most ** (1.0 / order))
         factor[shown] = worst
@@ -84,17 +83,11 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
         worst = np.maximum(
             chunk.feed / programmed[chunk.block], (np.abs(chunk.velocity) / limits[0]).max(axis=1)
         )
-        for order, ratio in beside_axes(machine, chunk):
+        for order, ratio in ratios(every, chunk):
             worst = np.maximum(worst, ratio ** (1.0 / order))
         at = np.searchsorted(motion.law.t, chunk.t, side="right") - 1
         np.maximum.at(factor, np.maximum(at, 0), worst)
     return factor
-
-
-def beside_axes(machine: Machine, motion: Trajectory) -> Iterator[tuple[int, FloatArray]]:
-    """The order and the ratios (T,) of limits that are no axis' own."""
-    yield from limits_used.normal_ratios(machine, motion)
-    yield from limits_used.user_ratios(machine.own, motion)
 
 
 def _on_one_interval(motion: Motion) -> Array:

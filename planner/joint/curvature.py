@@ -13,6 +13,7 @@ from planner.joint.rows import (
     FEED_ROWS,
     NORMAL_MID,
     NORMAL_NODE,
+    STATE_ROWS,
     SWITCH,
     TUBE_NODE,
     VECTOR_OF_NODE,
@@ -75,6 +76,12 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
         if not limits.on[i, r]:
             continue
         m = of[r]
+        if m == -2:
+            row = lin.state[i, r - more - STATE_ROWS]
+            for s in range(4 * axes + 1):
+                for t in range(s + 1):
+                    W[s, t] += ratio[r] * row[s] * row[t]
+            continue
         if m < 0:
             W[4 * axes, 4 * axes] += ratio[r] / (limits.h[i] * limits.h[i])
             continue

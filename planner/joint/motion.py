@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.joint.guess import Guess
 from planner.joint.run import TubeRun
+from planner.joint.state_limits import state_shares
 
 # Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their square from acceleration to
 # position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
@@ -119,11 +120,13 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]
-    for fraction in MEASURED_AT if np.isfinite(run.across_max).any() else ():
+    watched = np.isfinite(run.across_max).any() or len(run.state)
+    for fraction in MEASURED_AT if watched else ():
         tau = fraction * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
         speed_sq = (along**2).sum(axis=1)
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
         normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
         ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / run.across_max[leg]).max())
+        ratios.append(np.sqrt(state_shares(run.state, run.linear, along, push).max(initial=0.0)))
     return float(max(ratios))

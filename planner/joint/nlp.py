@@ -47,6 +47,7 @@ from planner.joint.numbers import acceleration_along, step_numbers
 from planner.joint.outcome import BROKE_DOWN, SOLVED, STUCK, TubeSolution
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
+from planner.joint.state_limits import REST, formula
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
 # iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
@@ -121,6 +122,7 @@ class TubeNLP:
         v_max, a_max, j_max = run.velocity / speed, run.acceleration / acc, run.jerk / jerk
 
         watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
+        state = np.flatnonzero(np.isfinite(run.state)).tolist()
 
         # ---- variables, stage by stage: state (p, v, a) and place of a node; jerk, duration and the other places of its step --------
         # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
@@ -196,6 +198,11 @@ class TubeNLP:
             velocity, acceleration = v + h * q * (a + h * q * j / 2), a + h * q * j
             across = acceleration - along[k] * velocity / pace
             rows.append((ca.sumsqr(across) / normal**2, -np.inf, 1.0))
+        for kind in state:
+            bound = run.state[kind] / acc
+            ordinates = formula(ca, kind, (v, ordinate, v1), (a, a1), run.linear, REST * pace)
+            for pushed, along_it in ordinates:
+                rows += [((sign * pushed / bound - along_it) / pace, -np.inf, 0.0) for sign in (1.0, -1.0)]
 
         # ---- constraints of all steps, stage by stage: gaps first -----------------------------------------------------------
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
@@ -221,7 +228,7 @@ class TubeNLP:
                 [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / mean_step[end]]]
             )
             node_min[end] = node_max[end] = rest
-        longer = LONGER_WATCHED if watched else LONGER
+        longer = LONGER_WATCHED if watched or state else LONGER
         step_high = np.column_stack(
             [np.tile(j_max, (steps, 1)), h_guess * longer, np.full((steps, 3 + watched), np.inf)]
         )

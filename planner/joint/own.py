@@ -21,7 +21,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, normal_shares, switches_kept, worst_shares
+from planner.joint.checks import Keeps, switches_kept, watched_shares, worst_shares
 from planner.joint.guess import Guess
 from planner.joint.interior_point import Tuning, solve_window
 from planner.joint.legs import LegFormulas
@@ -31,6 +31,7 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.run import TubeRun
+from planner.joint.state_limits import state_shares
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
 # divided into.
@@ -51,8 +52,8 @@ QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothi
 # steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
 # and 0.01 693 and 364.
 FAR, NEAR = (0.3, 0.05), (0.01, 0.01)
-# Normal acceleration is watched in two places of a step only. Where it is above its limit between them, the limit is lowered by what it
-# was above, and a little more [-], at most so many times.
+# Normal acceleration and the state's limits are watched in two places of a step only. Where one is exceeded between them, it is lowered
+# by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
@@ -173,11 +174,12 @@ class _Search:
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
         v, a = state[at, 1], state[at, 2]
         feed = np.minimum(run.feed[leg[at]], run.feed[leg[at - 1]])
+        pushed = state_shares(run.state, run.linear, v, a).max(axis=1, initial=0.0)
         beside = np.stack([v, v - a * h[at - 1, None] / 2, v + a * h[at, None] / 2])  # of the Bezier velocity
         shares = (
             (np.abs(beside) / run.velocity).max(axis=(0, 2)),
             np.linalg.norm(beside, axis=2).max(axis=0) / feed,
-            np.sqrt((np.abs(a) / run.acceleration).max(axis=1)),
+            np.sqrt(np.maximum((np.abs(a) / run.acceleration).max(axis=1), pushed)),
         )
         by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
         state[at, 1] /= by
@@ -248,7 +250,8 @@ class _Search:
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
         first = NEAR if self.settings.near else FAR
-        watched = bool(np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any())
+        normal = np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any()
+        watched = bool(normal or len(self._keeps.state))
         for prox, missed in tries:
             tight = np.ones(hi - lo)
             for _ in range(TIGHTENED if watched else 1):
@@ -271,7 +274,7 @@ class _Search:
 
     def _taken(self, lo: int, hi: int, window: StepWindow, tight: FloatArray) -> bool:
         """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place.
-        Where their normal acceleration is above its limit, `tight` (hi - lo,) grows."""
+        Where a limit that is watched in places only is exceeded between them, `tight` (hi - lo,) grows."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -281,7 +284,7 @@ class _Search:
         place = window.place * window.length
         limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
         if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
-            across = normal_shares(self._keeps, leg, h, found, jerk)
+            across = watched_shares(self._keeps, leg, h, found, jerk)
             tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
             return False
         if not switches_kept(run, leg, found):
@@ -303,6 +306,8 @@ def keeps_of(run: TubeRun) -> Keeps:
         jerk=run.jerk,
         feed=run.feed,
         normal=run.across_max,
+        state=run.state,
+        linear=run.linear,
         budget=run.budget,
         curvature=run.curvature,
         vertex_budget=run.vertex_budget,
@@ -319,5 +324,6 @@ def _strain(run: TubeRun, guess: Guess) -> FloatArray:
         (np.abs(v) / run.velocity).max(axis=1),
         np.linalg.norm(v, axis=1) / run.feed[leg],
         (np.abs(a) / run.acceleration).max(axis=1),
+        *state_shares(run.state, run.linear, v, a).T,
     )
     return np.max(shares, axis=0)

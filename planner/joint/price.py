@@ -22,24 +22,29 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.joint import rows
 from planner.joint.problem import StepWindow
+from planner.joint.state_limits import ROWS, STATE_LIMITS
 
 # Columns behind those of the axes (jerk, acceleration, velocity) of the prices of a step.
-FEED, NORMAL, ROOM, VERTEX, OTHER = range(5)
+FEED, NORMAL, STATE = range(3)
+KINDS = len(STATE_LIMITS)
+ROOM, VERTEX, OTHER = range(STATE + KINDS, STATE + KINDS + 3)
 
 
 def columns(axes: int) -> int:
     """How many prices a step has."""
-    return 3 * axes + 5
+    return 3 * axes + OTHER + 1
 
 
 def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
-    """(N, 3 A + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a window: jerk, acceleration and
-    velocity of each axis, then the feed, the normal acceleration, the room of the leg and that of the vertex that the step begins at,
-    and what bounds only the steps themselves."""
+    """(N, 3 A + K + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a window: jerk, acceleration and
+    velocity of each axis, then the feed, the normal acceleration, the K limits of the state, the room of the leg and that of the vertex
+    that the step begins at, and what bounds only the steps themselves."""
     axes = window.limits.box.shape[1]
     box, more = z[:, : 8 * axes].reshape(-1, 4, 2, axes).sum(axis=2), z[:, 8 * axes :]
     at_vertex = window.limits.at_vertex
     node = more[:, rows.TUBE_NODE]
+    state = more[:, rows.STATE_ROWS :].reshape(len(z), -1, ROWS).sum(axis=2)
+    state = state if state.shape[1] else np.zeros((len(z), KINDS))
     price = np.column_stack(
         [
             box[:, 0],
@@ -47,6 +52,7 @@ def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
             box[:, 2] + box[:, 3],
             more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1),
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_MID],
+            state,
             more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, 0.0, node),
             np.where(at_vertex, node, 0.0),
             more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH]].sum(

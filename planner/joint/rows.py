@@ -29,6 +29,9 @@ n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line 
 belong to the tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second vector, p or
 the next node's, through `lin.node`.
 
+Limits that are functions of velocity and acceleration (state_limits.py) have rows of another kind, with their derivatives by p, v, a, j
+and h, behind all others where a run has such limits.
+
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place that is nearest to V: with
 m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends on p and, through `lin.node`, on v; its own curvature
 is left out, as that of the kinematics is.
@@ -43,6 +46,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
+from planner.joint.state_limits import put_state_rows
 
 # Vectors y, in this order.
 P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
@@ -56,6 +60,7 @@ VECTOR_OF_NODE = (
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
 ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC, SWITCH = range(9, 15)
 MORE_ROWS = 15
+STATE_ROWS = MORE_ROWS  # the first of those of the state's limits
 VECTOR_OF_BOX = (J, A, MID, V)
 
 
@@ -72,6 +77,9 @@ class StepLimits(NamedTuple):
     feed_node: FloatArray  # (N,)
     normal: FloatArray  # (N,)
     normal_node: FloatArray  # (N,)
+    state: FloatArray  # (N, K) of the state's limits
+    state_node: FloatArray  # (N, K)
+    linear: FloatArray  # (A,) 1 for x, y and z, else 0
     step_max: FloatArray  # (N,)
     pace: FloatArray  # (N,) a speed like that of the step
     h: FloatArray  # (N,) duration that it is pulled to
@@ -92,11 +100,12 @@ class Linear(NamedTuple):
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
+    state: FloatArray  # (N, 6 K, 4 A + 1) derivatives of the rows of the state's limits
 
 
 @njit(cache=True, error_model="numpy")
 def count(axes):
-    """How many rows a step of so many axes has."""
+    """How many rows a step of so many axes has, without those of the state's limits."""
     return 8 * axes + MORE_ROWS
 
 
@@ -247,6 +256,7 @@ def put_rows(legs, limits, x, u, lin):
         g[more + ORDER_NODE], g[more + ORDER_MID], g[more + ARC] = order_node, order_mid, arc - 1.0
         _ball(y, ACROSS, limits.normal_node[i], more + NORMAL_NODE, g, n)
         _ball(y, ACROSS_MID, limits.normal[i], more + NORMAL_MID, g, n)
+        put_state_rows(limits, i, x[i], u[i], g[more + STATE_ROWS :], lin.state[i])
         for c in range(3):
             place = lin.place[i, c]
             if (c == 0 and limits.at_vertex[i]) or place <= 0.0 or place >= legs.length[limits.leg[i]]:
@@ -255,12 +265,14 @@ def put_rows(legs, limits, x, u, lin):
 
 @njit(cache=True, error_model="numpy")
 def vector_of(row, axes):
-    """The vector y that a row depends on; -1 for those of h alone."""
+    """The vector y that a row depends on; -1 for those of h alone, -2 for those of the state's limits."""
     if row < 8 * axes:
         return VECTOR_OF_BOX[row // (2 * axes)]
     more = row - 8 * axes
     if more <= H_MIN:
         return -1
+    if more >= STATE_ROWS:
+        return -2
     return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, ACROSS_MID, LONG, P)[more - FEED_NODE]
 
 
@@ -293,6 +305,14 @@ def slopes(limits, lin, dx, du, out):
                 )
         for r in range(R):
             if not limits.on[i, r]:
+                continue
+            if of[r] == -2:
+                row, total = lin.state[i, r - more - STATE_ROWS], 0.0
+                for k in range(3 * axes):
+                    total += row[k] * dx[i, k]
+                for k in range(axes + 1):
+                    total += row[3 * axes + k] * du[i, k]
+                out[i, r] = total
                 continue
             if of[r] < 0:
                 out[i, r] = dh / limits.h[i] * (1.0 if r == more + H_MAX else -1.0)

@@ -30,10 +30,12 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.corners.allocation import allocate
 from planner.corners.budget import error_rate, normal_anywhere, normal_within_budget
+from planner.feedrate.constraints.limits import Limits
 from planner.geometry.build import path_per_length
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.machine import Machine
+from planner.joint.state_limits import bounds_of
+from planner.machine import LINEAR_AXES, Machine
 
 # Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
 # turns by meanwhile [rad], within which tangents tell where a control point belongs.
@@ -64,6 +66,8 @@ class TubeRun:
                                    where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
+    state                        : (K,) other limits of velocity and acceleration (state_limits.py)
+    linear                       : (A,) 1 for x, y and z, else 0
     left                         : why the search cannot look for a motion here, "" if it can
     """
 
@@ -85,6 +89,8 @@ class TubeRun:
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
+    state: FloatArray
+    linear: FloatArray
     left: str = ""
 
     def __post_init__(self) -> None:
@@ -99,8 +105,9 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
-        for name in ("velocity", "acceleration", "jerk"):
+        for name in ("velocity", "acceleration", "jerk", "linear"):
             freeze(self, name, np.float64, (axes,))
+        freeze(self, "state", np.float64, (None,), finite=False)
 
     def __len__(self) -> int:
         return len(self.length)
@@ -155,7 +162,8 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             source=toolpath.source,
             line=int(toolpath.line[curves[0]]),
         )
-    limits = {q: machine.limits(q, toolpath.axes) for q in ("velocity", "acceleration", "jerk")}
+    limits = Limits.of(machine, toolpath.axes)
+    linear = np.isin(toolpath.axes, LINEAR_AXES).astype(np.float64)
     edges = _edges(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
     for begin, end in pairwise(stops):
@@ -167,7 +175,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
-        held = budgets.across < np.linalg.norm(limits["acceleration"][moves]) * (1 - 1e-12)
+        held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
         yield TubeRun(
             axis=np.flatnonzero(moves),
             left=_left(toolpath, slice(first[0], first[-1])),
@@ -178,7 +186,11 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             across_max=np.where(held, budgets.across, np.inf),
             vertex=vertex[:, moves],
             vertex_budget=budgets.vertex,
-            **{name: limit[moves] for name, limit in limits.items()},
+            velocity=limits.velocity[moves],
+            acceleration=limits.acceleration[moves],
+            jerk=limits.jerk[moves],
+            state=bounds_of(limits, moves),
+            linear=linear[moves],
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
 

@@ -11,12 +11,14 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.joint.motion import Steps
 from planner.joint.run import TubeRun
+from planner.joint.state_limits import STATE_LIMITS, state_shares
 
 NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place on an arc, from the node's
 
 
 def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatArray:
-    """(N, 3 A + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal acceleration, tolerance.
+    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal acceleration, the K limits of
+    the state, tolerance.
 
     leg   : (N,) of each step
     place : (N+1,) of the nodes along the run [mm]
@@ -34,6 +36,7 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
     vertex = leg[begins]
     at = np.linalg.norm(p[begins] - run.vertex[vertex], axis=1) / run.vertex_budget[vertex]
     used[begins] = np.maximum(used[begins], at)
+    state = state_shares(run.state, run.linear, speed, push)
     return np.column_stack(
         [
             np.abs(j) / run.jerk,
@@ -41,6 +44,7 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
             np.abs(speed) / run.velocity,
             np.sqrt(square) / run.feed[leg],
             np.linalg.norm(across, axis=1) / run.across_max[leg],
+            state if len(run.state) else np.zeros((len(h), len(STATE_LIMITS))),
             used,
         ]
     )

@@ -20,6 +20,7 @@ from planner.joint.motion import Steps
 from planner.joint.parts import FoundRun
 from planner.joint.shares import shares
 from planner.joint.splice import Spliced, SplicedRun
+from planner.joint.state_limits import STATE_LIMITS
 from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST
@@ -28,7 +29,8 @@ from planner.sensitivity.records import GridHistory
 TOLERANCE = "tolerance"
 STANDS = 1e-9  # shorter standstills are rounding of times [s]
 SEEN = 1e-3  # period of a trajectory that is looked at at given times only [s]
-PRICE_OF = (price.FEED, price.NORMAL, price.ROOM)  # of the shares behind those of the axes
+OF_STATE = range(price.STATE, price.STATE + len(STATE_LIMITS))
+PRICE_OF = (price.FEED, price.NORMAL, *OF_STATE, price.ROOM)  # of the shares behind those of the axes
 
 
 @dataclass
@@ -74,7 +76,7 @@ def found_history(
         return None
     axes = toolpath.axes
     own = (*(kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes),)
-    own = (*own, FEED.name, CHORD_ERROR.name, TOLERANCE)
+    own = (*own, FEED.name, CHORD_ERROR.name, *(limit.name for limit in STATE_LIMITS), TOLERANCE)
     known = [each.active_names[:-2] for each in (start, *alone.values()) if each is not None]
     others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)
@@ -132,7 +134,7 @@ def _of_steps(
     used = shares(run, own, leg, place[lo : hi + 1]) >= 1.0 - HELD
     moving, many = len(run.axis), len(toolpath.axes)
     column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
-    column = np.append(column, 3 * many + np.arange(3))
+    column = np.append(column, 3 * many + np.arange(len(PRICE_OF)))
     reached = np.zeros((hi - lo, len(rows.names)), dtype=bool)
     reached[:, column] = used
     reached[:, -2] = ~used.any(axis=1)

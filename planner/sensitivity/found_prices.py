@@ -25,6 +25,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint import price
 from planner.joint.parts import FoundRun
 from planner.joint.run import budgets_of
+from planner.joint.state_limits import STATE_LIMITS
 from planner.machine import Machine
 from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, price_list
 from planner.sensitivity.records import PlacePrices, PriceList
@@ -41,12 +42,12 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + 5) of joint/price.py, and the same without feed and velocities where these hold together
+    step, alone          : (N, 3 A + K + 5) of joint/price.py, and the same without feed and velocities where these hold together
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
     def __init__(self, toolpath: Toolpath, found: FoundRun, step: FloatArray, place: FloatArray):
-        """step : (N, 3 A + 5) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
+        """step : (N, 3 A + K + 5) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
         self.found, self.step, axes = found, step, len(found.run.axis)
         assert found.steps is not None
         least = TIED * found.steps.h
@@ -124,7 +125,7 @@ def found_prices(
 def _of_limits(
     toolpath: Toolpath, machine: Machine, runs: list[RunPrices]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The limits of the axes by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
+    """The limits of the axes and of the state by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
     limit, slope = {}, {FEED.name: fsum(float(run.of_feed().sum()) for run in runs)}
     for quantity, kind in enumerate(QUANTITIES):
         values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]
@@ -133,6 +134,10 @@ def _of_limits(
             limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
             if kind is ACCELERATION:
                 slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name)(STEP))
+    for k, state in enumerate(STATE_LIMITS):
+        if (value := getattr(machine, state.key)) is not None:
+            limit[state.name] = value
+            slope[state.name] = fsum(float(run.of(price.STATE + k).sum()) for run in runs)
     return limit, slope
 
 
@@ -187,6 +192,7 @@ def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -
         axes = len(run.found.run.axis)
         jerk, acceleration, velocity = (run.step[:, q * axes : (q + 1) * axes].sum(axis=1) for q in range(3))
         every = velocity + run.of(price.FEED) + acceleration + run.of(price.NORMAL) + jerk
+        every = every + sum(run.of(price.STATE + k) for k in range(len(STATE_LIMITS)))
         np.add.at(feed, run.segment, run.feed_saves(1.0 + MORE_LIMIT))
         np.add.at(limits, run.segment, -share * every)
     return PlacePrices(feed=feed, limits=limits, tolerance=by_joint)

@@ -1,0 +1,190 @@
+"""Limits of the search that are functions of a motion's velocity v and acceleration a: the tangential acceleration |a.t| <= A_t, t = v/|v|.
+
+On a step a is linear and v a parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at its
+ends e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are cubics with the
+ordinates
+
+    a.v     b0.w0,   (b1.w0 + 2 b0.w1)/3,   (2 b1.w1 + b0.w2)/3,   b1.w2
+    v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
+
+and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn between them. (Rows at places
+instead are made use of between them: the motion weaves inside the tolerance, and is beyond the limit there by up to 7 %.) The last
+ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are no rows.
+
+A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. The curvature of the product a.v is left out of the
+model, as that of the kinematics is.
+
+Rotary axes, u, v and w do not count. Another limit of this kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of
+`_ordinates`, `used` and `formula`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
+from planner.feedrate.constraints.limit import Limit
+from planner.feedrate.constraints.limits import TANGENTIAL, Limits
+from planner.machine import LINEAR_AXES
+
+STATE_LIMITS: tuple[Limit, ...] = (TANGENTIAL,)
+ROWS = 6  # of a limit: three ordinates, upper before lower
+REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
+
+
+def bounds_of(limits: Limits, moves: FloatArray) -> FloatArray:
+    """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that nothing can reach; (0,) where
+    that is so for all of them."""
+    reached = np.linalg.norm(limits.acceleration[moves & np.isin(limits.axes, LINEAR_AXES)])
+    bounds = np.array([limits.tangential if limits.tangential < reached else np.inf])
+    return bounds if np.isfinite(bounds).any() else bounds[:0]
+
+
+def formula(ca: Any, kind: int, w: Any, b: Any, linear: FloatArray, rest: Any) -> list[tuple[Any, Any]]:
+    """Pairs (a.v, v.e) of the ordinates of a limit of `STATE_LIMITS` in symbols of casadi, given as `ca`, from those of the velocity
+    w (3) and of the acceleration b (2); at the ends of a step too."""
+    w, b = [linear * one for one in w], [linear * one for one in b]
+    e0, e1 = (one / ca.sqrt(ca.sumsqr(one) + rest**2) for one in (w[0], w[2]))
+    pushed = b[0], (b[1], w[0], b[0], w[1])
+    return [
+        (ca.dot(pushed[0], w[0]), ca.dot(w[0], e0)),
+        ((ca.dot(b[1], w[0]) + 2 * ca.dot(b[0], w[1])) / 3, (ca.dot(w[0], e1) + 2 * ca.dot(w[1], e0)) / 3),
+        ((2 * ca.dot(b[1], w[1]) + ca.dot(b[0], w[2])) / 3, (2 * ca.dot(w[1], e1) + ca.dot(w[2], e0)) / 3),
+        (ca.dot(b[1], w[2]), ca.dot(w[2], e1)),
+    ]
+
+
+@njit(cache=True, error_model="numpy")
+def _ordinates(x, u, linear, rest, work, value, slope):
+    """The first three ordinates of a.v and of v.e of a step with the node x (3 A,) and the controls u (A+1,), value (2, 3), and their
+    derivatives by p, v, a, j and h, slope (2, 3, 4 A + 1). work (5, A)."""
+    axes = len(u) - 1
+    h, (e0, e1, w0, w1, w2) = u[axes], work
+    square0, square1 = rest * rest, rest * rest
+    for k in range(axes):
+        v, a, j = linear[k] * x[axes + k], linear[k] * x[2 * axes + k], linear[k] * u[k]
+        w0[k], w1[k], w2[k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * j)
+        square0, square1 = square0 + w0[k] * w0[k], square1 + w2[k] * w2[k]
+    size0, size1 = np.sqrt(square0), np.sqrt(square1)
+    value[:] = 0.0
+    for k in range(axes):
+        e0[k], e1[k] = w0[k] / size0, w2[k] / size1
+        b0, b1 = linear[k] * x[2 * axes + k], linear[k] * (x[2 * axes + k] + h * u[k])
+        value[0, 0] += b0 * w0[k]
+        value[0, 1] += (b1 * w0[k] + 2.0 * b0 * w1[k]) / 3.0
+        value[0, 2] += (2.0 * b1 * w1[k] + b0 * w2[k]) / 3.0
+        value[1, 0] += w0[k] * e0[k]
+        value[1, 1] += (w0[k] * e1[k] + 2.0 * w1[k] * e0[k]) / 3.0
+        value[1, 2] += (2.0 * w1[k] * e1[k] + w2[k] * e0[k]) / 3.0
+    slope[:] = 0.0
+    for r in range(3):
+        # what turns with e0 and with e1: the ordinates that they are multiplied by
+        along0, along1 = 0.0, 0.0
+        for k in range(axes):
+            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
+            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
+            along0, along1 = along0 + by0 * e0[k], along1 + by1 * e1[k]
+        for k in range(axes):
+            a, j = linear[k] * x[2 * axes + k], linear[k] * u[k]
+            b0, b1 = a, a + h * j
+            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
+            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
+            for side in range(2):
+                n0, n1, n2, m0, m1 = 0.0, 0.0, 0.0, 0.0, 0.0
+                if side == 0:
+                    if r == 0:
+                        n0, m0 = b0, w0[k]
+                    elif r == 1:
+                        n0, n1, m0, m1 = b1 / 3.0, 2.0 * b0 / 3.0, 2.0 * w1[k] / 3.0, w0[k] / 3.0
+                    else:
+                        n1, n2, m0, m1 = 2.0 * b1 / 3.0, b0 / 3.0, w2[k] / 3.0, 2.0 * w1[k] / 3.0
+                else:
+                    n0 = e0[k] if r == 0 else e1[k] / 3.0 if r == 1 else 0.0
+                    n1 = 0.0 if r == 0 else 2.0 / 3.0 * (e0[k] if r == 1 else e1[k])
+                    n2 = e0[k] / 3.0 if r == 2 else 0.0
+                    n0 += (by0 - along0 * e0[k]) / size0
+                    n2 += (by1 - along1 * e1[k]) / size1
+                row = slope[side, r]
+                row[axes + k] = linear[k] * (n0 + n1 + n2)
+                row[2 * axes + k] = linear[k] * (h * (0.5 * n1 + n2) + m0 + m1)
+                row[3 * axes + k] = linear[k] * h * (0.5 * h * n2 + m1)
+                row[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
+
+
+@njit(cache=True, error_model="numpy")
+def put_state_rows(limits, i, x, u, g, out):
+    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g (6 K,), and their derivatives by p, v, a, j and h into
+    out (6 K, 4 A + 1)."""
+    axes = len(u) - 1
+    work, value, slope = np.empty((5, axes)), np.empty((2, 3)), np.empty((2, 3, 4 * axes + 1))
+    for kind in range(limits.state.shape[1]):
+        rest = REST * limits.pace[i]
+        _ordinates(x, u, limits.linear, rest, work, value, slope)
+        for r in range(3):
+            bound = limits.state_node[i, kind] if r == 0 else limits.state[i, kind]
+            per = 1.0 / (bound * max(value[1, r], rest))
+            for side in range(2):
+                row, sign = ROWS * kind + 3 * side + r, 1.0 - 2.0 * side
+                g[row] = per * (sign * value[0, r] - bound * value[1, r])
+                for k in range(4 * axes + 1):
+                    out[row, k] = per * (sign * slope[0, r, k] - bound * slope[1, r, k])
+
+
+@njit(cache=True, error_model="numpy")
+def add_state_curvature(W, limits, i, x, u, z):
+    """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i: of b.w, which is
+    (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,) are their multipliers."""
+    axes = len(u) - 1
+    h = u[axes]
+    alpha, e = np.zeros(4), np.empty(axes)
+    size = np.zeros(3)
+    for k in range(axes):
+        a = x[2 * axes + k]
+        size[0] += limits.linear[k] * x[axes + k] ** 2
+        size[1] += limits.linear[k] * (x[axes + k] + 0.5 * h * a) ** 2
+        size[2] += limits.linear[k] * (x[axes + k] + h * (a + 0.5 * h * u[k])) ** 2
+    for kind in range(limits.state.shape[1]):
+        bound = limits.state[i, kind]
+        for pair in range(5):
+            r, m, n = (0, 1, 1, 2, 2)[pair], (0, 0, 1, 1, 2)[pair], (0, 1, 0, 1, 0)[pair]  # row, w, b
+            share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[pair]
+            speed = max(np.sqrt(size[m]), REST * limits.pace[i])
+            time = speed / bound
+            for side in range(2):
+                by = 0.5 * z[ROWS * kind + 3 * side + r] * share * time / (bound * speed)
+                per = (1.0 - 2.0 * side) / time
+                alpha[1], alpha[2], alpha[3] = per, n * 0.0 + 1.0 + per * 0.5 * m * h, n * h + per * (0.5 * h * h if m == 2 else 0.0)
+                for k in range(axes):
+                    a, j = x[2 * axes + k], u[k]
+                    e[k] = n * j + per * (0.5 * a if m == 1 else a + h * j if m == 2 else 0.0)
+                H = 4 * axes
+                for k in range(axes):
+                    g = by * limits.linear[k]
+                    W[H, H] += g * e[k] * e[k]
+                    for s in range(1, 4):
+                        W[H, s * axes + k] += g * e[k] * alpha[s]
+                        for t in range(1, s + 1):
+                            W[s * axes + k, t * axes + k] += g * alpha[s] * alpha[t]
+
+
+@njit(cache=True, error_model="numpy")
+def used(kind, v, a, linear):
+    """|f(v, a)| of a limit of `STATE_LIMITS`, for v, a (A,); 0 at rest. linear (A,) is 1 for x, y and z, else 0."""
+    square, along = 0.0, 0.0
+    for k in range(len(v)):
+        square += linear[k] * v[k] * v[k]
+        along += linear[k] * v[k] * a[k]
+    return abs(along) / np.sqrt(square) if square > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def state_shares(bounds, linear, v, a):
+    """(N, K) shares of the limits (K,) that the velocities and accelerations v, a (N, A) use."""
+    shares = np.zeros((len(v), len(bounds)))
+    for i in range(len(v)):
+        for kind in range(len(bounds)):
+            shares[i, kind] = used(kind, v[i], a[i], linear) / bounds[kind]
+    return shares

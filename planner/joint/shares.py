@@ -17,8 +17,8 @@ NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place on an arc, from the
 
 
 def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatArray:
-    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal acceleration, the K limits of
-    the state, tolerance.
+    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal acceleration, the K limits
+    of the state, tolerance.
 
     leg   : (N,) of each step
     place : (N+1,) of the nodes along the run [mm]

@@ -1,18 +1,17 @@
-"""Limits of the search that are functions of a motion's velocity v and acceleration a: the tangential acceleration |a.t| <= A_t, t = v/|v|.
+"""Limits of the search that are functions of a motion's velocity v and acceleration a: |a.t| <= A_t with t = v/|v|, tangential.
 
-On a step a is linear and v a parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at its
-ends e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are cubics with the
+On a step a is linear and v a parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at
+its ends e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are cubics with the
 ordinates
 
     a.v     b0.w0,   (b1.w0 + 2 b0.w1)/3,   (2 b1.w1 + b0.w2)/3,   b1.w2
     v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
 
 and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn between them. (Rows at places
-instead are made use of between them: the motion weaves inside the tolerance, and is beyond the limit there by up to 7 %.) The last
-ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are no rows.
+instead are made use of between them, by a motion that weaves inside the tolerance.) The last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are no rows.
 
-A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. The curvature of the product a.v is left out of the
-model, as that of the kinematics is.
+A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the model has what is positive of
+that of the products b.w: without it windows take many more iterations, or do not converge.
 
 Rotary axes, u, v and w do not count. Another limit of this kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of
 `_ordinates`, `used` and `formula`.
@@ -36,8 +35,8 @@ REST = 1e-3  # of a step's pace: below that the direction of a velocity counts l
 
 
 def bounds_of(limits: Limits, moves: FloatArray) -> FloatArray:
-    """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that nothing can reach; (0,) where
-    that is so for all of them."""
+    """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that nothing can reach; (0,)
+    where that is so for all of them."""
     reached = np.linalg.norm(limits.acceleration[moves & np.isin(limits.axes, LINEAR_AXES)])
     bounds = np.array([limits.tangential if limits.tangential < reached else np.inf])
     return bounds if np.isfinite(bounds).any() else bounds[:0]
@@ -139,33 +138,31 @@ def add_state_curvature(W, limits, i, x, u, z):
     (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,) are their multipliers."""
     axes = len(u) - 1
     h = u[axes]
-    alpha, e = np.zeros(4), np.empty(axes)
-    size = np.zeros(3)
+    alpha, e, square = np.zeros(4), np.empty(axes), np.zeros(3)
     for k in range(axes):
-        a = x[2 * axes + k]
-        size[0] += limits.linear[k] * x[axes + k] ** 2
-        size[1] += limits.linear[k] * (x[axes + k] + 0.5 * h * a) ** 2
-        size[2] += limits.linear[k] * (x[axes + k] + h * (a + 0.5 * h * u[k])) ** 2
+        v, a = x[axes + k], x[2 * axes + k]
+        square[0] += limits.linear[k] * v**2
+        square[1] += limits.linear[k] * (v + 0.5 * h * a) ** 2
+        square[2] += limits.linear[k] * (v + h * (a + 0.5 * h * u[k])) ** 2
     for kind in range(limits.state.shape[1]):
         bound = limits.state[i, kind]
         for pair in range(5):
-            r, m, n = (0, 1, 1, 2, 2)[pair], (0, 0, 1, 1, 2)[pair], (0, 1, 0, 1, 0)[pair]  # row, w, b
+            r, m, n = (0, 1, 1, 2, 2)[pair], (0, 0, 1, 1, 2)[pair], (0, 1, 0, 1, 0)[pair]  # of the row, w and b
             share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[pair]
-            speed = max(np.sqrt(size[m]), REST * limits.pace[i])
-            time = speed / bound
+            time = max(np.sqrt(square[m]), REST * limits.pace[i]) / bound
             for side in range(2):
-                by = 0.5 * z[ROWS * kind + 3 * side + r] * share * time / (bound * speed)
+                by = 0.5 * share * z[ROWS * kind + 3 * side + r] / (bound * bound)
                 per = (1.0 - 2.0 * side) / time
-                alpha[1], alpha[2], alpha[3] = per, n * 0.0 + 1.0 + per * 0.5 * m * h, n * h + per * (0.5 * h * h if m == 2 else 0.0)
+                of_j = 0.5 * h * h if m == 2 else 0.0
+                alpha[1], alpha[2], alpha[3] = per, 1.0 + 0.5 * per * m * h, n * h + per * of_j
                 for k in range(axes):
                     a, j = x[2 * axes + k], u[k]
                     e[k] = n * j + per * (0.5 * a if m == 1 else a + h * j if m == 2 else 0.0)
-                H = 4 * axes
                 for k in range(axes):
                     g = by * limits.linear[k]
-                    W[H, H] += g * e[k] * e[k]
+                    W[4 * axes, 4 * axes] += g * e[k] * e[k]
                     for s in range(1, 4):
-                        W[H, s * axes + k] += g * e[k] * alpha[s]
+                        W[4 * axes, s * axes + k] += g * e[k] * alpha[s]
                         for t in range(1, s + 1):
                             W[s * axes + k, t * axes + k] += g * alpha[s] * alpha[t]
 

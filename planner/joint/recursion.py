@@ -24,8 +24,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.joint.curvature import model_of_rows
-from planner.joint.state_limits import add_state_curvature
 from planner.joint.rows import STATE_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
+from planner.joint.state_limits import add_state_curvature
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 

@@ -147,7 +147,11 @@ def add_state_curvature(W, limits, i, x, u, z):
     for kind in range(limits.state.shape[1]):
         bound = limits.state[i, kind]
         for pair in range(5):
-            r, m, n = (0, 1, 1, 2, 2)[pair], (0, 0, 1, 1, 2)[pair], (0, 1, 0, 1, 0)[pair]  # of the row, w and b
+            r, m, n = (
+                (0, 1, 1, 2, 2)[pair],
+                (0, 0, 1, 1, 2)[pair],
+                (0, 1, 0, 1, 0)[pair],
+            )  # of the row, w and b
             share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[pair]
             time = max(np.sqrt(square[m]), REST * limits.pace[i]) / bound
             for side in range(2):

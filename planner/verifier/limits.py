@@ -50,14 +50,14 @@ from planner.verifier.worst import (
 
 # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
 FEED_AT_REST = 1e-6
-NORMAL_NAME = "normal_acceleration"
+NORMAL_NAME, TANGENTIAL_NAME = "normal_acceleration", "acceleration.tangential"
 UNITS = ("/s", "/s2", "/s3")
 
-# Rows of `Worst`: six groups of one row per axis, then three rows of their own, then three per user limit.
+# Rows of `Worst`: six groups of one row per axis, then some of their own, then three per user limit.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
 GROUPS = 6
-FEED, NORMAL, CHORD = range(3)
-ROWS_ALONE = 3
+FEED, NORMAL, CHORD, TANGENTIAL = range(4)
+ROWS_ALONE = 4
 
 
 def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
@@ -72,6 +72,7 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
         normal=normal_limit(machine),
+        tangential=machine.tangential_acceleration or math.inf,
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         user=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
@@ -105,7 +106,7 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
         for letter, length in zip(limits.axes, unit, strict=True)
     ]
     rows += [("", "")] * (GROUPS * len(limits.axes) - len(rows))
-    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm")]
+    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm"), (TANGENTIAL_NAME, "mm/s2")]
     return rows + [
         (f"{quantity}.{limit.name}", limit.unit + per)
         for limit in limits.user

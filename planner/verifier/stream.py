@@ -22,6 +22,7 @@ from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, matc
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.stops import AtStop
 from planner.verifier.switches import Bounds, Chords
+from planner.verifier.tangential import look_at_tangential
 from planner.verifier.user_limits import look_at_user_limits
 from planner.verifier.worst import BACK, Limits, SampleBlock, Worst
 
@@ -135,6 +136,7 @@ class Watch:
             travelled=self._travelled,
         )
         look_at_axes(block, limits, seen.worst)
+        look_at_tangential(block, limits, seen.worst)
         look_at_user_limits(block, limits, seen.worst, GROUPS * len(limits.axes) + ROWS_ALONE)
         self._travelled = float(block.travelled_to()[-1])
 

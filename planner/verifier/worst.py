@@ -137,7 +137,7 @@ class Limits:
     judged        : (3,) True for the columns velocity, acceleration, jerk that were delivered
     rounding      : (A,) largest error of a position by its digits [mm]
     time_rounding : the same of a time [s]
-    normal        : of the normal acceleration [mm/s2], or inf
+    normal, tangential : of the normal and of the tangential acceleration [mm/s2], or inf
     acceleration_at_stop : (A,) inf where acceleration is not limited [mm/s2]
     user          : the user's limits (user_limits.py)
     """
@@ -149,6 +149,7 @@ class Limits:
     rounding: FloatArray
     time_rounding: float
     normal: float
+    tangential: float
     acceleration_at_stop: FloatArray
     jerk_limited: bool
     user: tuple[Any, ...] = ()

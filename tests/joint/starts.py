@@ -10,6 +10,7 @@ from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.run import TubeRun, tube_runs_of
+from planner.machine import Machine
 from planner.motion.vertex_times import passing_times
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
@@ -20,20 +21,22 @@ PROGRAMS = {
     "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
     "arcs": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
     "pentagon": problems.pentagon(side=6.0),
+    "pushed": problems.polyline([[0, 0], [4, 0], [4, 4]]),  # along which a tangential acceleration holds
 }
+MACHINES = {"pushed": MACHINE.model_copy(update={"tangential_acceleration": 900.0})}
 
 
 @cache
 def begun(name: str, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
     """A run, and its motion on Bezier corners cut into steps."""
-    return begun_on(PROGRAMS[name], cut)
+    return begun_on(PROGRAMS[name], cut, MACHINES.get(name, MACHINE))
 
 
-def begun_on(program: Program, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
+def begun_on(program: Program, cut: Cut = DEFAULT_CUT, machine: Machine = MACHINE) -> tuple[TubeRun, Guess]:
     """The same of a program of one run."""
-    toolpath = toolpath_from_program(program, MACHINE)
-    (run,) = tube_runs_of(toolpath, MACHINE)
-    seen = OptimalMethod(corner="bezier").plan(program, MACHINE).require().trajectory
+    toolpath = toolpath_from_program(program, machine)
+    (run,) = tube_runs_of(toolpath, machine)
+    seen = OptimalMethod(corner="bezier").plan(program, machine).require().trajectory
     times = np.maximum.accumulate(passing_times(seen, toolpath))
     times[-1] = seen.t[-1]
     return run, guess_from(run, seen, times[run.first], cut)

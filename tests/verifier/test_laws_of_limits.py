@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from judging import judge
-from motions import Moves, along, chain, helix, rest_to_rest, straight
+from motions import Moves, along, chain, helix, rest_to_rest, sample, straight
 from motions import machine as machine_with
 
 from benchmarks.judge.setpoints import trajectory_of
@@ -19,10 +19,11 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.axis_acceleration import JUMP
 from planner.feedrate.constraints.limit import RowPoint
-from planner.feedrate.constraints.limits import JERK, LIMITS, ROWS
+from planner.feedrate.constraints.limits import JERK, LIMITS, ROWS, TANGENTIAL, Limits
 from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.constraints.own_axes import own_inside
 from planner.feedrate.sampling.samples import sample_path
+from planner.motion.limits_used import ratios
 from planner.verifier.filtered import filtered
 
 RADIUS, TURNS, ARC = 10.0, 3, 0.4 * np.pi
@@ -186,12 +187,26 @@ def test_the_judge_finds_the_acceleration_used_up_where_a_line_meets_an_arc():
     assert verdict.limits["acceleration.y"].position == pytest.approx([0.0, 0.0, 0.0], abs=speed * machine.dt)
 
 
+def test_the_judge_finds_the_tangential_acceleration_used_up():
+    """Of a motion that speeds up and slows down round the circle as fast as it may, and what the planner says that it uses."""
+    pushed = 180.0
+    machine = machine_with(tangential_acceleration=pushed)
+    toolpath = circle().toolpath(machine)
+    length, curve = helix((RADIUS, 0.0, 0.0), (0.0, 0.0), 2.0 * np.pi * TURNS)
+    motion = along(length, curve, rest_to_rest(length, PROGRAMMED, pushed, 4e3))
+    check = judge(motion, toolpath, machine).limits[TANGENTIAL.name]
+    assert (check.ratio, check.unit) == (pytest.approx(1.0, abs=CLOSE), TANGENTIAL.unit)
+    limits = Limits.of(machine, toolpath.axes)
+    used = [ratio.max() for order, ratio in ratios(limits, sample(motion, machine.dt)) if order == 2]
+    assert used == [pytest.approx(1.0, abs=CLOSE)]
+
+
 @pytest.mark.parametrize("own", [Along(), Belt()], ids=lambda limit: limit.name)
 def test_the_judge_finds_limits_of_ones_own_used_up(own):
     machine = machine_with().with_own([own])
     toolpath = circle().toolpath(machine)
     grid = on_grid(toolpath, machine)
-    speed = float(np.sqrt(own_inside(grid.samples, machine).min()))
+    speed = float(np.sqrt(own_inside(grid.samples, Limits.of(machine, grid.axes)).min()))
     verdict = judge(steady(speed), toolpath, machine)
     check = verdict.limits[f"velocity.{own.name}"]
     assert check.ratio == pytest.approx(1.0, abs=CLOSE)
@@ -199,7 +214,10 @@ def test_the_judge_finds_limits_of_ones_own_used_up(own):
 
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-ROW = re.compile(r"^\| [^|]+ \| `(\w+)[^`]*` \| ([^|]+) \| ([^|]+) \| `([^`]+)` \| `(\w+)` \|$", re.MULTILINE)
+ROW = re.compile(
+    r"^\| [^|]+ \| `([\w.]+?)(?:\.[xyz]|[^\w.`][^`]*)?` \| ([^|]+) \| ([^|]+) \| `([^`]+)` \| `(\w+)` \|$",
+    re.MULTILINE,
+)
 
 
 def test_the_table_of_limits_is_that_of_the_objects():
@@ -219,7 +237,12 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
 
 def test_a_limit_is_named_in_one_file():
     """Printed names are in the limit's own file, and in no other of the planner; the judge has its own."""
-    single = {limit.name for limit in LIMITS} - {"feed", "velocity", "acceleration", "jerk"} | {JUMP}
+    single = {limit.name for limit in LIMITS if "." not in limit.name} - {
+        "feed",
+        "velocity",
+        "acceleration",
+        "jerk",
+    } | {JUMP}
     with_axes = tuple(f"{name}." for name in ("velocity", "acceleration", "jerk", JUMP))
     quoted = re.compile("[\"'](" + "|".join([*single, *map(re.escape, with_axes)]) + ")")
     found: dict[str, set[str]] = {name: set() for name in single}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
 from planner.feedrate.constraints.limit import Limit
 from planner.machine import LINEAR_AXES, TANGENTIAL, Machine
 from planner.machine.user_limit import PathLimit, Place
@@ -45,7 +46,7 @@ class _Row(PathLimit):
 class TangentialAcceleration(Limit):
     """|l' u + l'' x| <= A_t, on machines that name A_t."""
 
-    name, unit, order = f"acceleration.{TANGENTIAL}", "mm/s2", 2
+    name, unit, order = AxisAcceleration.called(TANGENTIAL), "mm/s2", 2
     key = "tangential_acceleration"
 
     def along(self, machine: Machine, axes: tuple[str, ...]) -> PathLimit | None:

@@ -8,10 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from planner.base.errors import InputError
 from planner.base.names import KINEMATIC, OPTIMAL
 from planner.delivery import periods
 from planner.feedrate.constraints.extruder import with_extruder_limit
-from planner.feedrate.constraints.limits import JERK
+from planner.feedrate.constraints.limits import JERK, Limits
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint, Toolpath
@@ -50,10 +51,12 @@ class Method(ABC):
     ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
               `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
     measures_filters : whether filters make its motions slower only where they are measured to leave the tolerance
+    keeps_tangential : whether its motions keep the machine's limit of the tangential acceleration
     """
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
     measures_filters: ClassVar[bool] = False
+    keeps_tangential: ClassVar[bool] = True
 
     def plan(
         self,
@@ -69,13 +72,19 @@ class Method(ABC):
         progress  : called with the stage's name and the fraction done (0 to 1)
         log       : called with every step of the planning, e.g. a `Trace` (planning/job/trace.py)
 
-        Raises InputError for a program that cannot be planned. An unsolved problem is the status of the plan.
+        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep. An unsolved problem is the
+        status of the plan.
         """
         stages = Stages(progress, log)
         with stages.stage("geometry"):
             toolpath = toolpath_from_program(program, machine, tolerance)
             if (fed := toolpath.extrusion) is not None:
                 machine = with_extruder_limit(machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block)
+        if not self.keeps_tangential and np.isfinite(Limits.of(machine, toolpath.axes).tangential):
+            raise InputError(
+                f"the machine limits the tangential acceleration to {machine.tangential_acceleration:g} mm/s2, which {self!r} does not "
+                "keep; plan with method optimal, second-order, bezier or stop, or leave tangential_acceleration out of the machine"
+            )
         # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
         at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
         require_samples(at_feed, machine.dt)

@@ -45,6 +45,7 @@ class FirMethod(Method):
     plain: bool = False
     profile_filters: tuple[float, float] | None = None
 
+    keeps_tangential = False
     ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
 
     def __post_init__(self) -> None:

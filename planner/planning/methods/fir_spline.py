@@ -70,6 +70,7 @@ class FirSplineMethod(Method):
     profile_filters: tuple[float, float] | None = None
     phase_lag: float = PHASE_LAG
 
+    keeps_tangential = False
     ways = ((0.5, 1.0), (0.25, 1.0), (0.1, 1.0), (0.03, 1.0))
 
     def __post_init__(self) -> None:

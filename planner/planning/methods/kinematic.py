@@ -29,6 +29,7 @@ from planner.baselines.lookahead.ramps import JointKind
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners import kinematic as corner
 from planner.corners.budget import error_rate, normal_at_corners, normal_within_budget
+from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
@@ -60,7 +61,7 @@ class KinematicMethod(Method):
     start_stop: float = 0.0
     short_segment: float = 1.0
 
-    ways = CLOSED_FORM_WAYS
+    ways, keeps_tangential = CLOSED_FORM_WAYS, False
 
     def __post_init__(self) -> None:
         if not 0 <= self.start_stop < np.inf:
@@ -72,7 +73,9 @@ class KinematicMethod(Method):
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
         job.note(*_curve_notes(job.toolpath, exact))
         with job.stage("solve"):
-            chain = self._chain(job.toolpath, job.machine, exact)
+            # legs alone could keep a tangential acceleration, corners would not begin as they end
+            machine = job.machine.model_copy(update={TANGENTIAL.key: None})
+            chain = self._chain(job.toolpath, machine, exact)
             motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
         made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)
         with job.stage("report"):

@@ -11,7 +11,7 @@ from benchmarks.jobs import problems
 from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints.limits import VELOCITY
+from planner.feedrate.constraints.limits import VELOCITY, Limits
 from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
@@ -64,6 +64,6 @@ def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():
     acceleration = along * velocity / speed - speed**2 / radius * np.stack([c, s, nothing], axis=1)
     motion = dataclasses.replace(motion, acceleration=acceleration)
     machine = problems.machine().model_copy(update={"normal_acceleration": most})
-    ((order, ratio),) = limits_used.normal_ratios(machine, motion)
+    ((order, ratio),) = limits_used.ratios(Limits.of(machine, motion.axes), motion)
     assert order == 2
     assert ratio == pytest.approx(speed**2 / radius / most, rel=1e-9)

@@ -174,7 +174,9 @@ class _Column:
             feed_sq_mid = (bound_mid[:, 0] / np.abs(q_mid[0])) ** 2
         least = np.minimum(bound.min(axis=0), bound_mid.min(axis=0))
         limited = bool(np.isfinite(least[0]))
-        feed_sq, short, jump = _between(feed_sq, feed_sq_mid, real_sq, FAR * real.feed_sq, at)
+        short, jump = np.zeros(len(at)), np.zeros(len(at))
+        if limited:
+            feed_sq, short, jump = _between(feed_sq, feed_sq_mid, real_sq, FAR * real.feed_sq, at)
         # what the intervals can be run with, for the errors of their rows
         x = np.minimum(real.feed_sq, np.minimum(np.maximum(feed_sq[a], feed_sq[b]), feed_sq_mid))
         u = real.acceleration
@@ -207,7 +209,7 @@ class _Column:
             least=least,
             acceleration=acceleration,
             jerk=jerk,
-            feed_sq_max=feed_sq if limited else np.full(points, np.inf),
+            feed_sq_max=feed_sq,
             error=error,
             bend=bend,
             short=np.max([short, short_a, short_j], axis=0),

@@ -14,6 +14,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.machine import Machine
 
+NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
+
 
 def chord_rate(machine: Machine) -> float:
     """dt^2/8 [s2], or dt^2/32 with cubics: chord error per unit of normal acceleration."""
@@ -37,7 +39,7 @@ def largest_normal(machine: Machine) -> float:
 
 def with_less_normal(machine: Machine, most: float) -> Machine:
     """The machine with A of at most that [mm/s2]: what is behind the setpoints cuts curves off by no more."""
-    return machine.model_copy(update={"normal_acceleration": min(most, largest_normal(machine))})
+    return machine.model_copy(update={NORMAL: min(most, largest_normal(machine))})
 
 
 def normal_of_axes(limits: FloatArray, u1: FloatArray, u2: FloatArray) -> FloatArray:

@@ -1,20 +1,23 @@
-"""Limits of the search that are functions of a motion's velocity v and acceleration a: |a.t| <= A_t with t = v/|v|, tangential.
+"""Limits of the search that are functions of a motion's velocity v and acceleration a.
 
-On a step a is linear and v a parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at
-its ends e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are cubics with the
-ordinates
+The tangential acceleration: |a.t| <= A_t with t = v/|v|, of x, y and z alone. On a step a is linear and v a
+parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at its ends
+e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are
+cubics with the ordinates
 
     a.v     b0.w0,   (b1.w0 + 2 b0.w1)/3,   (2 b1.w1 + b0.w2)/3,   b1.w2
     v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
 
-and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn between them. (Rows at places
-instead are made use of between them, by a motion that weaves inside the tolerance.) The last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are no rows.
+and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn between
+them. (Rows at places instead are made use of between them, by a motion that weaves inside the tolerance.) The
+last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are
+no rows.
 
-A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the model has what is positive of
-that of the products b.w: without it windows take many more iterations, or do not converge.
+A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the model
+has what is positive of that of the products b.w: without it windows take many more iterations, or do not converge.
 
-Rotary axes, u, v and w do not count. Another limit of this kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of
-`_ordinates`, `used` and `formula`.
+Another limit of this kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of `_ordinates`, `used`
+and `formula`.
 """
 
 from __future__ import annotations
@@ -43,13 +46,16 @@ def bounds_of(limits: Limits, moves: FloatArray) -> FloatArray:
 
 
 def formula(ca: Any, kind: int, w: Any, b: Any, linear: FloatArray, rest: Any) -> list[tuple[Any, Any]]:
-    """Pairs (a.v, v.e) of the ordinates of a limit of `STATE_LIMITS` in symbols of casadi, given as `ca`, from those of the velocity
-    w (3) and of the acceleration b (2); at the ends of a step too."""
+    """Pairs (a.v, v.e) of all four ordinates of a limit of `STATE_LIMITS` in symbols of casadi, given as `ca`.
+
+    w, b   : ordinates of the velocity (3) and of the acceleration (2) of a step
+    linear : (A,) 1 for x, y and z, else 0
+    rest   : speed to which directions are smoothed
+    """
     w, b = [linear * one for one in w], [linear * one for one in b]
     e0, e1 = (one / ca.sqrt(ca.sumsqr(one) + rest**2) for one in (w[0], w[2]))
-    pushed = b[0], (b[1], w[0], b[0], w[1])
     return [
-        (ca.dot(pushed[0], w[0]), ca.dot(w[0], e0)),
+        (ca.dot(b[0], w[0]), ca.dot(w[0], e0)),
         ((ca.dot(b[1], w[0]) + 2 * ca.dot(b[0], w[1])) / 3, (ca.dot(w[0], e1) + 2 * ca.dot(w[1], e0)) / 3),
         ((2 * ca.dot(b[1], w[1]) + ca.dot(b[0], w[2])) / 3, (2 * ca.dot(w[1], e1) + ca.dot(w[2], e0)) / 3),
         (ca.dot(b[1], w[2]), ca.dot(w[2], e1)),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks import problems
+from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH
 from planner.feedrate.constraints.limits import TANGENTIAL, Limits

@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from planner.base.arrays import FloatArray
+from planner.corners.budget import NORMAL
 from planner.feedrate.constraints.limit import Cap, Limit, over
 from planner.machine import Machine
 
 if TYPE_CHECKING:
     from planner.feedrate.constraints.on_grid import Side
 
-NAME = "normal_acceleration"
+NAME = NORMAL
 
 
 def feed_sq_within(kappa: FloatArray, limit: float) -> FloatArray:

@@ -24,7 +24,10 @@ REACHABLE = 1.0 - 1e-12  # of the norm of the axes' accelerations: rounding [-]
 
 
 def binding(machine: Machine, axes: tuple[str, ...], acceleration: FloatArray) -> float:
-    """A_t [mm/s2]; inf where it is above what the axes give, with their accelerations (A,) [mm/s2], and where none is named."""
+    """A_t [mm/s2]; inf where none is named, and where it is above what the axes give.
+
+    acceleration : (A,) of the axes [mm/s2]
+    """
     largest = machine.tangential_acceleration
     reached = float(np.linalg.norm(acceleration[np.isin(axes, LINEAR_AXES)]))
     return np.inf if largest is None or largest >= reached * REACHABLE else largest

@@ -72,8 +72,8 @@ class Method(ABC):
         progress  : called with the stage's name and the fraction done (0 to 1)
         log       : called with every step of the planning, e.g. a `Trace` (planning/job/trace.py)
 
-        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep. An unsolved problem is the
-        status of the plan.
+        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep. An unsolved problem is
+        the status of the plan.
         """
         stages = Stages(progress, log)
         with stages.stage("geometry"):

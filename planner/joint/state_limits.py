@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.constraints.limit import Limit
 from planner.feedrate.constraints.limits import TANGENTIAL, Limits
@@ -37,7 +37,7 @@ ROWS = 6  # of a limit: three ordinates, upper before lower
 REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
 
 
-def bounds_of(limits: Limits, moves: FloatArray) -> FloatArray:
+def bounds_of(limits: Limits, moves: Array) -> FloatArray:
     """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that nothing can reach; (0,)
     where that is so for all of them."""
     reached = np.linalg.norm(limits.acceleration[moves & np.isin(limits.axes, LINEAR_AXES)])

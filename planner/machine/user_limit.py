@@ -91,7 +91,7 @@ class PathLimit:
 
     name: str = ""
     unit: str = "mm"
-    turn: ClassVar[float | None] = None
+    turn: float | None = None
     counts: ClassVar[tuple[str, ...] | None] = (
         None  # letters of the axes whose common way it is; None: of all
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,8 @@ from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.time_law import TimeLaw, law_of_solution
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, MotionInTime, in_chunks, inside_pieces
+from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.planning.optimal.geometry import corner_shape
 
@@ -121,3 +123,11 @@ def evaluate_corner(
         by_s[i] = by_w[i]
         to_arc_length(by_s[i])
     return Corner(by_w=by_w, by_s=by_s, vertex=legs[joint]["start"].copy())
+
+
+def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
+    """The motion between its samples at dt [s]: half-way between them and inside every piece, in chunks."""
+    halves = np.arange(0.5 * dt, motion.end, dt)
+    return in_chunks(
+        motion, dt, np.concatenate([[0.0, motion.end], inside_pieces(motion)[1].ravel(), halves])
+    )

@@ -12,31 +12,32 @@ FloatArray = NDArray[np.float64]
 
 
 def freeze(
-    record: object, name: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
-) -> Array:
-    """Convert field `name` of a frozen dataclass to a contiguous read-only array of a shape such as (3, None), in place; return it.
+    record: object, names: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
+) -> None:
+    """Convert fields of a frozen dataclass to contiguous read-only arrays of a shape such as (3, None), in place.
 
     An array that has the type already is not copied (trajectories fill gigabytes): the record then shares memory with the
     caller's array, which the caller must not change any more.
 
+    names  : of the fields, with spaces between them
     shape  : expected shape; None where any length will do
     finite : refuse NaN and infinity (floating point fields only)
 
     Raises ValueError naming record, field, found and expected.
     """
-    given = getattr(record, name)
-    array: Array = np.ascontiguousarray(given, dtype=dtype)
-    if array is given and array.flags.writeable:
-        array = array.view()  # the caller keeps a writable array of its own; ours is not
-    if array.shape != shape and not _fits(array.shape, shape):
-        raise ValueError(f"{type(record).__name__}.{name}: shape {array.shape}, expected {shape}")
-    if finite and array.dtype.kind == "f" and not np.logical_and.reduce(np.isfinite(array), axis=None):
-        bad = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        where = f"{type(record).__name__}.{name}"
-        raise ValueError(f"{where}: {array[bad]} at index {bad}; every value must be finite")
-    array.flags.writeable = False
-    object.__setattr__(record, name, array)
-    return array
+    for name in names.split():
+        given = getattr(record, name)
+        array: Array = np.ascontiguousarray(given, dtype=dtype)
+        if array is given and array.flags.writeable:
+            array = array.view()  # the caller keeps a writable array of its own; ours is not
+        if array.shape != shape and not _fits(array.shape, shape):
+            raise ValueError(f"{type(record).__name__}.{name}: shape {array.shape}, expected {shape}")
+        if finite and array.dtype.kind == "f" and not np.logical_and.reduce(np.isfinite(array), axis=None):
+            bad = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+            where = f"{type(record).__name__}.{name}"
+            raise ValueError(f"{where}: {array[bad]} at index {bad}; every value must be finite")
+        array.flags.writeable = False
+        object.__setattr__(record, name, array)
 
 
 def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:

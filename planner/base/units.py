@@ -1,13 +1,11 @@
 """Units and symbols. Inside the package everything is in mm, s and rad; conversions happen only at the edges, with the names below.
 
-    s         arc length along the path [mm]            feed      ds/dt [mm/s]
-    feed_sq   feed squared [mm2/s2]                     acc_s     d2s/dt2 [mm/s2]
-    jerk_s    d3s/dt3 [mm/s3]                           kappa     curvature [1/mm]
-    theta     turning angle at a corner [rad], 0 = straight on, pi = reversal
-    tol_*     a part of the contour error budget [mm]   dt        interpolation period [s]
-    *_max     a limit      *_grid  sampled along s      *_t       sampled in time      *_sq  squared
-
-Words, for parts of a path and for terms of the field: `planner.base.glossary`.
+s         arc length along the path [mm]            feed      ds/dt [mm/s]
+feed_sq   feed squared [mm2/s2]                     acc_s     d2s/dt2 [mm/s2]
+jerk_s    d3s/dt3 [mm/s3]                           kappa     curvature [1/mm]
+theta     turning angle at a corner [rad], 0 = straight on, pi = reversal
+tol_*     a part of the contour error budget [mm]   dt        interpolation period [s]
+*_max     a limit      *_grid  sampled along s      *_t       sampled in time      *_sq  squared
 """
 
 from __future__ import annotations

@@ -94,8 +94,7 @@ class SmoothPath:
         freeze(self, "joint", np.uint8, (joints,))
         freeze(self, "params", np.float64, (joints, 4))
         freeze(self, "scale", np.float64, (joints, 2))
-        for name in ("d", "tol", "tol_ap", "normal_max"):
-            freeze(self, name, np.float64, (joints,))
+        freeze(self, "d tol tol_ap normal_max", np.float64, (joints,))
 
     @property
     def d_in(self) -> FloatArray:

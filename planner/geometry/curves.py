@@ -86,11 +86,6 @@ class CurveSegments(NamedTuple):
     ends: FloatArray
 
 
-def no_curves(axes: int) -> Curves:
-    """The curves of a path that has none, over `axes` axes."""
-    return Curves(points=np.zeros((0, 4, axes)), weight=np.zeros((0, 2)), twist=np.zeros(0))
-
-
 def curve_segments(pieces: FloatArray, near: FloatArray) -> CurveSegments:
     """Divide rational cubics until each has a parameter like its arc length.
 

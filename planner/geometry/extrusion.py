@@ -60,12 +60,10 @@ class Extrusion:
         knots, moves = len(self.joint), len(self.at)
         freeze(self, "limits", np.float64, (3,))
         freeze(self, "joint", np.int64, (knots,))
-        for name in ("arrive", "leave"):
-            freeze(self, name, np.float64, (knots,))
+        freeze(self, "arrive leave", np.float64, (knots,))
         freeze(self, "ratio", np.float64, (None,))
         freeze(self, "at", np.int64, (moves,))
-        for name in ("delay", "amount", "speed"):
-            freeze(self, name, np.float64, (moves,))
+        freeze(self, "delay amount speed", np.float64, (moves,))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

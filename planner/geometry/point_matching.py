@@ -82,18 +82,11 @@ def chain_of(toolpath: Toolpath) -> PathChain:
     return PathChain(vertex, at_vertex, budget, skipped, toolpath.feed[segment], segment, first)
 
 
-def segments_at(toolpath: Toolpath, point: FloatArray, feed: FloatArray) -> Array | None:
-    """(T,) segment of the toolpath that each point (T, A) of a motion is at, moving at `feed` (T,) [mm/s]; None where that cannot be
-    told: the motion leaves the path, or does not end where it ends."""
-    found = SegmentsInOrder(toolpath)
-    found.take(point, feed)
-    runs = found.runs()
-    return None if runs is None else np.repeat(runs[1], np.diff(np.append(runs[0], len(point))))
-
-
 class SegmentsInOrder:
-    """`segments_at` for points that come chunk by chunk. Which link a point is at is settled as soon as all assignments that are still
-    possible agree on it; until then its chunk is kept."""
+    """Which segment of the toolpath each point of a motion is at, for points that come chunk by chunk.
+
+    Which link a point is at is settled as soon as all assignments that are still possible agree on it; until then its chunk is kept.
+    """
 
     def __init__(self, toolpath: Toolpath):
         self._chain = chain_of(toolpath)

@@ -44,10 +44,8 @@ class Spline:
     def __post_init__(self) -> None:
         runs = len(self.joint_first)
         freeze(self, "first", np.int64, (runs + 1,))
-        freeze(self, "joint_first", np.int64, (runs,))
-        freeze(self, "joint_last", np.int64, (runs,))
-        freeze(self, "x_first", np.float64, (runs,))
-        freeze(self, "x_last", np.float64, (runs,))
+        freeze(self, "joint_first joint_last", np.int64, (runs,))
+        freeze(self, "x_first x_last", np.float64, (runs,))
         freeze(self, "budget", np.float64, (len(self.spans),))
 
     def __len__(self) -> int:

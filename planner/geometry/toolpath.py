@@ -54,10 +54,8 @@ class Arcs:
 
     def __post_init__(self) -> None:
         arcs, axes = np.shape(self.center)
-        for name in ("center", "e1", "e2", "drift"):
-            freeze(self, name, np.float64, (arcs, axes))
-        for name in ("radius", "rate"):
-            freeze(self, name, np.float64, (arcs,))
+        freeze(self, "center e1 e2 drift", np.float64, (arcs, axes))
+        freeze(self, "radius rate", np.float64, (arcs,))
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -126,21 +124,15 @@ class Toolpath:
 
     def __post_init__(self) -> None:
         segments, axes = len(self.length), len(self.axes)
-        for name in ("start", "end", "tangent_start", "tangent_end"):
-            freeze(self, name, np.float64, (segments, axes))
-        for name in ("length", "curvature"):
-            freeze(self, name, np.float64, (segments,))
+        freeze(self, "start end tangent_start tangent_end", np.float64, (segments, axes))
+        freeze(self, "length curvature", np.float64, (segments,))
         freeze(self, "feed", np.float64, (segments,), finite=False)
-        freeze(self, "rapid", np.bool_, (segments,))
-        freeze(self, "held", np.bool_, (segments,))
-        freeze(self, "exact", np.bool_, (segments,))
+        freeze(self, "rapid held exact", np.bool_, (segments,))
         freeze(self, "block", np.int64, (segments,))
         freeze(self, "line", np.int32, (segments,))
-        freeze(self, "arc", np.int64, (segments,))
-        freeze(self, "curve", np.int64, (segments,))
+        freeze(self, "arc curve", np.int64, (segments,))
         freeze(self, "joint", np.uint8, (segments + 1,))
-        for name in ("theta", "tolerance", "dwell"):
-            freeze(self, name, np.float64, (segments + 1,))
+        freeze(self, "theta tolerance dwell", np.float64, (segments + 1,))
         freeze(self, "zero_length", np.int64, (None,))
         if self.inside is not None:
             freeze(self, "inside", np.float64, (segments,))

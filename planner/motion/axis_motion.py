@@ -77,8 +77,7 @@ class AxisMotion:
     def __post_init__(self) -> None:
         pieces, axes = len(self.t), len(self.axes)
         freeze(self, "t", np.float64, (pieces,))
-        for name in ("position", "velocity", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (pieces, axes))
+        freeze(self, "position velocity acceleration jerk", np.float64, (pieces, axes))
         freeze(self, "block", np.int64, (pieces,))
         freeze(self, "line", np.int32, (pieces,))
         if not pieces or self.t[0] != 0.0:

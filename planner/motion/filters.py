@@ -84,17 +84,6 @@ class Filters:
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 
-    def taps(self, dt: float) -> FloatArray:
-        """(K,) the discrete kernel at the period dt [s], of unit sum; each length in whole periods N_i, one at least.
-
-        Its variance is dt^2 (sum N_i^2 - n) / 12.
-        """
-        taps = np.ones(1)
-        for T in self.times:
-            count = max(1, round(T / dt))
-            taps = np.convolve(taps, np.full(count, 1.0 / count))
-        return taps
-
     def magnitude(self, w: FloatArray) -> FloatArray:
         """|M| (W,) [-] at frequencies w (W,) [rad/s]: prod |sinc| (eq. 8, 9)."""
         return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
@@ -104,11 +93,6 @@ class Filters:
         w = 2.0 * np.pi * frequency
         pole = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
         return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))
-
-    def move_spectrum(self, w: FloatArray, speed: float, duration: float) -> FloatArray:
-        """(W,) |A| [mm/s] of the acceleration of a full move at frequencies w (W,) [rad/s] (eq. 6): a pulse of `speed` [mm/s] and
-        `duration` [s]."""
-        return speed * np.abs(1.0 - np.exp(-1j * np.asarray(w) * duration)) * self.magnitude(w)
 
     def _response(self, t: FloatArray, integrals: int) -> FloatArray:
         """The kernel, integrated 0, 1 or 2 times, at times t (n,) [s] (module text)."""
@@ -130,32 +114,14 @@ class Filters:
         return np.where(late, t - self.delay / 2 + total, total)
 
 
-def lengths_from_limits(
-    V: FloatArray, A: FloatArray, J: FloatArray, margin: float = 1.0
-) -> tuple[FloatArray, FloatArray]:
-    """T1 = V/A and T2 = margin A/J (S,) [s] (paper 001 par. 19), or both sqrt(margin V/J) where V is too small to reach A.
+def lengths_from_limits(V: FloatArray, A: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """T1 = V/A and T2 = A/J (S,) [s] (paper 001 par. 19), or both sqrt(V/J) where V is too small to reach A.
 
     V, A, J : (S,) speed, acceleration and jerk along a line [mm/s, mm/s2, mm/s3]
-    margin  : 1 is enough for a pulse that is no shorter than Td; an isolated corner needs `corner_margin`, chains of pulses 2 to 4
     """
-    T1, T2 = np.asarray(V / A), np.asarray(margin * A / J)
+    T1, T2 = np.asarray(V / A), np.asarray(A / J)
     equal = np.sqrt(T1 * T2)
     return np.where(T1 >= T2, T1, equal), np.where(T1 >= T2, T2, equal)
-
-
-def corner_margin(u1: FloatArray, u2: FloatArray, overlap: FloatArray, T1: float, T2: float) -> FloatArray:
-    """(n,) factor on T2 = A/J that keeps the axis jerks of an isolated corner within J.
-
-    The largest of 1, max_k |u1k + u2k| for an overlap Tk < 2 T2, and max_k |u2k - u1k| for Tk > T1 (docs/papers.md, peaks inside the
-    corner).
-
-    u1, u2  : (n, A) unit directions before and behind the corner
-    overlap : (n,) Tk [s]
-    T1, T2  : lengths of the filters [s]
-    """
-    plus, minus = np.abs(u1 + u2).max(axis=-1), np.abs(u2 - u1).max(axis=-1)
-    partial = (overlap > 0) & (overlap < 2.0 * T2)
-    return np.maximum(1.0, np.maximum(np.where(partial, plus, 0.0), np.where(overlap > T1, minus, 0.0)))
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
@@ -188,27 +154,6 @@ def damped_period(frequency: float, damping: float) -> float:
 def _multiple(T: FloatArray, period: float) -> FloatArray:
     """T (S,) [s] rounded up to whole periods, one at least."""
     return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
-
-
-def acceleration_spectrum(t: FloatArray, acceleration: FloatArray, w: FloatArray) -> FloatArray:
-    """|integral of a(t) exp(-i w t) dt| (W, A) [mm/s], with a straight between its samples.
-
-    t            : (T,) [s], ascending
-    acceleration : (T, A) [mm/s2]
-    w            : (W,) frequencies [rad/s]
-    """
-    h, slope = np.diff(t)[:, None], np.diff(acceleration, axis=0) / np.diff(t)[:, None]
-    out = np.empty((len(w), acceleration.shape[1]))
-    for n, wn in enumerate(np.asarray(w, float)):
-        z = 1j * wn * h
-        # integral over one period, in (a0 + slope tau): phi1 = int exp(-z x), phi2 = int x exp(-z x) over [0, 1]
-        small = np.abs(z) < 1e-3  # below, the closed forms cancel; the series are good to 1e-13
-        safe = np.where(small, 1.0, z)
-        phi1 = np.where(small, 1 - z / 2 + z**2 / 6 - z**3 / 24, (1 - np.exp(-safe)) / safe)
-        phi2 = np.where(small, 0.5 - z / 3 + z**2 / 8 - z**3 / 30, (1 - (1 + safe) * np.exp(-safe)) / safe**2)
-        terms = np.exp(-1j * wn * t[:-1])[:, None] * h * (acceleration[:-1] * phi1 + slope * h * phi2)
-        out[n] = np.abs(terms.sum(axis=0))
-    return out
 
 
 def residual_vibration(

@@ -49,8 +49,7 @@ class Shaper:
 
     def __post_init__(self) -> None:
         copies = len(self.delay)
-        for name in ("delay", "weight"):
-            freeze(self, name, np.float64, (copies,))
+        freeze(self, "delay weight", np.float64, (copies,))
 
     @property
     def length(self) -> float:

@@ -40,8 +40,7 @@ class TimeLaw:
 
     def __post_init__(self) -> None:
         pieces = len(self.t)
-        for name in ("t", "s", "feed", "acc_s", "jerk_s"):
-            freeze(self, name, np.float64, (pieces,))
+        freeze(self, "t s feed acc_s jerk_s", np.float64, (pieces,))
         freeze(self, "run", np.int64, (pieces,))
 
     @property

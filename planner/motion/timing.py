@@ -108,14 +108,6 @@ def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
     return TrajectoryOnDemand(motion, dt, count) if times is None else motion.at(times, dt)
 
 
-def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:
-    """The motion between its samples at dt [s]: half-way between them and inside every piece, in chunks."""
-    halves = np.arange(0.5 * dt, motion.end, dt)
-    return in_chunks(
-        motion, dt, np.concatenate([[0.0], inside_pieces(motion)[1].ravel(), halves, [motion.end]])
-    )
-
-
 def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
     """Pieces (n,) that last, and times (n, 3) near both ends and in the middle of each [s], at its shares `WATCHED`: all speeds,
     accelerations and jerks are smooth there, and peaks in between close to those of parabolas."""

@@ -51,10 +51,8 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         samples, axes = len(self.t), len(self.axes)
-        for name in ("t", "s", "feed"):
-            freeze(self, name, np.float64, (samples,))
-        for name in ("position", "velocity", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (samples, axes))
+        freeze(self, "t s feed", np.float64, (samples,))
+        freeze(self, "position velocity acceleration jerk", np.float64, (samples, axes))
         freeze(self, "block", np.int64, (samples,))
         freeze(self, "line", np.int32, (samples,))
         freeze(self, "extruder", np.float64, (samples if len(self.extruder) else 0, 4))

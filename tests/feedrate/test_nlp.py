@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from whole_plans import smooth_path
+from whole_plans import dense_motion, smooth_path
 
 from benchmarks.jobs import problems
 from benchmarks.solvers.jerk_campaign import small_problem
@@ -21,7 +21,7 @@ from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status, active_names, constraint_ratios
 from planner.machine import Machine
 from planner.motion.time_law import law_of_solution
-from planner.motion.timing import Motion, dense_motion
+from planner.motion.timing import Motion
 from planner.nc.program import Program
 
 SOLVERS = ("ipopt", "fatrop")

@@ -11,7 +11,7 @@ from quick import slow_but
 
 import planner
 from planner.geometry.build import toolpath_from_program
-from planner.geometry.point_matching import CHORD_FRACTION, SAME_PLACE, SegmentsInOrder, segments_at
+from planner.geometry.point_matching import CHORD_FRACTION, SAME_PLACE, SegmentsInOrder
 from planner.geometry.toolpath import Toolpath
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
@@ -40,6 +40,14 @@ def distance(toolpath: Toolpath, point: np.ndarray, segment: int) -> float:
         nearest = int(away.argmin())
         low, high = x[max(nearest - 1, 0), 0], x[min(nearest + 1, 200), 0]
     return float(away.min())
+
+
+def segments_at(toolpath, point, feed):
+    """(T,) segment that each point (T, A) is at; None where that cannot be told."""
+    found = SegmentsInOrder(toolpath)
+    found.take(point, feed)
+    runs = found.runs()
+    return None if runs is None else np.repeat(runs[1], np.diff(np.append(runs[0], len(point))))
 
 
 def at(text: str, points: list[tuple[float, float]], feed: float = 1.0) -> list[int] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rest_motion import along_x
+from whole_plans import dense_motion
 
 from benchmarks.jobs import problems
 from planner.feedrate.solution import Status
@@ -14,7 +15,6 @@ from planner.joint.guess import guess_from
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
 from planner.joint.run import tube_runs_of
-from planner.motion.timing import dense_motion
 from planner.motion.trajectory import joined
 
 LENGTH, JERK = 0.3, 2e5  # [mm], [mm/s3]: so short that neither 100 mm/s nor 2000 mm/s2 is reached

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from whole_plans import dense_motion
 
 from planner.motion.axis_motion import AxisMotion
-from planner.motion.timing import dense_motion, sample_motion
+from planner.motion.timing import sample_motion
 
 
 def motion_of(duration, jerk, start=(0.0, 0.0)) -> AxisMotion:

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import needs_ruckig
-from whole_plans import CORNERS, Solved, smooth_path, solve
+from whole_plans import CORNERS, Solved, dense_motion, smooth_path, solve
 
 from benchmarks.jobs import problems
 from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.motion.time_law import law_of_moves
-from planner.motion.timing import Motion, dense_motion, sample_motion
+from planner.motion.timing import Motion, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job

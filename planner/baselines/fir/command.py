@@ -32,8 +32,7 @@ class VelocityPulses:
     def __post_init__(self) -> None:
         pulses = len(self.leg)
         freeze(self, "leg", np.int64, (pulses,))
-        freeze(self, "length", np.float64, (pulses,))
-        freeze(self, "speed", np.float64, (pulses,))
+        freeze(self, "length speed", np.float64, (pulses,))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,8 +69,7 @@ class Command:
         freeze(self, "velocity", np.float64, (steps, None))
         freeze(self, "position", np.float64, self.velocity.shape)
         freeze(self, "leg", np.int64, (steps,))
-        for name in ("T1", "T2", "begin", "dwell"):
-            freeze(self, name, np.float64, (runs,))
+        freeze(self, "T1 T2 begin dwell", np.float64, (runs,))
 
     @property
     def end(self) -> FloatArray:

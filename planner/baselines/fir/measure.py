@@ -55,8 +55,7 @@ class Measured:
     jerk: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("t", "error", "normal", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (len(self.t),))
+        freeze(self, "t error normal acceleration jerk", np.float64, (len(self.t),))
 
     @property
     def worst(self) -> FloatArray:

@@ -33,8 +33,7 @@ class LegLimits:
     def __post_init__(self) -> None:
         if self.turning is None:
             object.__setattr__(self, "turning", np.zeros(len(self.length)))
-        for name in ("length", "v", "a", "j", "turning"):
-            freeze(self, name, np.float64, (len(self.length),))
+        freeze(self, "length v a j turning", np.float64, (len(self.length),))
 
     def __len__(self) -> int:
         return len(self.length)
@@ -64,8 +63,7 @@ class Passage:
         freeze(self, "kind", np.int64, (None,))
         if self.r is None:
             object.__setattr__(self, "r", np.zeros(len(self.kind)))
-        for name in ("V", "p", "q", "r"):
-            freeze(self, name, np.float64, (len(self.kind),))
+        freeze(self, "V p q r", np.float64, (len(self.kind),))
 
     @cached_property
     def table(self) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from quick import slow_but
 from scipy.special import ellipe, ellipk
-from whole_plans import CORNERS, Solved, smooth_path, solve
+from whole_plans import CORNERS, Solved, dense_motion, smooth_path, solve
 
 from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
@@ -18,7 +18,6 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_length, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import insert_points, sample_path
-from planner.motion.timing import dense_motion
 from planner.nc.reader import parse_program
 
 MACHINE = problems.machine()

@@ -9,7 +9,7 @@ import pytest
 from curves import circle, curve_named, wave
 
 from planner.base.arrays import FloatArray
-from planner.baselines.lookahead.stop_moves import parts_of
+from planner.baselines.lookahead.rest_to_rest import parts_of
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import arc_sagitta, chorded, points_on
 from planner.geometry.curves import PLACES, UNEVEN, CurveSegments, curve_segments

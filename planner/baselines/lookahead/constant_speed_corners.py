@@ -7,7 +7,7 @@ At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k 
 besides the bounds on kappa v^2 of eq. (18)-(20), the chord error and the programmed feed (feedrate/constraints/assemble.py). The
 maxima of r'' and r''' are taken from five samples per grid interval; with the samples g_i of one component a smooth function
 exceeds them by at most max |g_{i-1} - 2 g_i + g_{i+1}| / 8 but for terms of fourth order, which is added. What is added depends on
-where intervals end: a block border inside a corner changed its speed by 1.1e-4 on one random path.
+where intervals end.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.baselines.lookahead.passage import LegLimits, Passage
-from planner.baselines.lookahead.ramps import JointKind
+from planner.baselines.lookahead.ramps import LEG, WAY, JointKind, records
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.constraints.assemble import feedrate_problem
@@ -76,15 +75,15 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
 class CornerChain(NamedTuple):
     """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only the limits change.
 
-    legs    : what is free between two joints, each with what the corners beside it took of their legs
-    passage : of every joint
+    legs    : (n,) records `LEG`: what is free between two joints, each with what the corners beside it took of their legs
+    passage : (n+1,) records `WAY`
     joint   : (n+1,) the path's joint if it is a corner, -1 otherwise
     run     : (n,) run between full stops that a leg belongs to
     begin   : (n,) where each leg begins, or the corner before it [mm]
     """
 
-    legs: LegLimits
-    passage: Passage
+    legs: np.recarray
+    passage: np.recarray
     joint: Array
     run: Array
     begin: FloatArray
@@ -122,7 +121,8 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
     d_in, d_out = (np.where(turns, d[where], 0.0) for d in (path.d_in, path.d_out))
     stop = np.append(np.insert(np.diff(run[leg]) != 0, 0, True), True)
     beside = np.minimum(np.append(v, np.inf), np.insert(v, 0, np.inf))
-    passage = Passage(
+    passage = records(
+        WAY,
         kind=np.where(stop, JointKind.STOP, np.where(turns, JointKind.CONSTANT, JointKind.PASS)),
         V=np.where(stop, 0.0, np.where(turns, np.minimum(corner_speed[where], beside), beside)),
         p=d_in,
@@ -130,7 +130,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
         r=np.where(turns, np.append(length[before], 0.0), 0.0),
     )
     return CornerChain(
-        legs=LegLimits(length=length[leg] + d_out[:-1] + d_in[1:], v=v, a=a, j=j),
+        legs=records(LEG, length=length[leg] + d_out[:-1] + d_in[1:], v=v, a=a, j=j),
         passage=passage,
         joint=where,
         run=run[leg],

@@ -11,6 +11,15 @@ On leg k only c2 moves, in the seven phases of two ramps and the cruise between 
 
 and c1 + c2 is the distance from the vertex along the program at which the corner is matched with it (corners/blend.py): pieces are
 cut where that passes the end of a block, in a corner's middle and inside long legs.
+
+Arcs from rest to rest are the twice continuously differentiable cubic spline in time. A move s(t) along an arc is cut into pieces that
+turn little; the spline through their ends p_i, at rest at both ends of the arc, has the accelerations M_i that solve (h_i the pieces'
+durations, d_i = (p_{i+1} - p_i)/h_i)
+
+    h_{i-1} M_{i-1} + 2 (h_{i-1} + h_i) M_i + h_i M_{i+1} = 6 (d_i - d_{i-1}),
+    2 h_0 M_0 + h_0 M_1 = 6 d_0,        h_{n-1} M_{n-1} + 2 h_{n-1} M_n = -6 d_{n-1}      at the two ends,
+
+and on piece i starts with the velocity d_i - h_i (2 M_i + M_{i+1})/6 and has the jerk (M_{i+1} - M_i)/h_i.
 """
 
 from __future__ import annotations
@@ -21,8 +30,6 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.baselines.lookahead.arc_pieces import spline_at_rest
-from planner.baselines.lookahead.passage import LegLimits, Passage
 from planner.baselines.lookahead.ramps import (
     ENTRY,
     PHASES,
@@ -81,16 +88,16 @@ class CornerPieces(NamedTuple):
     segment: Array
 
 
-def corner_pieces(passage: Passage, limits: LegLimits, path: Legs, dwell: FloatArray) -> CornerPieces:
+def corner_pieces(ways: np.recarray, limits: np.recarray, path: Legs, dwell: FloatArray) -> CornerPieces:
     """The motion of a look-ahead over n legs, in pieces (module text).
 
-    passage : what was chosen at the n+1 joints
-    limits  : of the legs
-    path    : the same legs with their segments
-    dwell   : (n+1,) standstill at each joint [s]
+    ways   : (n+1,) records `WAY`, what was chosen at the joints
+    limits : (n,) records `LEG`
+    path   : the same legs with their segments
+    dwell  : (n+1,) standstill at each joint [s]
     """
-    rows = _empty(_emit(passage.table, limits.table, dwell, _empty(0)))
-    _emit(passage.table, limits.table, dwell, rows)
+    rows = _empty(_emit(ways, limits, dwell, _empty(0)))
+    _emit(ways, limits, dwell, rows)
     cut = _empty(len(rows.leg) + len(path.offset))
     segment = np.zeros(len(cut.leg), np.int64)
     count = _cut(rows, limits.length, path.first, path.offset, cut, segment)
@@ -110,13 +117,11 @@ def along_axes(
     )
     position += vertex[joint]
     arc = (toolpath.arc[pieces.segment] >= 0) & (after[:, 1:] != 0.0).any(axis=1)  # not at standstill
-    for values, along in zip(
-        (position, velocity, acceleration, jerk),
-        _along_arcs(pieces, np.flatnonzero(arc), toolpath),
-        strict=True,
-    ):
-        values[arc] = along
-    return position, velocity, acceleration, jerk
+    columns = position, velocity, acceleration, jerk
+    if arc.any():
+        for values, along in zip(columns, _along_arcs(pieces, np.flatnonzero(arc), toolpath), strict=True):
+            values[arc] = along
+    return columns
 
 
 def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[FloatArray, ...]:
@@ -131,7 +136,32 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
     last = np.ones(len(points), bool)
     last[at] = False
     position = points[at] + toolpath.arcs.center[toolpath.arc[segment]]
-    return position, *spline_at_rest(pieces.rows.duration[move], points, last)
+    return position, *_spline_at_rest(pieces.rows.duration[move], points, last)
+
+
+def _spline_at_rest(
+    duration: FloatArray, position: FloatArray, last: Array
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Velocity, acceleration and jerk (n, A) at the starts of n pieces on moves that begin and end at rest.
+
+    duration : (n,) [s]
+    position : (n + moves, A) points before and after every piece, move after move [mm]
+    last     : (n + moves,) True at the last point of each move
+    """
+    from scipy.linalg import solve_banded  # 0.2 s
+
+    start = np.flatnonzero(~last)  # the points that a piece starts at
+    h = np.zeros(len(position))
+    h[start] = duration
+    slope = np.zeros_like(position)
+    slope[start] = (position[start + 1] - position[start]) / duration[:, None]
+    before, slope_before = np.insert(h[:-1], 0, 0.0), np.insert(slope[:-1], 0, 0.0, axis=0)
+    bands = np.zeros((3, len(position)))
+    bands[1] = 2.0 * (before + h)
+    bands[0, 1:] = bands[2, :-1] = h[:-1]  # 0 between moves, whose ends thus know nothing of each other
+    M = solve_banded((1, 1), bands, 6.0 * (slope - slope_before))
+    velocity = slope[start] - duration[:, None] * (2.0 * M[start] + M[start + 1]) / 6.0
+    return velocity, M[start], (M[start + 1] - M[start]) / duration[:, None]
 
 
 def _empty(count: int) -> PieceRows:

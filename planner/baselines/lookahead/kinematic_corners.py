@@ -17,8 +17,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.lookahead.corner_pieces import ARC_RAMP
 from planner.baselines.lookahead.look_ahead import capped, needed
-from planner.baselines.lookahead.passage import LegLimits, Passage
-from planner.baselines.lookahead.ramps import JointKind
+from planner.baselines.lookahead.ramps import LEG, WAY, JointKind, records
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners import kinematic as corner
 from planner.corners.budget import error_rate, largest_normal
@@ -36,19 +35,19 @@ ARC_LIMITS = 1.0 - 3e-4
 EASE_MIN = 1e-12
 
 
-def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> LegLimits:
-    """Limits of the legs of a path of lines, and of arcs between full stops."""
+def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> np.recarray:
+    """(n,) records `LEG` of a path of lines, and of arcs between full stops."""
     v, a, j = (np.minimum.reduceat(limit, path.first[:-1]) for limit in block_limits(toolpath, machine))
     share = np.where(toolpath.arc[path.first[:-1]] >= 0, ARC_LIMITS, 1.0)
     turning = np.abs(path.table["rate"])
     j = np.where(turning > 0.0, np.minimum(j, a / ARC_RAMP), j)
-    return LegLimits(length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
+    return records(LEG, length=path.length, v=share * v, a=share * a, j=share * j, turning=turning)
 
 
 def corner_passages(
-    path: Legs, toolpath: Toolpath, legs: LegLimits, machine: Machine, start_stop: float
-) -> list[Passage]:
-    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, at n+1 joints.
+    path: Legs, toolpath: Toolpath, legs: np.recarray, machine: Machine, start_stop: float
+) -> list[np.recarray]:
+    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, (n+1,) records `WAY` each.
 
     Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints without a corner are passed
     straight on by every candidate.
@@ -72,7 +71,7 @@ def corner_passages(
     return [_candidate(bare, feed, k, *way) for way in ways]
 
 
-def fitted(passage: Passage, legs: LegLimits) -> Passage:
+def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
     """A candidate slowed down to what its n legs have room for; a leg is divided where both of its corners would be equally fast."""
     longest = np.minimum(np.append(legs.length, np.inf), np.insert(legs.length, 0, np.inf))
     wanted = np.minimum(needed(passage, legs), longest)
@@ -82,12 +81,12 @@ def fitted(passage: Passage, legs: LegLimits) -> Passage:
 
 def _candidate(
     bare: Array, feed: FloatArray, k: Array, kind: JointKind, V: FloatArray, p: FloatArray, q: FloatArray
-) -> Passage:
+) -> np.recarray:
     """One kind at the corners k with speeds V and parameters p, q."""
     kinds, speed = bare.copy(), np.where(bare == JointKind.PASS, feed, 0.0)
     first, second = np.zeros(len(bare)), np.zeros(len(bare))
     kinds[k], speed[k], first[k], second[k] = kind, np.minimum(V, feed[k]), p, q
-    return Passage(kind=kinds, V=speed, p=first, q=second)
+    return records(WAY, kind=kinds, V=speed, p=first, q=second)
 
 
 def _zero_entry(

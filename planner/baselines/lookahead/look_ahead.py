@@ -14,8 +14,7 @@ is paper 003's for short segments (eq. (9) as docs/papers.md reads it); with k =
 2. Faster corners are not always better (zero entry acceleration makes the deceleration die out twice, a corner at constant low speed
    takes long). Over all choices of a candidate or a stop per corner, the fastest is found by dynamic programming; between two
    corners the speeds where only limits change are the largest ones. All stops, and every candidate throughout, are among the choices:
-   the result is never slower than any of them. (Candidates at 0.2 to 0.8 of their speed too save 0.02 % at most on five NC programs,
-   and take twice as long; of constant speeds none was ever chosen on 120 random paths.)
+   the result is never slower than any of them.
 
 Everything is linear in the number of joints.
 """
@@ -28,11 +27,11 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.baselines.lookahead.passage import WAY, LegLimits, Passage, passage_of
 from planner.baselines.lookahead.ramps import (
     ENTRY,
     PASS,
     PHASES,
+    WAY,
     ZERO,
     corner_at,
     gain_max,
@@ -48,53 +47,48 @@ BISECTIONS = 60  # of a speed's bracket: to its last digit
 SPEED_ROUNDING = 4e-16
 
 
-def look_ahead(legs: LegLimits, candidates: Sequence[Passage], k: float = 1.0) -> tuple[Passage, FloatArray]:
+def look_ahead(
+    legs: np.recarray, candidates: Sequence[np.recarray], k: float = 1.0
+) -> tuple[np.recarray, FloatArray]:
     """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each joint's corner [s].
 
     Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the corners beside them allow.
 
-    candidates : may overlap nowhere on a leg at their speeds (see `capped`)
+    legs       : (n,) records `LEG`
+    candidates : (n+1,) records `WAY` each; may overlap nowhere on a leg at their speeds (see `capped`)
     k          : factor of the short-segment rule, 0 < k <= 1
     """
-    wished = np.stack([one.table for one in candidates])
+    wished = np.stack(candidates)
     straight = (wished["kind"] == PASS).all(axis=0)
     rows = np.concatenate([np.zeros((1, len(legs) + 1), WAY), wished])
     for way in rows[1:]:
-        _sweep(way, legs.table, k)
+        _sweep(way, legs, k)
     rows["V"][1:, straight] = wished["V"][:, straight]
-    ways, time = _choose(rows, straight, legs.table, k)
-    return passage_of(ways), time
+    ways, time = _choose(rows, straight, legs, k)
+    return ways.view(np.recarray), time
 
 
-def swept(legs: LegLimits, passage: Passage, k: float = 1.0) -> Passage:
-    """The same ways, lowered to the largest speeds at which every leg can be run.
-
-    k : factor of the short-segment rule, 0 < k <= 1
-    """
-    ways = passage.table.copy()
-    _sweep(ways, legs.table, k)
-    return passage_of(ways)
+def swept(legs: np.recarray, ways: np.recarray, k: float = 1.0) -> np.recarray:
+    """The same ways (n+1,), lowered to the largest speeds at which every leg can be run; k as of `look_ahead`."""
+    lower = ways.copy()
+    _sweep(lower, legs, k)
+    return lower
 
 
-def capped(passage: Passage, legs: LegLimits, room: FloatArray) -> Passage:
+def capped(ways: np.recarray, legs: np.recarray, room: FloatArray) -> np.recarray:
     """The same candidates, slowed down until they have room and their ramps stay below the legs' speeds.
 
     room : (n+1,) what each may need of the leg before it and of the one behind, ramps included [mm]
     """
-    ways = passage.table.copy()
-    _cap(ways, legs.table, room)
-    return passage_of(ways)
+    lower = ways.copy()
+    _cap(lower, legs, room)
+    return lower
 
 
-def needed(passage: Passage, legs: LegLimits) -> FloatArray:
-    """(n+1,) length that each candidate needs of its legs, ramps included [mm]."""
-    return _needed(passage.table, legs.table)
-
-
-def moves(passage: Passage, legs: LegLimits) -> tuple[FloatArray, FloatArray]:
+def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]:
     """Durations [s] and jerks along the path [mm/s3], both (n, 8): the corner at constant speed before each leg, and its phases."""
     duration, jerk = np.zeros((len(legs), 1 + PHASES)), np.zeros((len(legs), 1 + PHASES))
-    _moves(passage.table, legs.table, duration, jerk)
+    _moves(ways, legs, duration, jerk)
     return duration, jerk
 
 
@@ -111,8 +105,8 @@ def _feasible(one, other, leg, k, slack):
 
 
 @njit(cache=True, error_model="numpy")
-def _needed(ways, legs):
-    """(n+1,) length that each of the ways needs of its legs [mm]."""
+def needed(ways, legs):
+    """(n+1,) length that each of the ways needs of its legs, ramps included [mm]."""
     out = np.zeros(len(ways))
     for i in range(1, len(ways) - 1):
         way = ways[i]

@@ -1,7 +1,5 @@
 """One leg of a look-ahead between two corners: how much speed it can gain, and how fast it is run.
 
-The kernels take legs and ways to pass a joint as records `LEG` and `WAY` (baselines/lookahead/passage.py).
-
 On a leg with the limits a, j along it the motion runs from (V1, A1) to (V2, -A2). A ramp from (V, A) to a speed W with zero
 acceleration is the end of one that began with zero acceleration at V' = V - A^2/(2j), `pre` = V' A/j + A^3/(6 j^2) before:
 
@@ -17,7 +15,7 @@ From V' over D (measured from where the ramp would have begun) a motion reaches 
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +43,20 @@ class JointKind(IntEnum):
 
 
 STOP, PASS, ZERO, ENTRY, CONSTANT = (int(kind) for kind in JointKind)  # numba reads plain integers
+
+# A leg: length from joint to joint, with what corners take of it, > 0 [mm]; largest speed, acceleration and jerk along it; of one that
+# is run as an arc from rest to rest the turning [rad/mm], 0 on others.
+LEG = np.dtype([(name, np.float64) for name in ("length", "v", "a", "j", "turning")])
+# A way to pass a joint: its `JointKind`, the speed [mm/s], 0 at stops, of candidates the largest; and the parameters of the kind.
+WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", "q", "r"))])
+
+
+def records(dtype: np.dtype, **columns: Any) -> np.recarray:
+    """(n,) records `LEG` or `WAY` with these columns, each (n,); 0 in others. n legs have n+1 joints, the first and last are stops."""
+    table = np.zeros(len(next(iter(columns.values()))), dtype).view(np.recarray)
+    for name, column in columns.items():
+        table[name] = column
+    return table
 
 
 class End(NamedTuple):

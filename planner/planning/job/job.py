@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.names import OPTIMAL, SECOND_ORDER
-from planner.baselines.lookahead.stop_moves import stop_time
+from planner.baselines.lookahead.rest_to_rest import stop_time
 from planner.corners.budget import filter_rate, with_less_normal
 from planner.delivery import mending, periods
 from planner.delivery.filters import kept

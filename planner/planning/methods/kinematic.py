@@ -6,8 +6,8 @@
    deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
 3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
    is fastest (baselines/lookahead/look_ahead.py).
-4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the motion itself, nothing is
-sampled.
+4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the motion itself,
+   nothing is sampled.
 
 A run between full stops that is not faster than stopping at every block is made as method `stop` makes it.
 """
@@ -24,7 +24,6 @@ from planner.base.point_to_point import rest_to_rest_times
 from planner.baselines.lookahead.corner_pieces import along_axes, corner_pieces
 from planner.baselines.lookahead.kinematic_corners import corner_passages, fitted, leg_limits
 from planner.baselines.lookahead.look_ahead import look_ahead
-from planner.baselines.lookahead.passage import LegLimits, Passage
 from planner.baselines.lookahead.ramps import JointKind
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners import kinematic as corner
@@ -121,19 +120,19 @@ class _Chain:
 
     lines   : the toolpath with its arcs as chords
     path    : its legs
-    legs    : what they allow
-    free    : the candidates by themselves
+    legs    : (n,) records of what they allow (baselines/lookahead/ramps.py)
+    free    : (n+1,) records each, the candidates by themselves
     fitting : the candidates that fit on their legs
-    passage : what was chosen
+    passage : (n+1,) what was chosen
     time    : (n+1,) when each joint's corner is over, standstills not counted [s]
     """
 
     lines: Toolpath
     path: Legs
-    legs: LegLimits
-    free: list[Passage]
-    fitting: list[Passage]
-    passage: Passage
+    legs: np.recarray
+    free: list[np.recarray]
+    fitting: list[np.recarray]
+    passage: np.recarray
     time: FloatArray
 
     @property

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.baselines.lookahead.stop_moves import parts_of, stop_phases
+from planner.baselines.lookahead.rest_to_rest import parts_of, stop_phases
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import sample_path

@@ -12,8 +12,7 @@ from oracles import needs_ruckig
 
 from planner.base.arrays import FloatArray
 from planner.baselines.lookahead.look_ahead import capped, look_ahead, moves, needed, swept
-from planner.baselines.lookahead.passage import LegLimits, Passage
-from planner.baselines.lookahead.ramps import JointKind, gain_max
+from planner.baselines.lookahead.ramps import LEG, WAY, JointKind, gain_max, records
 from planner.corners import kinematic
 
 seeds = st.integers(0, 2**32 - 1)
@@ -46,10 +45,11 @@ def ruckig_time(distance, V1, A1, V2, A2, v, a, j) -> float:
 
 
 def random_case(seed: int, joints: int):
-    """LegLimits of one to a thousand and corners of both families at all inner joints, none longer than half a leg."""
+    """Legs of one to a thousand and corners of both families at all inner joints, none longer than half a leg."""
     rng = np.random.default_rng(seed)
     n = joints - 1
-    legs = LegLimits(
+    legs = records(
+        LEG,
         length=10 ** rng.uniform(-2, 1.3, n),
         v=10 ** rng.uniform(1, 2.5, n),
         a=10 ** rng.uniform(2.5, 4, n),
@@ -69,11 +69,11 @@ def random_case(seed: int, joints: int):
     for which, p, q in ((JointKind.ZERO, alpha, eta), (JointKind.ENTRY, a, J)):
         kind = np.zeros(joints, int)
         kind[inner] = which
-        candidates.append(capped(Passage(kind=kind, V=wish, p=p, q=q), legs, room))
+        candidates.append(capped(records(WAY, kind=kind, V=wish, p=p, q=q), legs, room))
     return legs, candidates
 
 
-def corner_of(passage: Passage, i: int) -> tuple[float, float, float]:
+def corner_of(passage: np.recarray, i: int) -> tuple[float, float, float]:
     """A, l and T of a corner by corners/kinematic.py."""
     kind, V, p, q = (getattr(passage, name)[i] for name in ("kind", "V", "p", "q"))
     if kind == JointKind.ZERO and V > 0:
@@ -84,7 +84,7 @@ def corner_of(passage: Passage, i: int) -> tuple[float, float, float]:
     return 0.0, 0.0, 0.0
 
 
-def shortest_need(legs: LegLimits, passage: Passage, i: int) -> float:
+def shortest_need(legs: np.recarray, passage: np.recarray, i: int) -> float:
     """The shortest length that leg i can have between its corners, by adding up the phases of both ramps."""
 
     def ramp(V, A, W, a, j):
@@ -166,7 +166,7 @@ def test_short_segment_rule_holds_in_both_directions(seed, k):
         assert high <= k * (low + gain_max(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
 
 
-def total_time(legs: LegLimits, passage: Passage) -> float:
+def total_time(legs: np.recarray, passage: np.recarray) -> float:
     """Time of a passage by ruckig, infinite where a leg is too short."""
     total = 0.0
     for i in range(len(legs)):
@@ -187,13 +187,13 @@ def test_no_other_choice_of_corners_and_stops_is_faster(seed):
     """Brute force over all 3^4 choices with the swept speeds."""
     legs, candidates = random_case(seed, 6)
     slower = [swept(legs, way) for way in candidates]
-    stop = Passage(kind=np.zeros(6, int), V=np.zeros(6), p=np.ones(6), q=np.ones(6))
+    stop = records(WAY, kind=np.zeros(6, int), V=np.zeros(6), p=np.ones(6), q=np.ones(6))
     ways, at = [stop, *slower], np.arange(6)
     times = []
     for choice in itertools.product(range(3), repeat=4):
         row = np.array([0, *choice, 0])
         pick = {name: np.stack([getattr(w, name) for w in ways])[row, at] for name in ("kind", "V", "p", "q")}
-        times.append(total_time(legs, Passage(**pick)))
+        times.append(total_time(legs, records(WAY, **pick)))
     _, time = look_ahead(legs, candidates)
     assert time[-1] <= min(times) * (1 + 1e-4)
     assert time[-1] >= min(times) * (1 - 1e-4)
@@ -201,10 +201,10 @@ def test_no_other_choice_of_corners_and_stops_is_faster(seed):
 
 def two_legs(
     theta: float, V: float, eps: float, *, kinds=("zero", "entry")
-) -> tuple[LegLimits, list[Passage]]:
+) -> tuple[np.recarray, list[np.recarray]]:
     """docs/papers.md' example: two legs of 20 mm, A = 2000, J = 66,667 along the path, a corner of angle theta between them."""
     A, J, s = 2000.0, 66_667.0, np.sin(theta / 2)
-    legs = LegLimits(length=np.full(2, 20.0), v=np.full(2, V), a=np.full(2, A), j=np.full(2, J))
+    legs = records(LEG, length=np.full(2, 20.0), v=np.full(2, V), a=np.full(2, A), j=np.full(2, J))
     u1, u2 = np.array([[1.0, 0.0]]), np.array([[np.cos(theta), np.sin(theta)]])
     limits = np.full(2, A), np.full(2, J)
     alpha, eta = kinematic.ratio_min(limits[0], u2 - u1), kinematic.ratio_min(limits[1], u2 - u1)
@@ -216,10 +216,10 @@ def two_legs(
         "entry": (JointKind.ENTRY, kinematic.entry_speed_from_middle(m, a, jerk), a, jerk),
     }
 
-    def candidate(kind: JointKind, speed: FloatArray, p: FloatArray, q: FloatArray) -> Passage:
+    def candidate(kind: JointKind, speed: FloatArray, p: FloatArray, q: FloatArray) -> np.recarray:
         row = np.zeros((3, 3))
         row[:, 1] = np.minimum(speed[0], V), p[0], q[0]
-        way = Passage(kind=np.array([0, kind, 0]), V=row[0], p=row[1], q=row[2])
+        way = records(WAY, kind=np.array([0, kind, 0]), V=row[0], p=row[1], q=row[2])
         return capped(way, legs, np.array([0.0, 20.0, 0.0]))
 
     return legs, [candidate(*ways[name]) for name in kinds]
@@ -267,8 +267,8 @@ def test_where_only_limits_change_the_motion_is_as_fast_as_the_limits_allow(seed
     """Legs without corners: no stop, all legs run; with corners at constant speed some of which are stops, as by brute force."""
     legs, _ = random_case(seed, 7)
     inner = np.minimum(legs.v[:-1], legs.v[1:])
-    straight = Passage(
-        kind=np.array([0, 1, 1, 1, 1, 1, 0]), V=np.array([0, *inner, 0]), p=np.zeros(7), q=np.zeros(7)
+    straight = records(
+        WAY, kind=np.array([0, 1, 1, 1, 1, 1, 0]), V=np.array([0, *inner, 0]), p=np.zeros(7), q=np.zeros(7)
     )
     chosen, time = look_ahead(legs, [straight])
     np.testing.assert_allclose(chosen.V, swept(legs, straight).V, rtol=1e-12)
@@ -278,7 +278,8 @@ def test_where_only_limits_change_the_motion_is_as_fast_as_the_limits_allow(seed
     corner = np.array([False, False, True, False, True, False, False])
     least = np.append(np.minimum(legs.length[:-1], legs.length[1:]), 0.0)
     taken = 0.3 * np.where(corner, np.insert(least, 0, 0.0)[:7], 0.0)
-    turning = Passage(
+    turning = records(
+        WAY,
         kind=np.where(corner, JointKind.CONSTANT, straight.kind),
         V=np.where(corner, straight.V * rng.uniform(0.02, 1.0), straight.V),
         p=taken,
@@ -293,7 +294,7 @@ def test_where_only_limits_change_the_motion_is_as_fast_as_the_limits_allow(seed
         kind = np.where(stopped, JointKind.STOP, turning.kind)
         other = {name: np.where(stopped, 0.0, getattr(turning, name)) for name in ("p", "q", "r")}
         V = np.where(corner & ~stopped, swept(legs, turning).V, np.where(stopped, 0.0, turning.V))
-        way = swept(legs, Passage(kind=kind, V=V, **other))
+        way = swept(legs, records(WAY, kind=kind, V=V, **other))
         lasting = moves(way, legs)[0].sum()
         times.append(lasting)
     assert time[-1] == pytest.approx(min(times), rel=1e-9)

@@ -13,7 +13,7 @@ from benchmarks.runner.measure import outcome
 from benchmarks.runner.rows import ERROR, METHOD, Row
 from benchmarks.runner.suites import RANDOM_RIVALS, Job
 from benchmarks.runner.ways import way_of
-from planner.baselines.lookahead.stop_moves import parts_of
+from planner.baselines.lookahead.rest_to_rest import parts_of
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program

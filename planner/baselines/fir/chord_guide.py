@@ -17,9 +17,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.baselines.fir.columns import per_leg, picked
 from planner.baselines.fir.command import lower_between
-from planner.baselines.fir.guide import Guide
+from planner.baselines.fir.guide import Guide, per_leg, picked
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.geometry.nurbs import Nurbs

@@ -12,6 +12,27 @@ What is exceeded is mended where it comes from:
 
 Should that not come to an end, everything gets slower with the filters at twice their lengths. With filters that are given, all speeds
 are lowered instead of making the filters longer. Both end: slower motions have smaller errors, accelerations and jerks.
+
+Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2: paper 001's, and what to begin with.
+
+    v_acc  = sqrt(a rho)                          normal acceleration                                        (par. 13)
+    v_jerk = (j rho^2)^(1/3)                      jerk of a point on a circle                                (par. 17)
+    v_eps  = sqrt(24 rho eps / (T1^2 + T2^2))     error of the filters to second order, eps = a_n var(h)/2   (par. 24)
+    v_ph   = 2 rho phi / (T1 + T2)                phase lag phi behind the path                              (par. 26)
+    v_sc   = min(v_p, v_acc, v_jerk, v_eps, v_ph)                                                            (par. 29)
+    T1 = v_p / a,   T2 = a / j                                                                               (par. 19)
+
+On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)] further inside, sinc x =
+sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
+
+Where the curvature varies within the length that the filters cover, none of this is a bound (docs/papers.md, paper 001), nor is it
+needed: what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that
+has the kernel's second and fourth moment mu2, mu4,
+
+    D = p(s - v x) + p(s + v x) - 2 p(s),   error w |D|,   acceleration D/x^2,      x^2 = mu4/mu2,   w = mu2^2/(2 mu4).
+
+A corner that turns by theta is missed by no more than eps if the command takes as long as the gap Td - Tk that paper 000's eq. 15
+puts between the pulses of two legs, with V in its legs.
 """
 
 from __future__ import annotations
@@ -20,13 +41,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.chord_guide import STRAIGHT, ChordGuide, feeds_held
-from planner.baselines.fir.columns import per_leg, per_run
 from planner.baselines.fir.command import Command, VelocityPulses, command_of
+from planner.baselines.fir.guide import per_leg, per_run
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
-from planner.baselines.fir.spline_speeds import filter_lengths, first_speeds
+from planner.corners.fir import overlap_time
+from planner.feedrate.constraints import filter_error, phase_lag
 from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
@@ -39,6 +61,11 @@ MARGINS_MAX = np.array([2.0, 4.0])
 # So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean length reach from rest to
 # rest: half as many are 1.4 % slower on one of ten jobs, 0.4 and 0.08 cost 0.2 and 0.1 % in mean.
 SPEEDS, LOWEST = 18, 0.17
+# Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
+MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
+# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured
+# afterwards, and ten jobs hardly care (0.2: 0.01 % faster).
+MEAN_OVER = 0.02
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -130,3 +157,138 @@ def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSp
         v = first_speeds(guide, most, acceleration, T1, T2)
         T1, T2 = filter_lengths(guide, v, machine, margin)
     return ChordSpeeds(guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin)
+
+
+def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """(n,) how far inside a circle the filtered point runs [mm]: exact (module text).
+
+    rho    : (n,) radius [mm]
+    v      : (n,) speed [mm/s]
+    T1, T2 : (n,) filters [s]
+    """
+    lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
+    return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
+
+
+def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm], to second order (par. 24); inf where the path is straight.
+
+    kappa  : (n,) curvature [1/mm]
+    T1, T2 : (n,) filters [s]
+    """
+    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
+
+
+def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """(n,) speed [mm/s] at which the filtered point lags by the angle phi [rad] (par. 26); inf where the path is straight.
+
+    kappa  : (n,) curvature [1/mm]
+    T1, T2 : (n,) filters [s]
+    """
+    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
+
+
+def filter_lengths(
+    guide: ChordGuide, speed: FloatArray, machine: Machine, margin: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """T1 >= T2 (S,) [s] for the speeds on the chords (par. 19).
+
+    T1 = V/A and T1 T2 = V/J with the axes' limits along the chords, each times its margin, or both the same where V is too small to
+    reach A.
+
+    speed  : (R,) [mm/s]
+    margin : (S, 2) of T1 and of T1 T2 [-]
+    """
+    along = speed[:, None] * np.abs(guide.direction)
+    by_a, by_j = (
+        guide.largest((along / machine.limits(q, guide.axes)).max(axis=1)) for q in ("acceleration", "jerk")
+    )
+    by_a, by_j = by_a * margin[:, 0], by_j * margin[:, 1]
+    T1 = np.maximum(by_a, np.sqrt(by_j))
+    return T1, by_j / T1
+
+
+def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
+    """(R,) the paper's speed on each chord [mm/s] (par. 29).
+
+    T1, T2 : (S,) filters of the runs [s]
+    phi    : phase lag [rad]
+    """
+    T1, T2 = T1[guide.run], T2[guide.run]
+    by_filters = v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2)
+    return np.min([guide.feed, guide.v_acc, guide.v_jerk, *by_filters], axis=0)
+
+
+def first_speeds(
+    guide: ChordGuide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
+
+    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the gap takes.
+
+    most         : (R,) largest speeds [mm/s]
+    acceleration : (A,) limits of the axes [mm/s2]
+    T1, T2       : (S,) filters of the runs [s]
+    """
+    local = np.minimum(guide.v_acc, v_eps(guide.kappa, guide.tol, T1[guide.run], T2[guide.run]))
+    v = np.minimum(most, local)
+    bent = np.flatnonzero(local < most)
+    v[bent] = np.maximum(v[bent], _v_mean(guide, bent, most[bent], acceleration, T1, T2))
+    return v * _slower_corners(guide, v, most, T1, T2)
+
+
+def two_nodes(T1: FloatArray, T2: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) x [s] and (n,) w [-] of the rule of the module's text, for filters T1, T2 (n,) [s]."""
+    second, fourth = (T1**2 + T2**2) / 12.0, (T1**4 + T2**4) / 80.0 + T1**2 * T2**2 / 24.0
+    return np.sqrt(fourth / second), second**2 / (2.0 * fourth)
+
+
+def _v_mean(
+    guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
+    run = guide.run[at]
+    T1, T2 = T1[run], T2[run]
+    x, w = two_nodes(T1, T2)
+    begin, end = guide.s[guide.first[run]], guide.s[guide.first[run + 1]]
+    half = 0.5 * guide.length[at]
+    here, middle = guide.s[at] + half, guide.point[at] + half[:, None] * guide.direction[at]
+    v, open_ = most.copy(), np.arange(len(at))
+    for _ in range(MEAN_STEPS):
+        k = open_
+        reach = np.minimum(
+            v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k])
+        )  # the path ends at a run's ends
+        D = guide_point(guide, here[k] - reach) + guide_point(guide, here[k] + reach) - 2.0 * middle[k]
+        by_error = w[k] * np.linalg.norm(D, axis=1) / guide.tol[at[k]]
+        over = np.maximum(by_error, (np.abs(D) / acceleration).max(axis=1) / x[k] ** 2)
+        v[k] *= np.maximum(MEAN_STEP_MIN, 1.0 / np.sqrt(np.maximum(over, 1.0)))
+        open_ = k[over > 1.0 + MEAN_OVER]
+        if not len(open_):
+            break
+    return v
+
+
+def _slower_corners(
+    guide: ChordGuide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1 elsewhere."""
+    chord = np.flatnonzero(guide.corner >= 0)
+    by = np.ones(len(guide))
+    if not len(chord):
+        return by
+    first = np.flatnonzero(np.diff(guide.corner[chord], prepend=-2))
+    at, run = chord[first], guide.run[chord[first]]
+    last = np.append(chord[first[1:] - 1], chord[-1])
+    V = np.sqrt(most[at] * most[last])
+    gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
+    lasting = np.add.reduceat(guide.length[chord] / v[chord], first)
+    by[chord] = np.repeat(
+        np.minimum(lasting / np.maximum(gap, 1e-300), 1.0), np.diff(np.append(first, len(chord)))
+    )
+    return by
+
+
+def guide_point(guide: ChordGuide, s: FloatArray) -> FloatArray:
+    """(n, A) points of the chords [mm] at the lengths s (n,) from the start [mm]."""
+    return np.stack([np.interp(s, guide.s, axis) for axis in guide.point.T], axis=1)

@@ -7,17 +7,16 @@ so that an hour of motion costs no digits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.guide import Guide
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class VelocityPulses:
+class VelocityPulses(NamedTuple):
     """C velocity pulses in order: legs, or what they are cut into, each run at a constant speed.
 
     leg    : (C,) leg of the guide, non-decreasing
@@ -29,14 +28,8 @@ class VelocityPulses:
     length: FloatArray
     speed: FloatArray
 
-    def __post_init__(self) -> None:
-        pulses = len(self.leg)
-        freeze(self, "leg", np.int64, (pulses,))
-        freeze(self, "length speed", np.float64, (pulses,))
 
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Command:
+class Command(NamedTuple):
     """N steps of constant velocity over A axes, in S runs: first[k] .. first[k+1] - 1, the last of them a standstill.
 
     Column A of velocity and position is the length along the guide and its rate: filtered like the axes it tells where on the
@@ -61,15 +54,6 @@ class Command:
     T2: FloatArray
     begin: FloatArray
     dwell: FloatArray
-
-    def __post_init__(self) -> None:
-        runs, steps = len(self.begin), len(self.t)
-        freeze(self, "first", np.int64, (runs + 1,))
-        freeze(self, "t", np.float64, (steps,))
-        freeze(self, "velocity", np.float64, (steps, None))
-        freeze(self, "position", np.float64, self.velocity.shape)
-        freeze(self, "leg", np.int64, (steps,))
-        freeze(self, "T1 T2 begin dwell", np.float64, (runs,))
 
     @property
     def end(self) -> FloatArray:
@@ -107,13 +91,10 @@ def command_of(
     along = np.insert(within - within[first_pulse], after, 0.0)
     start = np.column_stack([guide.point, guide.s])
     position = start[which + ~moving]
-    position[moving] += (
-        along[moving, None] * np.column_stack([guide.direction, np.ones(len(guide))])[which[moving]]
-    )
+    direction = np.column_stack([guide.direction, np.ones(len(guide))])[which[moving]]
+    position[moving] += along[moving, None] * direction
     velocity = np.zeros_like(position)
-    velocity[moving] = (
-        speed[moving, None] * np.column_stack([guide.direction, np.ones(len(guide))])[which[moving]]
-    )
+    velocity[moving] = speed[moving, None] * direction
 
     lasting = t[first[1:] - 1] + T1 + T2 + guide.dwell[1:]
     return Command(

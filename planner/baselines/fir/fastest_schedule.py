@@ -16,11 +16,13 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import rest_to_rest_times
-from planner.baselines.fir.design import plan_for
 from planner.baselines.fir.leg_guide import LegGuide
+from planner.baselines.fir.rules import schedule
 from planner.baselines.fir.schedule import Schedule
 from planner.baselines.fir.slow_down import WORTH, settled_fastest
+from planner.corners.fir import overlap_time
 from planner.machine import Machine
+from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
 # Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others
 # between them, to this natural logarithm of their ratio. Ten jobs take 0.06 % longer with 0.1, and 0.18 % less with 0.01 and 1.2 times
@@ -36,6 +38,11 @@ NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
 # be so slow that a stop is faster: one of 29 random jobs takes 14 % less, and one that had taken 6 % more with more tolerance.
 STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that fraction
+# In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion by dt^2/8 of it. T1 is at
+# least so long that this is the given fraction of the tolerance [-]: what is left is for the filters.
+CHORD_FRACTION = 0.5
+# Two filters suppress two modes, those of the lowest frequencies.
+MODES = 2
 
 
 def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
@@ -134,3 +141,62 @@ def _best_speeds(
         signs = (-1, 1) if (step > FINEST).any() else ()
         tries = [np.minimum(best * np.exp(sign * step), high) for sign in signs]
     return best, best_time
+
+
+def filters_for(
+    guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """T1 and T2 (S,) [s]: the guide's own, or the shortest for legs run at their feed and at most at `speed`.
+
+    T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or both equal where V does
+    not reach A), lengthened to whole periods of the machine's vibration modes (eq. 10).
+
+    speed  : (S,) [mm/s]
+    margin : (S,) [-]
+    """
+    if guide.own is not None:
+        return guide.given_filters()
+    V = np.minimum(guide.feed, speed[guide.run])
+    T1 = guide.largest(V / guide.a_max)
+    product = margin * guide.largest(V / guide.j_max)
+    sharpest = guide.largest(V * guide.sin_half[1:] / guide.tol[1:])
+    T1 = np.maximum(T1, sharpest * machine.dt**2 / (4 * CHORD_FRACTION))
+    T1 = np.maximum(T1, np.sqrt(product))
+    T2 = product / T1
+    modes = sorted(machine.modes, key=lambda mode: mode.frequency)[:MODES]
+    return (
+        suppressing(T1, T2, tuple(damped_period(m.frequency, m.damping) for m in modes))
+        if modes
+        else (T1, T2)
+    )
+
+
+def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
+    """The first schedule with the filters for a speed, not yet slowed down.
+
+    speed  : (S,) largest speed on each run [mm/s]
+    margin : (S,) on T2 = A/J [-]
+    """
+    T1, T2 = filters_for(guide, machine, speed, margin)
+    return schedule(guide, machine, np.minimum(guide.feed, speed[guide.run]), T1, T2)
+
+
+def plain_plan(guide: LegGuide, machine: Machine) -> Schedule:
+    """Paper 000's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
+    a, j = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
+    V = guide.largest(guide.feed)
+    T1, T2 = lengths_from_limits(V, a, j) if guide.own is None else guide.given_filters()
+    before, after, at = guide.feed[:-1], guide.feed[1:], guide.run[1:]
+    overlap = np.zeros(len(guide) + 1)
+    overlap[1:-1] = overlap_time(
+        guide.tol[1:-1], np.sqrt(before * after), guide.sin_half[1:-1], T1[at], T2[at]
+    )
+    return Schedule(
+        guide=guide,
+        T1=T1,
+        T2=T2,
+        speed=guide.feed,
+        passing=np.full(len(guide) + 1, np.inf),
+        overlap=np.where(guide.inner, overlap, 0.0),
+        holding=np.zeros(len(guide), bool),
+    )

@@ -2,20 +2,110 @@
 
 Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself (leg_guide.py),
 paper 001 along the fine chords of a smooth path (chord_guide.py).
+
+Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is declared so is checked
+and made read-only, picked for some runs and put back, for every record in the same way.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.baselines.fir.columns import chosen_rows, freeze_columns, per_joint, per_leg, picked
+from planner.base.errors import InputError
+
+
+def per_run(width: int | None = None) -> Any:
+    """A field (S,), or (S, width), of float64."""
+    return _column("run", np.float64, width)
+
+
+def per_leg(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R,), or (R, A) with `axes`; with `finite=False` infinity is allowed."""
+    return _column("leg", dtype, -1 if axes else None, finite)
+
+
+def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R+1,), or (R+1, A) with `axes`."""
+    return _column("joint", dtype, -1 if axes else None, finite)
+
+
+def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
+    """A field with its rows, type and width in the metadata; width -1 for one column per axis."""
+    return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
+
+
+def _columns(record: Any) -> list[tuple[str, Any]]:
+    """Names and metadata of the columns of a record."""
+    return [(one.name, one.metadata) for one in fields(record) if "rows" in one.metadata]
+
+
+def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
+    """Check the columns of a record and make them read-only.
+
+    sizes : number of rows per "run", "leg" and "joint"
+    axes  : A, the width of columns with `axes`
+
+    Raises ValueError for a column of another shape, or one that is not finite and should be.
+    """
+    for name, of in _columns(record):
+        width = () if of["width"] is None else (axes if of["width"] < 0 else of["width"],)
+        freeze(record, name, of["dtype"], (sizes[of["rows"]], *width), finite=of["finite"])
+
+
+def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
+    """Indices of the rows that the chosen runs have, for "run", "leg" and "joint".
+
+    first  : (S+1,) first joint of each run, as of `Guide`
+    chosen : (S,) True for the runs that are meant, one at least
+    """
+    run = np.flatnonzero(chosen)
+    legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))
+    return {"run": run, "leg": legs, "joint": np.append(legs, first[run[-1] + 1])}
+
+
+def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
+    """The given rows (n,) of "run", "leg" and "joint" (`chosen_rows`) of all columns, by name."""
+    return {name: getattr(record, name)[rows[of["rows"]]] for name, of in _columns(record)}
+
+
+def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
+    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run belongs to the next one.
+
+    rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
+    chosen : a record of these rows alone
+    """
+    columns: dict[str, Any] = {}
+    for name, of in _columns(record):
+        last = -1 if of["rows"] == "joint" else None
+        columns[name] = getattr(record, name).copy()
+        columns[name][rows[of["rows"]][:last]] = getattr(chosen, name)[:last]
+    return columns
+
+
+class Line(NamedTuple):
+    """The fields of a `Guide` that kernels measure along."""
+
+    s: FloatArray
+    point: FloatArray
+    direction: FloatArray
+    budget: FloatArray
+    inner: Array
+
+
+def check_profile_filters(times: tuple[float, float] | None) -> None:
+    """Raise InputError for profile filters that are not two positive lengths."""
+    if times is not None and (len(times) != 2 or not all(0 < T < np.inf for T in times)):
+        raise InputError(
+            f"profile_filters = {', '.join(f'{T:g}' for T in times) or 'none'}; give two lengths [s], positive and finite, "
+            "or None: then the method chooses them"
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,6 +165,11 @@ class Guide(ABC):
         inner = np.ones(len(self) + 1, bool)
         inner[self.first] = False
         return inner
+
+    @cached_property
+    def line(self) -> Line:
+        """The same for the kernels."""
+        return Line(self.s, self.point, self.direction, self.budget, self.inner)
 
     def largest(self, value: FloatArray) -> FloatArray:
         """(S,) the largest of a value per leg (R,) in each run."""

@@ -9,8 +9,7 @@ from typing import Self
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.baselines.fir.columns import per_joint, per_leg
-from planner.baselines.fir.guide import Guide
+from planner.baselines.fir.guide import Guide, per_joint, per_leg
 from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath

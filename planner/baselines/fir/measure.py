@@ -17,12 +17,11 @@ Acceleration is linear and jerk constant on every piece: their peaks are exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.guide import Guide
 from planner.baselines.fir.superpose import Filtered
@@ -37,8 +36,7 @@ BISECTIONS = 30
 FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is rounding
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Measured:
+class Measured(NamedTuple):
     """What was measured at n times: start and middle of all pieces, and when the joints that are no full stops are passed.
 
     t            : (n,) ascending [s]
@@ -54,23 +52,10 @@ class Measured:
     acceleration: FloatArray
     jerk: FloatArray
 
-    def __post_init__(self) -> None:
-        freeze(self, "t error normal acceleration jerk", np.float64, (len(self.t),))
-
     @property
     def worst(self) -> FloatArray:
         """(n,) the largest of the ratios [-]."""
-        return np.max([self.error, self.normal, self.acceleration, self.jerk], axis=0)
-
-
-class _Line(NamedTuple):
-    """The fields of a `Guide`, for the kernels."""
-
-    s: FloatArray
-    point: FloatArray
-    direction: FloatArray
-    budget: FloatArray
-    inner: Array
+        return np.max(self[1:], axis=0)
 
 
 class _Limits(NamedTuple):
@@ -83,17 +68,9 @@ class _Limits(NamedTuple):
     bow: float
 
 
-class _Motion(NamedTuple):
-    """The fields of a `Filtered`, for the kernels."""
-
-    t: FloatArray
-    ends: FloatArray
-    state: FloatArray
-
-
 def measure(guide: Guide, motion: Filtered, machine: Machine) -> Measured:
     """Measure a filtered motion along a guide (module text)."""
-    seen = np.empty((5, 2 * len(motion) + len(guide)))
+    seen = np.empty((5, 2 * len(motion.t) + len(guide)))
     limits = _Limits(
         machine.limits("acceleration", guide.axes),
         machine.limits("jerk", guide.axes),
@@ -101,10 +78,8 @@ def measure(guide: Guide, motion: Filtered, machine: Machine) -> Measured:
         np.array([axis in LINEAR_AXES for axis in guide.axes]),
         chord_rate(machine),
     )
-    line = _Line(*(getattr(guide, name) for name in _Line._fields))
-    count = _measure(_Motion(motion.t, motion.ends, motion.state), line, limits, seen)
-    t, error, normal, acceleration, jerk = seen[:, :count]
-    return Measured(t=t, error=error, normal=normal, acceleration=acceleration, jerk=jerk)
+    count = _measure(motion, guide.line, limits, seen)
+    return Measured(*seen[:, :count])
 
 
 @njit(cache=True, error_model="numpy")
@@ -113,12 +88,8 @@ def _measure(motion, line, limits, seen):
     n, leg, last = 0, 0, motion.state.shape[2] - 1
     for m in range(len(motion.t)):
         half, begun = 0.5 * (motion.ends[m] - motion.t[m]), 0
-        p, v, a, j = (
-            motion.state[0, m, last],
-            motion.state[1, m, last],
-            motion.state[2, m, last],
-            motion.state[3, m, last],
-        )
+        p, v = motion.state[0, m, last], motion.state[1, m, last]
+        a, j = motion.state[2, m, last], motion.state[3, m, last]
         arrival = p + 2.0 * half * (v + half * (a + 2.0 * half * j / 3.0))
         while True:
             joint, tau = leg + 1 < len(line.direction) and line.s[leg + 1] <= arrival, np.inf

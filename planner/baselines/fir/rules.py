@@ -118,23 +118,14 @@ def _flowing(
     T2: FloatArray,
 ) -> FloatArray:
     """Largest speeds (n,) at the flow joints `joint` [mm/s]: the rule of the module's text."""
-    line = _Line(guide.s, guide.point, guide.direction)
     allowed = _Allowed(
-        guide.tol[joint]
-        / (1 + 3 * machine.dt**2 / (T1**2 + T2**2)),  # the rest is the chord error of samples
+        # the rest is the chord error of samples
+        guide.tol[joint] / (1 + 3 * machine.dt**2 / (T1**2 + T2**2)),
         machine.limits("acceleration", guide.axes),
         largest_normal(machine),
     )
     fastest = np.maximum(speed[joint - 1], speed[joint])
-    return _flow_speeds(joint, np.flatnonzero(tied), fastest, line, allowed, T1, T2)
-
-
-class _Line(NamedTuple):
-    """Joints (R+1,) along the guide [mm], where they are (R+1, A) [mm], and the directions (R, A) of the legs between them."""
-
-    s: FloatArray
-    point: FloatArray
-    direction: FloatArray
+    return _flow_speeds(joint, np.flatnonzero(tied), fastest, guide.line, allowed, T1, T2)
 
 
 class _Allowed(NamedTuple):

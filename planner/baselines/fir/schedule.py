@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.baselines.fir.columns import per_joint, per_leg
 from planner.baselines.fir.command import Command, VelocityPulses, command_of, lower_between
+from planner.baselines.fir.guide import per_joint, per_leg
 from planner.baselines.fir.leg_guide import LegGuide
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing

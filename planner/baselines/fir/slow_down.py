@@ -12,14 +12,13 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.baselines.fir.columns import chosen_rows, freeze_columns, per_run, picked, put_back
 from planner.baselines.fir.command import Command
-from planner.baselines.fir.guide import Guide
+from planner.baselines.fir.guide import Guide, chosen_rows, freeze_columns, per_run, picked, put_back
 from planner.baselines.fir.measure import Measured, measure
 from planner.baselines.fir.superpose import Filtered, superpose
 from planner.machine import Machine
@@ -77,8 +76,7 @@ class SpeedPlan(ABC):
         return dataclasses.replace(self, **put_back(self, chosen_rows(self.guide.first, chosen), plan))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Made:
+class Made(NamedTuple):
     """A motion with what made it, and what it does."""
 
     command: Command
@@ -97,7 +95,7 @@ def make(plan: SpeedPlan, machine: Machine) -> Made:
     """The motion of a plan, measured."""
     command = plan.command()
     motion = superpose(command)
-    return Made(command=command, motion=motion, seen=measure(plan.guide, motion, machine))
+    return Made(command, motion, measure(plan.guide, motion, machine))
 
 
 def slowing(ratio: FloatArray, most: float = BEYOND) -> FloatArray:

@@ -13,14 +13,15 @@ by superposition of the edges that still have an effect, on what the step that w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.command import Command
+from planner.geometry.toolpath import Toolpath
+from planner.motion.axis_motion import AxisMotion
 
 # Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that close is rounding.
 SHORTEST_PIECE = 1e-12
@@ -28,52 +29,24 @@ SHORTEST_PIECE = 1e-12
 ANCHOR_EVERY = 32
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Filtered:
+class Filtered(NamedTuple):
     """L pieces of constant jerk, over the A axes and the guide (column A), in S runs.
 
     t     : (L,) start of each piece [s]
+    ends  : (L,) end of each piece [s]
     state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece [mm/s3]
     first : (S+1,) first piece of each run
-    end   : (S,) when each run is over, its dwell too [s]
     """
 
     t: FloatArray
+    ends: FloatArray
     state: FloatArray
     first: Array
-    end: FloatArray
-
-    def __post_init__(self) -> None:
-        freeze(self, "t", np.float64, (None,))
-        freeze(self, "state", np.float64, (4, len(self.t), None))
-        freeze(self, "first", np.int64, (len(self.end) + 1,))
-        freeze(self, "end", np.float64, (None,))
-
-    def __len__(self) -> int:
-        return len(self.t)
 
     @property
     def begin(self) -> FloatArray:
         """(S,) start of each run [s]."""
         return self.t[self.first[:-1]]
-
-    @property
-    def ends(self) -> FloatArray:
-        """(L,) end of each piece [s]."""
-        return np.append(self.t[1:], self.end[-1])
-
-
-class _Command(NamedTuple):
-    """The fields of a `Command`, for the kernels."""
-
-    first: Array
-    t: FloatArray
-    velocity: FloatArray
-    position: FloatArray
-    T1: FloatArray
-    T2: FloatArray
-    begin: FloatArray
-    dwell: FloatArray
 
 
 def superpose(command: Command) -> Filtered:
@@ -81,8 +54,47 @@ def superpose(command: Command) -> Filtered:
     most = 4 * len(command.t) + len(command.begin)
     t, state = np.empty(most), np.empty((4, most, command.velocity.shape[1]))
     first = np.zeros(len(command.begin) + 1, np.int64)
-    n = _superpose(_Command(*(getattr(command, name) for name in _Command._fields)), t, state, first)
-    return Filtered(t=t[:n], state=state[:, :n], first=first, end=command.end)
+    n = _superpose(command, t, state, first)
+    ends = np.append(t[1:n], command.end[-1])
+    return Filtered(t[:n], ends, state[:, :n].copy(), first)
+
+
+def reached(motion: Filtered) -> FloatArray:
+    """(P,) how far the middle of each piece has come along the guide, which is the last column of the pieces [mm]."""
+    middle = (motion.ends + motion.t) / 2 - motion.t
+    s, v, a, j = motion.state[:, :, -1]
+    along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))
+    return along
+
+
+def axes_of(
+    motion: Filtered, segment: Array, first: int, toolpath: Toolpath, start: FloatArray
+) -> AxisMotion:
+    """The axes of a filtered motion of P pieces, a standstill before the first move included.
+
+    segment : (P,) of the toolpath, that each piece belongs to
+    first   : the segment that a standstill before the first move belongs to
+    start   : (A,) where that is [mm]
+    """
+    t, state = motion.t, motion.state[:, :, :-1]
+    if t[0] > 0:
+        t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, first)
+        still = np.zeros((4, 1, len(start)))
+        still[0, 0] = start
+        state = np.concatenate([still, state], axis=1)
+    position, velocity, acceleration, jerk = state
+    return AxisMotion(
+        axes=toolpath.axes,
+        radius=toolpath.radius,
+        t=t,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        jerk=jerk,
+        block=toolpath.block[segment],
+        line=toolpath.line[segment],
+        end=float(motion.ends[-1]),
+    )
 
 
 @njit(cache=True, error_model="numpy")

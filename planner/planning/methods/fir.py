@@ -1,6 +1,7 @@
 """Method `fir`: paper 000's velocity pulses, overlapped at the corners and smoothed by two FIR filters.
 
-1. Arcs become chords. Between full stops the filters are chosen anew (baselines/fir/design.py), unless `profile_filters` says which.
+1. Arcs become chords. Between full stops the filters are chosen anew (baselines/fir/fastest_schedule.py), unless `profile_filters`
+   says which.
 2. At sharp corners the command waits for the gap that eq. 15 leaves of the filters' delay; through curves it flows without a gap,
    at a speed at which the filters stay within the tolerance (baselines/fir/rules.py).
 3. The filtered motion is made exactly, in pieces of constant jerk (baselines/fir/superpose.py).
@@ -19,12 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.baselines.fir.design import plain_plan
-from planner.baselines.fir.fastest_schedule import fastest_schedule
-from planner.baselines.fir.filtered_axes import axes_of, check_profile_filters, reached
+from planner.baselines.fir.fastest_schedule import fastest_schedule, plain_plan
+from planner.baselines.fir.guide import check_profile_filters
 from planner.baselines.fir.leg_guide import LegGuide, guide_of_legs
 from planner.baselines.fir.schedule import Schedule
-from planner.baselines.fir.superpose import Filtered, superpose
+from planner.baselines.fir.superpose import Filtered, axes_of, reached, superpose
 from planner.feedrate.solution import Status
 from planner.motion.axis_motion import AxisMotion
 from planner.planning.job.job import Job
@@ -69,7 +69,7 @@ class FirMethod(Method):
             solver="pulses",
             status=Status.ACCEPTABLE,
             sentence=_sentence(schedule),
-            grid_points=len(filtered),
+            grid_points=len(filtered.t),
         )
 
 

@@ -1,13 +1,11 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
 1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance. Curves are taken as they
-are
-   (`plan_curve`). Either becomes chords so fine that they are the path (baselines/fir/chord_guide.py).
-2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J (baselines/fir/spline_speeds.py), for a few largest
-speeds V of
-   every run between full stops.
+   are (`plan_curve`). Either becomes chords so fine that they are the path (baselines/fir/chord_guide.py).
+2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of every run between full
+   stops (baselines/fir/chord_speeds.py).
 3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured, and where something is
-   exceeded the command gets slower or the filters longer, until nothing is (baselines/fir/chord_speeds.py). The fastest of the V stays.
+   exceeded the command gets slower or the filters longer, until nothing is. The fastest of the V stays.
 
 `plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant curvature within what
 the filters cover; where it varies, the verdict shows what they exceed (docs/papers.md, paper 001: G3).
@@ -22,10 +20,9 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.baselines.fir.chord_guide import ChordGuide, guide_of_curve, guide_of_path
-from planner.baselines.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised
-from planner.baselines.fir.filtered_axes import axes_of, check_profile_filters, reached
-from planner.baselines.fir.spline_speeds import v_sc
-from planner.baselines.fir.superpose import superpose
+from planner.baselines.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised, v_sc
+from planner.baselines.fir.guide import check_profile_filters
+from planner.baselines.fir.superpose import axes_of, reached, superpose
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import sample_path

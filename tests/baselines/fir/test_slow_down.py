@@ -11,8 +11,8 @@ from guides import distance_to_polyline, guide_through, machine_of
 from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import guide_of_path
 from planner.baselines.fir.chord_speeds import promised
-from planner.baselines.fir.columns import per_leg
-from planner.baselines.fir.design import plan_for
+from planner.baselines.fir.fastest_schedule import plan_for
+from planner.baselines.fir.guide import per_leg
 from planner.baselines.fir.slow_down import RATIO_ROUNDING, WORTH, SpeedPlan, make, settled_fastest, slow_down
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -65,8 +65,8 @@ def test_the_measured_error_bounds_the_distance_from_the_path(plans):
     plan = plans[0]
     made = make(plan, MACHINE)
     motion, guide = made.motion, plan.guide
-    t = np.linspace(0.0, motion.end[-1] - 1e-9, 4000)
-    m = np.clip(np.searchsorted(motion.t, t, side="right") - 1, 0, len(motion) - 1)
+    t = np.linspace(0.0, motion.ends[-1] - 1e-9, 4000)
+    m = np.clip(np.searchsorted(motion.t, t, side="right") - 1, 0, len(motion.t) - 1)
     h = (t - motion.t[m])[:, None]
     p, v, a, j = motion.state[:, m, :-1]
     apart = distance_to_polyline(p + h * (v + h * (a / 2 + h * j / 6)), guide.point)

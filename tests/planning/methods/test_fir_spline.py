@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import ChordGuide, guide_of_curve
-from planner.baselines.fir.spline_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
+from planner.baselines.fir.chord_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
 from planner.motion.filters import Filters

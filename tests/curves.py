@@ -13,7 +13,9 @@ from planner.base.arrays import FloatArray
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 
-CURVES = json.loads((Path(__file__).parents[1] / "benchmarks" / "curves.json").read_text(encoding="utf-8"))
+CURVES = json.loads(
+    (Path(__file__).parents[1] / "benchmarks" / "solvers" / "curves.json").read_text(encoding="utf-8")
+)
 
 
 def curve_named(name: str) -> Nurbs:

@@ -36,7 +36,7 @@ from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.second_order import SecondOrderMethod
 from planner.planning.methods.stop import StopMethod
 from planner.report.trajectory_reader import read_trajectory
-from planner.verifier import Given, Verdict, verify
+from planner.verifier import Given, Kind, Verdict, verify
 
 DRAWS = 40  # of a mutation until one is proved to be a fault
 POSITIONS = Given(columns=())
@@ -209,7 +209,7 @@ def correct_of(seed: int) -> list[dict[str, Any]]:
                 verdict = judged(
                     read.trajectory, subject.points, subject.feed, subject.machine, read.given, jerk
                 )
-                wrong = [text for text in verdict.sentences if TOO_FEW_DIGITS not in text]
+                wrong = [fault.sentence for fault in verdict.faults if fault.kind is not Kind.DIGITS]
                 answer = "passed" if verdict.passed else "refused" if wrong else TOO_FEW_DIGITS
                 rows.append(
                     {

@@ -103,47 +103,6 @@ def _machines(incomplete: str) -> list[str]:
 
 
 SHAPING = " and ".join(names.users_of("geometry"))
-METHOD = _choice(
-    "--method", names.method_name, f"how to plan: {', '.join(names.METHODS)}", known=names.METHODS
-)
-GEOMETRY = _choice(
-    "--geometry",
-    names.geometry_name,
-    f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or auto (splines, or "
-    f"corners where they take less time; the default)",
-    "|".join(names.GEOMETRIES),
-)
-CORNER = _choice(
-    "--corner",
-    names.corner_name,
-    f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
-    "|".join(names.CORNER_SHAPES),
-)
-EFFORT = _choice(
-    "--effort",
-    names.effort_name,
-    f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
-    known=names.EFFORTS,
-)
-SOLVER = _choice(
-    "--solver",
-    names.solver_name,
-    "solver; the first is the method's default: "
-    + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
-    known=names.SOLVERS,
-)
-# Rounds of reshaping: for comparisons; --effort is the dial for users.
-ROUNDS = typer.Option(
-    "--rounds",
-    min=0,
-    help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
-)
-MethodOption = Annotated[str, METHOD]
-GeometryOption = Annotated[str | None, GEOMETRY]
-CornerOption = Annotated[str | None, CORNER]
-EffortOption = Annotated[str | None, EFFORT]
-SolverOption = Annotated[str | None, SOLVER]
-RoundsOption = Annotated[int | None, ROUNDS]
 Jobs = Annotated[list[Path], typer.Argument(metavar="JOB", help="NC program, or several")]
 Job = Annotated[Path, typer.Argument(metavar="JOB", help="NC program")]
 MachineOption = Annotated[
@@ -286,19 +245,70 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
     return taking(command, "reading", _READING, usual, gathered)
 
 
-# How a job is planned, as options: of commands that plan it many times.
+# How a job is planned, as options: type of the value, and the option.
 _PLANNING: dict[str, tuple[Any, Any]] = {
-    "method": (str, METHOD),
-    "geometry": (str | None, GEOMETRY),
-    "corner": (str | None, CORNER),
-    "solver": (str | None, SOLVER),
-    "effort": (str | None, EFFORT),
-    "rounds": (int | None, ROUNDS),
+    "method": (
+        str,
+        _choice(
+            "--method",
+            names.method_name,
+            f"how to plan: {', '.join(names.METHODS)}",
+            known=names.METHODS,
+        ),
+    ),
+    "geometry": (
+        str | None,
+        _choice(
+            "--geometry",
+            names.geometry_name,
+            f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or "
+            "auto (splines, or corners where they take less time; the default)",
+            "|".join(names.GEOMETRIES),
+        ),
+    ),
+    "corner": (
+        str | None,
+        _choice(
+            "--corner",
+            names.corner_name,
+            f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
+            "|".join(names.CORNER_SHAPES),
+        ),
+    ),
+    "solver": (
+        str | None,
+        _choice(
+            "--solver",
+            names.solver_name,
+            "solver; the first is the method's default: "
+            + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
+            known=names.SOLVERS,
+        ),
+    ),
+    "effort": (
+        str | None,
+        _choice(
+            "--effort",
+            names.effort_name,
+            f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
+            known=names.EFFORTS,
+        ),
+    ),
+    # For comparisons; users have --effort.
+    "rounds": (
+        int | None,
+        typer.Option(
+            "--rounds",
+            min=0,
+            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
+        ),
+    ),
 }
 
 
 def takes_planning(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of planning; it gets those that are given as one argument, `how`, as `planner.plan` takes them."""
+    """Give a command the options of planning; it gets those that are given as one argument, `how`, as `planner.plan` takes
+    them."""
     usual = dict.fromkeys(_PLANNING, None) | {"method": names.OPTIMAL}
     return taking(
         command,

@@ -10,24 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.base.names import OPTIMAL, users_of
+from planner.base.names import users_of
 from planner.commands.options import (
     DEFAULT_MACHINE,
-    CornerOption,
-    EffortOption,
     ForceOption,
     Format,
-    GeometryOption,
     Jobs,
     JsonOption,
     MachineOption,
-    MethodOption,
     QuietOption,
-    RoundsOption,
-    SolverOption,
     ThreadsOption,
     ToleranceOption,
     given_options,
+    takes_planning,
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
@@ -45,17 +40,12 @@ NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 @guarded
 @takes_reading
+@takes_planning
 def plan_command(
     context: typer.Context,
     jobs: Jobs,
     machine: MachineOption = None,
     tolerance: ToleranceOption = None,
-    method: MethodOption = OPTIMAL,
-    geometry: GeometryOption = None,
-    corner: CornerOption = None,
-    solver: SolverOption = None,
-    effort: EffortOption = None,
-    rounds: RoundsOption = None,
     shaped: Annotated[
         bool,
         typer.Option(
@@ -96,6 +86,7 @@ def plan_command(
     quiet: QuietOption = False,
     force: ForceOption = False,
     *,
+    how: dict[str, Any],
     reading: Reading,
 ) -> None:
     """Plan the motion of a program, sample it and verify it; of several ones side by side, each into DIR/NAME."""
@@ -113,14 +104,7 @@ def plan_command(
     ):
         if wrong:
             raise InputError(why)
-    how: dict[str, Any] = {
-        "geometry": geometry,
-        "corner": corner,
-        "effort": effort,
-        "rounds": rounds,
-        "solver": solver,
-        "shaped": shaped,
-    }
+    how |= {"shaped": shaped} if shaped else {}
     if len(jobs) > 1:
         for name, value in {"--trace": trace, "--verbose": verbose, "--corners": corners}.items():
             if value:
@@ -128,7 +112,7 @@ def plan_command(
         from planner.commands.many import plan_many
         from planner.planning.methods.registry import check_settings
 
-        check_settings(method, **how)
+        check_settings(**how)
         handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
         code = plan_many(jobs, handed_on, output, threads=threads, quiet=quiet, as_json=as_json)
         if code:
@@ -152,7 +136,6 @@ def plan_command(
         result = plan(
             job,
             machine or DEFAULT_MACHINE,
-            method=method,
             tolerance=tolerance,
             reading=reading,
             progress=progress,

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
-from planner.verifier.excess import Excess, Fault, Kind, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, line_of
+from planner.verifier.excess import Excess, Fault, Kind, first_of, placed
+from planner.verifier.findings import line_of
 from planner.verifier.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
 from planner.verifier.stream import Look
@@ -125,25 +126,24 @@ class Apart:
     def vertex_faults(self, toolpath: Toolpath) -> list[Fault]:
         """Vertices that the motion misses by more than their budget, and arcs cut short."""
         said: list[Fault] = []
-        pieces, budgets = self.pieces, self.pieces.joint["budget"]
         for look in self.looks:
-            near, seen = self.near(look), look.seen.match.passed["near"]
+            seen = look.seen.match.passed["near"]
             missed = np.flatnonzero((seen > self._allowed) & np.isfinite(seen))
-            here: list[Fault] = []
-            for i in missed[:FAULTS_OF_A_KIND]:
-                what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
-                where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, pieces.vertex[i], strict=True))
-                by = f"missed by more than {NEAR_MISS:g} times the budget {budgets[i]:.6g} mm"
-                if not np.isnan(near[i]):
-                    by = f"missed by {near[i]:.7g} mm, {near[i] / budgets[i]:.6g} of the budget {budgets[i]:.6g} mm"
-                line, time = line_of(toolpath, pieces, i - 1), float(look.seen.match.passed["near_time"][i])
-                text = f"{what} of line {line} at {where}: {look.noted(by)}, t = {time:.6g} s"
-                ratio = float(seen[i] / budgets[i])
-                here.append(
-                    Fault(kind=Kind.VERTEX, name="vertex", found=text, ratio=ratio, time=time, line=line)
-                )
-            said += and_more(here, len(missed), "vertices missed")
+            said += first_of(missed, partial(self._vertex_fault, toolpath, look), "vertices missed")
         return said
+
+    def _vertex_fault(self, toolpath: Toolpath, look: Look, i: int) -> Fault:
+        pieces, near, passed = self.pieces, self.near(look)[i], look.seen.match.passed[i]
+        budget = pieces.joint["budget"][i]
+        what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
+        by = f"missed by {near:.7g} mm, {near / budget:.6g} of the budget {budget:.6g} mm"
+        if np.isnan(near):
+            by = f"missed by more than {NEAR_MISS:g} times the budget {budget:.6g} mm"
+        line, time = line_of(toolpath, pieces, i - 1), float(passed["near_time"])
+        where = placed(toolpath.axes, pieces.vertex[i])
+        found = f"{what} of line {line} at {where}: {look.noted(by)}, t = {time:.6g} s"
+        ratio = float(passed["near"] / budget)
+        return Fault(Kind.VERTEX, "vertex", found, ratio=ratio, time=time, line=line)
 
     def excesses(self) -> list[Excess]:
         """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose distance is known. Of what the

@@ -39,7 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 
@@ -49,9 +49,8 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.corners import CornerCheck
-from planner.verifier.excess import Excess, Fault, Kind, and_more
+from planner.verifier.excess import Excess, Fault, Kind, first_of, placed
 from planner.verifier.filtered import bow_share
-from planner.verifier.findings import FAULTS_OF_A_KIND
 from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
 from planner.verifier.pieces import ProgramPieces
@@ -146,15 +145,16 @@ def check_corners(
     )
 
 
-def too_fast_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
-    """Corners that are passed too fast."""
-    broken = check.too_fast & check.judged
-    return _faults(check, broken, check.speed_ratio, Kind.CORNER_SPEED, _too_fast, axes)
-
-
-def overdrawn_faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
-    """Corners whose budget is overdrawn."""
-    return _faults(check, check.overdrawn, check.budget_ratio, Kind.CORNER_BUDGET, _overdrawn, axes)
+def faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
+    """Corners that are passed too fast, and corners whose budget is overdrawn."""
+    found: list[Fault] = []
+    for broken, values, kind, said in (
+        (check.too_fast & check.judged, check.speed_ratio, Kind.CORNER_SPEED, _too_fast),
+        (check.overdrawn, check.budget_ratio, Kind.CORNER_BUDGET, _overdrawn),
+    ):
+        worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
+        found += first_of(worst, partial(_fault, check, values, kind, said, axes), "corners")
+    return found
 
 
 def excesses(check: CornerCheck) -> list[Excess]:
@@ -173,24 +173,18 @@ def _excess(check: CornerCheck, k: int, kind: Kind, ratio: float, power: int, st
     return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=power, still=still)
 
 
-def _faults(
+def _fault(
     check: CornerCheck,
-    broken: Array,
     values: FloatArray,
     kind: Kind,
-    found: Callable[[CornerCheck, int], str],
+    said: Callable[[CornerCheck, int], str],
     axes: tuple[str, ...],
-) -> list[Fault]:
-    worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
-    said = []
-    for k in worst[:FAULTS_OF_A_KIND]:
-        where = " ".join(f"{name}{x:.6g}" for name, x in zip(axes, check.position[k], strict=True))
-        line, time = int(check.line[k]), float(check.time[k])
-        text = f"{found(check, k)}, at the end of line {line}, {where}, t = {time:.6g} s"
-        said.append(
-            Fault(kind=kind, name=kind.value, found=text, ratio=float(values[k]), time=time, line=line)
-        )
-    return and_more(said, len(worst), "corners")
+    k: int,
+) -> Fault:
+    line, time = int(check.line[k]), float(check.time[k])
+    where = placed(axes, check.position[k])
+    found = f"{said(check, k)}, at the end of line {line}, {where}, t = {time:.6g} s"
+    return Fault(kind, kind.value, found, ratio=float(values[k]), time=time, line=line)
 
 
 def _too_fast(check: CornerCheck, k: int) -> str:

@@ -66,7 +66,7 @@ def exact_faults(
         line, time = line_of(toolpath, pieces, worst.piece), worst.time
         where = f"{worst.apart:.6g} mm off at t = {time:.6g} s, line {line}"
     found = f"{where}: G61 asks for the path itself"
-    return [Fault(kind=Kind.EXACT, name="exact path", found=found, time=time, line=line)]
+    return [Fault(Kind.EXACT, "exact path", found, time=time, line=line)]
 
 
 @dataclass

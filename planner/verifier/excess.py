@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.verifier.pieces import RATIO_ROUNDING
 
 
 class Kind(StrEnum):
     """What a fault is about."""
 
-    SAMPLES = "samples"  # periods, digits, columns, rest at both ends
+    SAMPLES = "samples"  # periods, columns, rest at both ends
+    DIGITS = "digits"  # too few to judge a quantity
     LIMIT = "limit"  # of an axis, the feed, the normal acceleration, one's own, the extruder
     CONTOUR = "contour"
     VERTEX = "vertex"
@@ -28,7 +31,10 @@ class Kind(StrEnum):
     CORNER_BUDGET = "eq. 18"
 
 
-@dataclass(frozen=True, kw_only=True)
+FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
+
+
+@dataclass(frozen=True)
 class Fault:
     """One thing that is wrong with a motion; as text its sentence.
 
@@ -43,6 +49,7 @@ class Fault:
     kind: Kind
     name: str
     found: str
+    _: KW_ONLY
     ratio: float | None = None
     time: float | None = None
     line: int | None = None
@@ -56,11 +63,18 @@ class Fault:
         return self.sentence
 
 
-def and_more(faults: list[Fault], count: int, of: str) -> list[Fault]:
-    """The faults, and one that tells how many there are in all, if these are not all `count`."""
-    if count == len(faults):
-        return faults
-    return [*faults, Fault(kind=faults[0].kind, name=faults[0].name, found=f"{count} {of} in all")]
+def first_of(places: Sequence[Any] | Array, fault: Callable[[Any], Fault], of: str) -> list[Fault]:
+    """The faults at the first few of some places (n,), and one that tells how many there are in all, if these are not
+    all of them; `of` says of what."""
+    said = [fault(place) for place in places[:FAULTS_OF_A_KIND]]
+    if len(said) < len(places):
+        said.append(Fault(said[0].kind, said[0].name, f"{len(places)} {of} in all"))
+    return said
+
+
+def placed(axes: tuple[str, ...], position: FloatArray) -> str:
+    """A place (A,) in words: "x1 y2.5"."""
+    return " ".join(f"{letter}{value:.6g}" for letter, value in zip(axes, position, strict=True))
 
 
 # What an error of the chords between samples alone can break.

@@ -22,8 +22,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
-from planner.verifier.excess import Fault, Kind, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, check_of, joint_times
+from planner.verifier.excess import Fault, Kind, first_of
+from planner.verifier.findings import check_of, joint_times
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
@@ -168,14 +168,15 @@ class _Watch:
         np.maximum.at(high, joint, place)
         off = np.maximum(np.maximum(low - self.seen, self.seen - high), 0.0)
         bad = np.flatnonzero(np.where(np.isnan(off), 0.0, off) > allowed * (1.0 + RATIO_ROUNDING))
-        said = []
-        for k in bad[:FAULTS_OF_A_KIND]:
-            line, ratio = int(toolpath.line[max(fed.joint[k] - 1, 0)]), float(off[k] / allowed[k])
-            text = f"{off[k]:.6g} mm of filament off where line {line} ends, {allowed[k]:.6g} mm allowed"
-            said.append(Fault(kind=Kind.EXTRUDER, name="extruder", found=text, ratio=ratio, line=line))
-        said = and_more(said, len(bad), "such places")
+
+        def fault(k: int) -> Fault:
+            line = int(toolpath.line[max(fed.joint[k] - 1, 0)])
+            found = f"{off[k]:.6g} mm of filament off where line {line} ends, {allowed[k]:.6g} mm allowed"
+            return Fault(Kind.EXTRUDER, "extruder", found, ratio=float(off[k] / allowed[k]), line=line)
+
+        said = first_of(bad, fault, "such places")
         missed = abs(self.end - float(fed.leave[-1]))
         if missed > PLACE_ROUNDING + 2.0 * self.given.extruder_rounding:
             text = f"ends at {self.end:.6g} mm of filament, the program at {fed.leave[-1]:.6g} mm"
-            said.append(Fault(kind=Kind.EXTRUDER, name="extruder", found=text))
+            said.append(Fault(Kind.EXTRUDER, "extruder", text))
         return said

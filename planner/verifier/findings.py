@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import in_degrees
 from planner.verifier import limits as rows
-from planner.verifier.excess import Excess, Fault, Kind, and_more, of_check
+from planner.verifier.excess import FAULTS_OF_A_KIND, Excess, Fault, Kind, first_of, of_check, placed
 from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verifier.stream import Look
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
-
-FAULTS_OF_A_KIND = 5  # spelled out; the rest are counted
 
 # A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a motion times are good to
 # 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop exceeds it by far more.
@@ -106,22 +106,17 @@ def column_faults(
     if limits.jerk_limited:
         tests.append(("velocity", "the positions", rows.GAP_BY_JERK, jerk))
         tests.append(("acceleration", "the velocity column", rows.GAP_OF_ACCELERATION, jerk))
-    said = []
-    for look in looks:
-        for column, against, group, bound in tests:
-            for axis, letter in enumerate(toolpath.axes):
-                row = group * len(toolpath.axes) + axis
-                worst = look.seen.worst
-                if (ratio := float(worst.row[row, 0])) > bound[axis]:
-                    time, line = float(worst.time[row]), line_of(toolpath, pieces, int(worst.piece[row]))
-                    text = (
-                        f"{column}.{letter} does not agree with {against} at t = {time:.6g} s, line {line}: "
-                    )
-                    text += look.noted(f"{ratio:.6g} of the difference that the limits allow")
-                    fault = Fault(
-                        kind=Kind.SAMPLES, name="columns", found=text, ratio=ratio, time=time, line=line
-                    )
-                    said.append(fault)
+    said, axes = [], len(toolpath.axes)
+    for look, (column, against, group, bound) in itertools.product(looks, tests):
+        worst = look.seen.worst
+        ratios = worst.row[group * axes : (group + 1) * axes, 0]
+        for axis in np.flatnonzero(ratios > bound):
+            row, ratio = group * axes + axis, float(ratios[axis])
+            time, line = float(worst.time[row]), line_of(toolpath, pieces, int(worst.piece[row]))
+            name = f"{column}.{toolpath.axes[axis]}"
+            found = f"{name} does not agree with {against} at t = {time:.6g} s, line {line}: "
+            found += look.noted(f"{ratio:.6g} of the difference that the limits allow")
+            said.append(Fault(Kind.SAMPLES, "columns", found, ratio=ratio, time=time, line=line))
     return said
 
 
@@ -151,16 +146,8 @@ def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tu
             if distance > allowed:
                 text = f"the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
                 text += look.noted(f"{allowed:.2g} mm allowed, line {line}")
-                said.append(
-                    Fault(
-                        kind=Kind.ORDER,
-                        name=name,
-                        found=text,
-                        ratio=distance / allowed,
-                        time=time,
-                        line=int(line),
-                    )
-                )
+                ratio = distance / allowed
+                said.append(Fault(Kind.ORDER, name, text, ratio=ratio, time=time, line=int(line)))
     return worst, said
 
 
@@ -195,7 +182,7 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple
 
 
 def _order(found: str, line: int) -> Fault:
-    return Fault(kind=Kind.ORDER, name="order", found=found, line=line)
+    return Fault(Kind.ORDER, "order", found, line=line)
 
 
 def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
@@ -229,36 +216,29 @@ def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, li
         # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
         unknown = RATIO_ROUNDING * toolpath.dwell + hurry * look.seen.gap_max + 2.0 * limits.time_rounding
         short = toolpath.dwell - match.passed["rest"][joint] > unknown
-        of_kind: dict[str, list[Fault]] = {"stop": [], "dwell": []}
-        for i in through[:FAULTS_OF_A_KIND]:
-            seen = f"{stop_ratio[i]:.6g} of the speed or distance that a sample next to it can have"
-            text = f"no full stop at {_joint_name(toolpath, i)}: {look.noted(seen)}"
-            of_kind["stop"].append(_stop("stop", text, toolpath, i, float(stop_ratio[i])))
-        for i in np.flatnonzero(short)[:FAULTS_OF_A_KIND]:
-            seen = f"{match.passed['rest'][joint[i]]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
-            text = f"too short at {_joint_name(toolpath, i)}: {look.noted(seen)}"
-            of_kind["dwell"].append(_stop("dwell", text, toolpath, i))
-        said += of_kind["stop"] + of_kind["dwell"]
-        for name, count in (("stop", len(through)), ("dwell", int(short.sum()))):
-            said += and_more(of_kind[name], count, "such places")[len(of_kind[name]) :]
+
+        def stop_fault(i: int, look: Look = look, ratios: FloatArray = stop_ratio) -> Fault:
+            by = f"{ratios[i]:.6g} of the speed or distance that a sample next to it can have"
+            found = f"no full stop at {_joint_name(toolpath, i)}: {look.noted(by)}"
+            return Fault(Kind.STOP, "stop", found, ratio=float(ratios[i]), line=_line_before(toolpath, i))
+
+        def dwell_fault(i: int, look: Look = look, rest: FloatArray = match.passed["rest"][joint]) -> Fault:
+            by = f"{rest[i]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
+            found = f"too short at {_joint_name(toolpath, i)}: {look.noted(by)}"
+            return Fault(Kind.STOP, "dwell", found, line=_line_before(toolpath, i))
+
+        said += first_of(through, stop_fault, "such places")
+        said += first_of(np.flatnonzero(short), dwell_fault, "such places")
     return said
 
 
-def _stop(name: str, found: str, toolpath: Toolpath, i: int, ratio: float | None = None) -> Fault:
-    return Fault(kind=Kind.STOP, name=name, found=found, ratio=ratio, line=int(toolpath.line[max(i - 1, 0)]))
-
-
 def _joint_name(toolpath: Toolpath, i: int) -> str:
-    where = " ".join(f"{n}{x:.6g}" for n, x in zip(toolpath.axes, _joint_point(toolpath, i), strict=True))
-    return (
-        f"the start of line {toolpath.line[0]}, {where}"
-        if i == 0
-        else f"the end of line {toolpath.line[i - 1]}, {where}"
-    )
+    where = placed(toolpath.axes, toolpath.start[i] if i < len(toolpath) else toolpath.end[-1])
+    return f"the {'end' if i else 'start'} of line {_line_before(toolpath, i)}, {where}"
 
 
-def _joint_point(toolpath: Toolpath, i: int) -> FloatArray:
-    return toolpath.start[i] if i < len(toolpath) else toolpath.end[-1]
+def _line_before(toolpath: Toolpath, i: int) -> int:
+    return int(toolpath.line[max(i - 1, 0)])
 
 
 def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:

@@ -20,8 +20,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
-from planner.verifier.excess import Fault, and_more
-from planner.verifier.findings import FAULTS_OF_A_KIND, joint_times
+from planner.verifier.excess import Fault, first_of
+from planner.verifier.findings import joint_times
 from planner.verifier.pieces import CONTOUR_ROUNDING, ProgramPieces
 from planner.verifier.stream import Look
 from planner.verifier.verdict import ThreadCheck
@@ -52,7 +52,7 @@ def thread_checks(
 def thread_faults(threads: tuple[ThreadCheck, ...]) -> list[Fault]:
     """Moves that are not in step with the spindle; the largest errors first."""
     bad = sorted((thread for thread in threads if thread.broken), key=lambda thread: -thread.ratio)
-    return and_more([thread.fault() for thread in bad[:FAULTS_OF_A_KIND]], len(bad), "such moves")
+    return first_of(bad, ThreadCheck.fault, "such moves")
 
 
 def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:

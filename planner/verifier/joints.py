@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,52 +46,6 @@ from planner.verifier.worst import BACK, SampleBlock, Worst
 NOT_JUDGED = 100.0
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class JointVerdict:
-    """The findings of `verify_joints`.
-
-    passed       : True if every check holds
-    limits       : of the linear joints, "velocity.x" and so on
-    tip          : the verdict of the tip's motion
-    tip_error_mm : largest distance of tip and angles from the path, with what lies between setpoints [mm]; inf where it was lost
-    faults       : each failure
-    """
-
-    passed: bool
-    limits: dict[str, LimitCheck]
-    tip: Verdict
-    tip_error_mm: float
-    faults: tuple[Fault, ...]
-
-    @property
-    def ratios(self) -> dict[str, float]:
-        """Of the linear joints, and of rotary joints, feed and tip: value / limit [-]."""
-        return {name: check.ratio for name, check in self._of_joints_and_tip().items()}
-
-    def verdict(self) -> Verdict:
-        """All of it as one verdict: limits of the joints in place of those of the tip's coordinates."""
-        known = np.isfinite(self.tip_error_mm)
-        contour = self.tip.contour
-        more = self.tip_error_mm - (self.tip.contour_error_mm or 0.0) if known else 0.0
-        value = contour.value + more
-        linear = self.tip.linear_error_mm
-        return dataclasses.replace(
-            self.tip,
-            passed=self.passed,
-            limits=self._of_joints_and_tip(),
-            contour=dataclasses.replace(contour, value=value, ratio=contour.ratio + more / contour.limit),
-            contour_error_mm=self.tip_error_mm if known else None,
-            linear_error_mm=None if linear is None else linear + more,
-            faults=self.faults,
-        )
-
-    def _of_joints_and_tip(self) -> dict[str, LimitCheck]:
-        of_tip = {n: c for n, c in self.tip.limits.items() if n.rpartition(".")[2] not in LINEAR_AXES}
-        found = self.limits | of_tip
-        order = {quantity: k for k, quantity in enumerate(DERIVATIVES)}
-        return dict(sorted(found.items(), key=lambda pair: order.get(pair[0].partition(".")[0], len(order))))
-
-
 def verify_joints(
     setpoints: Trajectory,
     toolpath: Toolpath,
@@ -102,8 +55,9 @@ def verify_joints(
     given: Given | None = None,
     not_limited: tuple[str, ...] = (),
     progress: Callable[[float], None] | None = None,
-) -> JointVerdict:
-    """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics].
+) -> Verdict:
+    """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics]: limits of the
+    linear joints in place of those of the tip's coordinates; errors with what lies between setpoints.
 
     tool_length : [mm]; None for that of the machine file
     given       : which columns were delivered; None for all
@@ -131,16 +85,39 @@ def verify_joints(
     limits = _joint_checks(setpoints, toolpath, machine, given, not_limited)
     broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
     faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
-    error = (np.inf if tip.contour_error_mm is None else tip.contour_error_mm) + gap
+    error = None if tip.contour_error_mm is None else tip.contour_error_mm + gap
     tolerance = tip.contour.limit
-    if error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING and not tip.contour.broken:
+    beyond = error is None or error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+    if beyond and not tip.contour.broken:
+        of_path = "an unknown distance" if error is None else f"{error:.6g} mm"
         found = (
-            f"up to {gap:.4g} mm beside its chord between setpoints of the joints: {error:.6g} mm from the path, "
+            f"up to {gap:.4g} mm beside its chord between setpoints of the joints: {of_path} from the path, "
             f"with {tolerance:.6g} mm allowed"
         )
-        faults.append(Fault(kind=Kind.CONTOUR, name="tip", found=found, ratio=error / tolerance))
-    faults += tip.faults
-    return JointVerdict(passed=not faults, limits=limits, tip=tip, tip_error_mm=error, faults=tuple(faults))
+        faults.append(Fault(Kind.CONTOUR, "tip", found, ratio=None if error is None else error / tolerance))
+    more, linear = 0.0 if error is None else gap, tip.linear_error_mm
+    contour = dataclasses.replace(
+        tip.contour, value=tip.contour.value + more, ratio=tip.contour.ratio + more / tolerance
+    )
+    return dataclasses.replace(
+        tip,
+        passed=not faults and tip.passed,
+        limits=_in_order(limits | {n: c for n, c in tip.limits.items() if not _of_linear(n)}),
+        contour=contour,
+        contour_error_mm=error,
+        linear_error_mm=None if linear is None else linear + more,
+        faults=(*faults, *tip.faults),
+    )
+
+
+def _of_linear(name: str) -> bool:
+    return name.rpartition(".")[2] in LINEAR_AXES
+
+
+def _in_order(limits: dict[str, LimitCheck]) -> dict[str, LimitCheck]:
+    """Velocities, accelerations and jerks first, as for other motions."""
+    order = {quantity: k for k, quantity in enumerate(DERIVATIVES)}
+    return dict(sorted(limits.items(), key=lambda one: order.get(one[0].partition(".")[0], len(order))))
 
 
 class _Carried:
@@ -219,7 +196,7 @@ def _joint_checks(
         check_of(worst, row, toolpath, int(worst.piece[row]), not_limited)
         for row in range(len(DERIVATIVES) * len(limits.axes))
     ]
-    return {check.name: check for check in checks if check.name.rpartition(".")[2] in LINEAR_AXES}
+    return {check.name: check for check in checks if _of_linear(check.name)}
 
 
 def _about(letter: str, angle: FloatArray) -> FloatArray:

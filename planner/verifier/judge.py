@@ -111,8 +111,7 @@ def verify(
         *thread_faults(threads),
         *extruder.faults,
         *(after.faults if after is not None else ()),
-        *error_allocation.too_fast_faults(corners, toolpath.axes),
-        *error_allocation.overdrawn_faults(corners, toolpath.axes),
+        *error_allocation.faults(corners, toolpath.axes),
     )
     excesses = findings.excesses(looks, checks, not_limited)
     excesses += apart.excesses() + error_allocation.excesses(corners)

@@ -208,12 +208,12 @@ class Comparison:
             found = (
                 f"it lasts from 0 to {self.end:.9g} s, its samples from {self.first:.9g} to {self.last:.9g} s"
             )
-            said.append(Fault(kind=Kind.SAMPLES, name="motion", found=found))
+            said.append(Fault(Kind.SAMPLES, "motion", found))
         bound = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION)) * (1 + RATIO_ROUNDING)
         for axis in np.flatnonzero(self.excess > bound):
             time = float(self.time[axis])
             found = f"not the delivered one: {self.axes[axis]} differs at t = {time:.6g} s"
-            said.append(Fault(kind=Kind.SAMPLES, name="motion", found=found, time=time))
+            said.append(Fault(Kind.SAMPLES, "motion", found, time=time))
         return said
 
 

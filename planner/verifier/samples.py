@@ -123,7 +123,7 @@ class Delivered:
             f"{period:.9g} s between the samples at t = {time:.6g} s and the next, dt is {self.dt:.9g} s "
             f"({self._wrong} such periods)"
         )
-        return [Fault(kind=Kind.SAMPLES, name="period", found=found, ratio=period / self.dt, time=time)]
+        return [Fault(Kind.SAMPLES, "period", found, ratio=period / self.dt, time=time)]
 
 
 def density(
@@ -148,7 +148,7 @@ def density(
         remedy = f"sample every {dense:.3g} s" if dense > 0 else "sample every period"
         with_seen = f", beside the {seen:.4g} mm seen" if seen else ""
         found = f"too coarse to judge: {apart}{with_seen}; the tolerance is {budget:g} mm; {remedy}"
-        return [Fault(kind=Kind.SAMPLES, name="samples", found=found)], []
+        return [Fault(Kind.SAMPLES, "samples", found)], []
     return [], [f"{apart}; velocity, acceleration and jerk are known as means over such periods only"]
 
 
@@ -173,7 +173,7 @@ def digits(
                 f"too few digits to judge {quantity}.{axes[k]}: positions good to {error[k]:.2g} mm every {h:g} s leave it "
                 f"unknown to {share[k]:.3g} times its limit; write more digits, or report it unjudged: --not-limited {quantity}"
             )
-            faults.append(Fault(kind=Kind.SAMPLES, name="samples", found=found))
+            faults.append(Fault(Kind.DIGITS, "samples", found))
         if share[k] < WORTH_A_WORD:
             shares.pop()
     if not shares:
@@ -208,12 +208,12 @@ def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list
                 f"not at rest: {axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
                 f"next to it, {furthest[k]:.4g} mm are possible{advice}"
             )
-            said.append(Fault(kind=Kind.SAMPLES, name=name, found=found, time=float(t[at])))
+            said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
         for quantity, row in (("velocity", 0), ("acceleration", 1)):
             value: FloatArray = np.abs(delivered.ends[quantity][at])
             k = int((value / limits.per_axis[row]).argmax())
             judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
             if judged and value[k] > RATIO_ROUNDING * limits.per_axis[row, k]:
                 found = f"not at rest: {quantity}.{axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
-                said.append(Fault(kind=Kind.SAMPLES, name=name, found=found, time=float(t[at])))
+                said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
     return said

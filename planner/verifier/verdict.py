@@ -7,7 +7,7 @@ from typing import Any
 
 from planner.base.arrays import FloatArray, freeze
 from planner.verifier.corners import CornerCheck
-from planner.verifier.excess import Excess, Fault, Kind
+from planner.verifier.excess import Excess, Fault, Kind, placed
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verifier.ringing import Ringing
 
@@ -51,11 +51,11 @@ class LimitCheck:
 
     def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
         """What is wrong where the limit does not hold."""
-        where = " ".join(f"{letter}{value:.6g}" for letter, value in zip(axes, self.position, strict=True))
+        where = placed(axes, self.position)
         found = f"{self.value:.7g} {self.unit}, {self.ratio:.6g} of the limit {self.limit:.6g} {self.unit}"
         found = f"{found} at t = {self.time:.6g} s, {where}, line {self.line}"
         found += f" ({self.note})" if self.note else ""
-        return Fault(kind=kind, name=self.name, found=found, ratio=self.ratio, time=self.time, line=self.line)
+        return Fault(kind, self.name, found, ratio=self.ratio, time=self.time, line=self.line)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ class ThreadCheck:
             f"{self.error_mm:.6g} mm out of step with the spindle, {self.allowed_mm:.6g} mm allowed, at the feed "
             f"{self.feed:.6g} mm/s, line {self.line}"
         )
-        return Fault(kind=Kind.THREAD, name="thread", found=found, ratio=self.ratio, line=self.line)
+        return Fault(Kind.THREAD, "thread", found, ratio=self.ratio, line=self.line)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

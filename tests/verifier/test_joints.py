@@ -13,6 +13,7 @@ from planner.base.errors import InputError
 from planner.machine.kinematics import at_tip, kinematics_of
 from planner.motion.chain_setpoints import joint_setpoints, tip_of_setpoints
 from planner.motion.trajectory import Trajectory
+from planner.verifier import Given, verify
 from planner.verifier.joints import verify_joints
 from tests.machine.kinematics.five_axis import table_machine, tip_program
 
@@ -44,12 +45,12 @@ def test_planned_joints_pass(plan, setpoints: Trajectory) -> None:
     found = verify_joints(setpoints, plan.toolpath, MACHINE, not_limited=NOT_LIMITED)
     assert found.faults == ()
     assert found.passed
-    assert found.tip_error_mm <= 0.01 + 1e-9
+    assert found.contour_error_mm <= 0.01 + 1e-9
     verdict = plan.verdict
     for name in ("velocity.x", "acceleration.y", "velocity.z"):  # two codes, one motion
         quantity, _, letter = name.partition(".")
         planned = verdict.limits[f"{quantity}.joint {letter}"].ratio
-        assert found.ratios[name] == pytest.approx(planned, rel=0.02)
+        assert found.limits[name].ratio == pytest.approx(planned, rel=0.02)
 
 
 @pytest.mark.slow
@@ -82,7 +83,7 @@ def test_setpoints_far_apart_leave_the_path_between_them(plan, setpoints: Trajec
     few = np.unique(np.append(np.arange(0, len(setpoints), 50), len(setpoints) - 1))
     sparse = dataclasses.replace(setpoints.rows(few), dt=0.05)
     found = verify_joints(sparse, plan.toolpath, MACHINE, not_limited=NOT_LIMITED)
-    assert found.tip_error_mm > 0.01
+    assert found.contour_error_mm > 0.01
 
 
 def test_a_machine_without_kinematics_is_refused(setpoints: Trajectory, plan) -> None:
@@ -101,4 +102,6 @@ def test_what_lies_between_setpoints_is_added_to_the_error_of_the_tip(plan, setp
     tips, middle = (tip_of_setpoints(each, kinematics_of(MACHINE)).position for each in (sparse, between))
     gap = np.linalg.norm(middle - 0.5 * (tips[1:] + tips[:-1]), axis=1).max()
     assert gap > 0.01
-    assert found.tip_error_mm == pytest.approx(found.tip.contour_error_mm + gap, abs=1e-9)
+    tip = tip_of_setpoints(sparse, kinematics_of(MACHINE))
+    alone = verify(tip, plan.toolpath, at_tip(MACHINE), given=Given(columns=()))
+    assert found.contour_error_mm == pytest.approx(alone.contour_error_mm + gap, abs=1e-9)

@@ -80,7 +80,7 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
     how = {"given": job.given, "not_limited": job.not_limited, "progress": job.progress}
     if chain is None:
         return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
-    return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how).verdict()  # type: ignore[arg-type]
+    return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how)  # type: ignore[arg-type]
 
 
 def planned(
@@ -109,7 +109,7 @@ def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
         machine,
         tool_length=chain.length,
         not_limited=_not_limited(plan.verdict),
-    ).verdict()
+    )
     spent = plan.timings.get("verify", 0.0) + time.perf_counter() - began
     return dataclasses.replace(
         plan,

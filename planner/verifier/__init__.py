@@ -24,7 +24,8 @@ sharp each check is:
     corners.py    the record of that
     excess.py     the kinds of faults, and the spans of time in which limits are exceeded
     exact.py      blocks under G61: the samples run along the path itself
-    held.py       threads: moves in step with the spindle
+    spindle_sync.py
+                  threads: moves in step with the spindle
     extruder.py   what the extruder of a 3-D printer does
     joints.py     setpoints of the joints, with the tool centre point on
     ringing.py    what the machine's vibration modes do

@@ -23,7 +23,7 @@ from planner.verifier.excess import Excess, Fault, Kind, first_of, placed
 from planner.verifier.findings import line_of
 from planner.verifier.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
-from planner.verifier.stream import Look
+from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
 
 WIDER = (4.0, 16.0, 64.0)  # times the budget
@@ -34,12 +34,12 @@ VISITS_MAX = 3e8  # samples times pieces within reach that are looked at for a n
 class Apart:
     """The readings that measure the distance of motion and path.
 
-    looks   : the readings
+    readings   : the readings
     pieces  : the path with its own budgets
     widened : their budgets were so many times those of `pieces`
     """
 
-    looks: list[Look]
+    readings: list[Observed]
     pieces: ProgramPieces
     widened: float = 1.0
 
@@ -48,13 +48,13 @@ class Apart:
         """The motion stays within these budgets, or half of those that were widened, as far as it goes."""
         share = self.widened if self.widened == 1.0 else 0.5 * self.widened
         return all(
-            look.seen.match.tally[LOST_AFTER] == NOT_LOST
-            and not look.seen.match.tally[JUMPS]
-            and look.seen.match.worst[0] <= share / self.widened * (1.0 + 2.0 * RATIO_ROUNDING)
-            and not (look.seen.match.passed["near"] > share * self._allowed)[
-                : look.seen.match.tally[LAST] + 1
+            reading.match.tally[LOST_AFTER] == NOT_LOST
+            and not reading.match.tally[JUMPS]
+            and reading.match.worst[0] <= share / self.widened * (1.0 + 2.0 * RATIO_ROUNDING)
+            and not (reading.match.passed["near"] > share * self._allowed)[
+                : reading.match.tally[LAST] + 1
             ].any()
-            for look in self.looks
+            for reading in self.readings
         )
 
     @property
@@ -66,12 +66,12 @@ class Apart:
 
     def contour_error(self) -> float | None:
         """Largest distance of the motion from the path [mm]."""
-        return None if not self.fits else max(float(look.seen.match.worst[5]) for look in self.looks)
+        return None if not self.fits else max(float(reading.match.worst[5]) for reading in self.readings)
 
     def contour_check(self, toolpath: Toolpath) -> LimitCheck:
         """The motion's worst distance from the path, as far as it could be followed, against the budget there."""
-        look = max(self.looks, key=lambda each: each.seen.match.worst[0])
-        ratio, distance, budget, time, piece, _ = look.seen.match.worst
+        reading = max(self.readings, key=lambda each: each.match.worst[0])
+        ratio, distance, budget, time, piece, _ = reading.match.worst
         ratio, budget = ratio * self.widened, budget / self.widened
         if distance <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
             ratio = min(ratio, 1.0)  # within the rounding of the matching, which is absolute too
@@ -82,31 +82,31 @@ class Apart:
             value=float(distance),
             limit=float(budget) if budget > 0 else float(self.pieces.piece["budget"].min()),
             time=float(time),
-            position=look.seen.match.place[WORST_AT],
+            position=reading.match.place[WORST_AT],
             line=line_of(toolpath, self.pieces, int(piece)),
-            note=look.note,
+            note=reading.note,
         )
 
     # ---- the vertices from the motion --------------------------------------------------------------------------------
 
-    def near(self, look: Look) -> FloatArray:
+    def near(self, reading: Observed) -> FloatArray:
         """(N+1,) distance of each vertex from the motion [mm]; NaN where it is not known."""
-        near: FloatArray = look.seen.match.passed["near"].copy()
+        near: FloatArray = reading.match.passed["near"].copy()
         # those of a motion that does not fit are known as far as the matching stays in place
         near[np.isinf(near) if self.fits else near > NEAR_MISS * self._allowed] = np.nan
         return near
 
     def vertex_error(self) -> float | None:
         """Largest distance of a programmed vertex from the motion [mm]."""
-        near = np.concatenate([self.near(look)[self.pieces.joint["real"]] for look in self.looks])
+        near = np.concatenate([self.near(reading)[self.pieces.joint["real"]] for reading in self.readings])
         return None if np.isnan(near).any() else float(near.max())
 
     def vertex_check(self, toolpath: Toolpath) -> LimitCheck:
         """The vertex that the motion misses by most of its budget, of those whose distance is known."""
         budgets = self.pieces.joint["budget"]
-        known = [np.nan_to_num(self.near(each) / budgets, nan=-1.0) for each in self.looks]
-        look = self.looks[int(np.argmax([ratio.max() for ratio in known]))]
-        near = self.near(look)
+        known = [np.nan_to_num(self.near(each) / budgets, nan=-1.0) for each in self.readings]
+        reading = self.readings[int(np.argmax([ratio.max() for ratio in known]))]
+        near = self.near(reading)
         i = int(np.nan_to_num(near / budgets, nan=-1.0).argmax())  # if none is known the first, with NaN
         ratio = near[i] / budgets[i]
         if near[i] <= self._allowed[i]:
@@ -117,23 +117,23 @@ class Apart:
             ratio=float(ratio),
             value=float(near[i]),
             limit=float(budgets[i]),
-            time=float(look.seen.match.passed["near_time"][i]),
+            time=float(reading.match.passed["near_time"][i]),
             position=self.pieces.vertex[i],
             line=line_of(toolpath, self.pieces, i - 1),
-            note=look.note,
+            note=reading.note,
         )
 
     def vertex_faults(self, toolpath: Toolpath) -> list[Fault]:
         """Vertices that the motion misses by more than their budget, and arcs cut short."""
         said: list[Fault] = []
-        for look in self.looks:
-            seen = look.seen.match.passed["near"]
+        for reading in self.readings:
+            seen = reading.match.passed["near"]
             missed = np.flatnonzero((seen > self._allowed) & np.isfinite(seen))
-            said += first_of(missed, partial(self._vertex_fault, toolpath, look), "vertices missed")
+            said += first_of(missed, partial(self._vertex_fault, toolpath, reading), "vertices missed")
         return said
 
-    def _vertex_fault(self, toolpath: Toolpath, look: Look, i: int) -> Fault:
-        pieces, near, passed = self.pieces, self.near(look)[i], look.seen.match.passed[i]
+    def _vertex_fault(self, toolpath: Toolpath, reading: Observed, i: int) -> Fault:
+        pieces, near, passed = self.pieces, self.near(reading)[i], reading.match.passed[i]
         budget = pieces.joint["budget"][i]
         what = "end of the block" if pieces.joint["real"][i] else "a point of the arc"
         by = f"missed by {near:.7g} mm, {near / budget:.6g} of the budget {budget:.6g} mm"
@@ -141,7 +141,7 @@ class Apart:
             by = f"missed by more than {NEAR_MISS:g} times the budget {budget:.6g} mm"
         line, time = line_of(toolpath, pieces, i - 1), float(passed["near_time"])
         where = placed(toolpath.axes, pieces.vertex[i])
-        found = f"{what} of line {line} at {where}: {look.noted(by)}, t = {time:.6g} s"
+        found = f"{what} of line {line} at {where}: {reading.noted(by)}, t = {time:.6g} s"
         ratio = float(passed["near"] / budget)
         return Fault(Kind.VERTEX, "vertex", found, ratio=ratio, time=time, line=line)
 
@@ -149,16 +149,16 @@ class Apart:
         """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose distance is known. Of what the
         chords between samples add a slower motion has less; what is between the samples is the path's own error."""
         found = []
-        for k, look in enumerate(self.looks):
-            ratio, distance, budget, time, _, _ = look.seen.match.worst.tolist()
+        for k, reading in enumerate(self.readings):
+            ratio, distance, budget, time, _, _ = reading.match.worst.tolist()
             still = 1.0 if k else 0.0
             if distance > budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
                 found.append(_excess(Kind.CONTOUR, time, ratio * self.widened, still))
-            near, times = self.near(look), look.seen.match.passed["near_time"]
+            near, times = self.near(reading), reading.match.passed["near_time"]
             for i in np.flatnonzero(np.nan_to_num(near) > self._allowed):
                 by = float(near[i] / self.pieces.joint["budget"][i])
-                own = float(self.near(self.looks[-1])[i] / self.pieces.joint["budget"][i])
-                still = own if len(self.looks) > 1 and np.isfinite(own) else 0.0
+                own = float(self.near(self.readings[-1])[i] / self.pieces.joint["budget"][i])
+                still = own if len(self.readings) > 1 and np.isfinite(own) else 0.0
                 found.append(_excess(Kind.VERTEX, float(times[i]), by, still))
         return found
 
@@ -167,12 +167,14 @@ def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
     return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=2, still=still)
 
 
-def apart(looks: list[Look], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Look]]) -> Apart:
-    """The readings that measure the motion: `looks` if it fits in them, or those by `read` with wider budgets in which it does."""
-    found = Apart(looks, pieces)
+def apart(
+    readings: list[Observed], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Observed]]
+) -> Apart:
+    """The readings that measure the motion: `readings` if it fits in them, or those by `read` with wider budgets in which it does."""
+    found = Apart(readings, pieces)
     if found.fits:
         return found
-    samples = sum(look.seen.samples for look in looks)
+    samples = sum(reading.samples for reading in readings)
     length = float(np.linalg.norm(np.diff(pieces.vertex, axis=0), axis=1).mean())
     for factor in WIDER:
         within = 1.0 + 2.0 * factor * float(pieces.piece["budget"].mean()) / length
@@ -184,10 +186,12 @@ def apart(looks: list[Look], pieces: ProgramPieces, read: Callable[[ProgramPiece
     return found
 
 
-def lost_after(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, complete: bool) -> int | None:
+def lost_after(
+    readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces, complete: bool
+) -> int | None:
     """NC line of the last block that the motion could be followed along before it was lost, or ended too early; None if it ran
     them all."""
-    tallies = [look.seen.match.tally for look in looks]
+    tallies = [reading.match.tally for reading in readings]
     at = [tally[LOST_AFTER] for tally in tallies if tally[LOST_AFTER] != NOT_LOST]
     if not at and not complete:
         at = [tally[LAST] for tally in tallies]

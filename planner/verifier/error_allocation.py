@@ -55,7 +55,7 @@ from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
 from planner.verifier.pieces import ProgramPieces
 from planner.verifier.reading import AnyMotion
-from planner.verifier.stream import Look
+from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
@@ -80,7 +80,7 @@ class _Reading:
 
 def check_corners(
     trajectory: Trajectory,
-    looks: list[Look],
+    readings: list[Observed],
     pieces: ProgramPieces,
     toolpath: Toolpath,
     machine: Machine,
@@ -91,7 +91,7 @@ def check_corners(
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    looks  : the readings of the samples and, where there is a motion, of the motion between them; they know when each vertex is passed
+    readings : of the samples and, where there is a motion, of the motion between them; they know when each vertex is passed
     motion : what the samples were taken from; None to look at the samples alone
     limits : what accelerations that were derived from positions can be off by
     judged : False if the limit of acceleration is reported only
@@ -102,7 +102,7 @@ def check_corners(
     corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
     at = np.flatnonzero(pieces.joint["real"])[corner]
     vertex, eps = pieces.vertex[at], pieces.joint["budget"][at]
-    near = [look.seen.match.passed[at] for look in looks]
+    near = [each.match.passed[at] for each in readings]
     miss = near[0]["near"]
     parts = [slice(first, first + AT_ONCE) for first in range(0, max(len(corner), 1), AT_ONCE)]
     found = [_nearest_sample(trajectory, near[0]["near_time"][n], vertex[n], machine, limits) for n in parts]

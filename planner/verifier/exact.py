@@ -39,30 +39,30 @@ from planner.verifier.pieces import (
     program_pieces,
     widened,
 )
-from planner.verifier.stream import BLOCK_SAMPLES, Look, follow
+from planner.verifier.stream import BLOCK_SAMPLES, Observed, follow
 from planner.verifier.worst import Limits
 
 
 def exact_faults(
-    trajectory: Trajectory, looks: list[Look], toolpath: Toolpath, limits: Limits
+    trajectory: Trajectory, readings: list[Observed], toolpath: Toolpath, limits: Limits
 ) -> list[Fault]:
     """What is wrong with a motion where the path is to be followed exactly; empty if nothing is."""
     if not toolpath.exact.any():
         return []
     digits = float(np.linalg.norm(limits.rounding))
-    bow = float(np.linalg.norm(limits.acceleration_at_stop)) * looks[0].seen.gap_max ** 2 / 8.0
+    bow = float(np.linalg.norm(limits.acceleration_at_stop)) * readings[0].gap_max ** 2 / 8.0
     pieces = program_pieces(toolpath, halved=np.logical_or(*_beside(toolpath)))
     exact = _exact_pieces(toolpath, pieces)
     tight = widened(_tightened(pieces, exact, bow), more=digits)
-    look = follow(_positions(trajectory), tight, search=False)
-    lost_at = _lost_at(look, tight)
+    reading = follow(_positions(trajectory), tight, search=False)
+    lost_at = _lost_at(reading, tight)
     if lost_at is None:
         return []
     worst = _Worst(widened(pieces, more=digits), exact)
     wide = follow(_positions(trajectory), worst.pieces, each=worst.take, search=False)
     line, time = line_of(toolpath, pieces, lost_at), None
     where = f"followed in its order only as far as line {line}"
-    if worst.apart > PLACE_ROUNDING + digits and not wide.seen.match.tally[HELD]:
+    if worst.apart > PLACE_ROUNDING + digits and not wide.match.tally[HELD]:
         line, time = line_of(toolpath, pieces, worst.piece), worst.time
         where = f"{worst.apart:.6g} mm off at t = {time:.6g} s, line {line}"
     found = f"{where}: G61 asks for the path itself"
@@ -131,9 +131,9 @@ def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces
     return pieces._replace(piece=piece, joint=joint)
 
 
-def _lost_at(look: Look, pieces: ProgramPieces) -> int | None:
+def _lost_at(reading: Observed, pieces: ProgramPieces) -> int | None:
     """The first piece of those with these budgets that a motion is not seen to run along to its end; None if it runs along all."""
-    match = look.seen.match
+    match = reading.match
     allowed = pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
     missed = np.flatnonzero(match.passed["near"] > allowed)
     found = [max(int(i) - 1, 0) for i in missed[:1]]

@@ -73,7 +73,7 @@ def first_of(places: Sequence[Any] | Array, fault: Callable[[Any], Fault], of: s
 
 
 def placed(axes: tuple[str, ...], position: FloatArray) -> str:
-    """A place (A,) in words: "x1 y2.5"."""
+    """A `position` (A,) in words: "x1 y2.5"."""
     return " ".join(f"{letter}{value:.6g}" for letter, value in zip(axes, position, strict=True))
 
 

@@ -27,7 +27,7 @@ from planner.verifier.findings import check_of, joint_times
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
-from planner.verifier.stream import Look
+from planner.verifier.stream import Observed
 from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import COLUMN, ROUNDING_ULPS, SampleBlock, Worst, differences, less_error
@@ -50,7 +50,7 @@ class ExtruderSeen:
 
 def extruder_seen(
     trajectory: Trajectory,
-    looks: list[Look],
+    readings: list[Observed],
     toolpath: Toolpath,
     pieces: ProgramPieces,
     given: Given,
@@ -59,7 +59,7 @@ def extruder_seen(
     """What the extruder of a delivered motion did; nothing where the program has none."""
     if toolpath.extrusion is None:
         return ExtruderSeen()
-    watch = _Watch(toolpath, joint_times(looks[0], pieces), given)
+    watch = _Watch(toolpath, joint_times(readings[0], pieces), given)
     for chunk in trajectory.chunks():
         if not len(chunk.extruder):
             return ExtruderSeen(notes=("there is no column e: what the extruder does is not judged",))

@@ -49,7 +49,7 @@ from planner.motion.trajectory import Trajectory
 from planner.verifier import contour, findings
 from planner.verifier.excess import Kind
 from planner.verifier.pieces import ProgramPieces
-from planner.verifier.stream import Look, follow
+from planner.verifier.stream import Observed, follow
 from planner.verifier.verdict import AfterFilters
 
 NOTE = "after the filters"
@@ -120,16 +120,16 @@ def after_filters(
         return None
     lengths = machine.fir.time_constants
 
-    def read(pieces: ProgramPieces) -> list[Look]:
+    def read(pieces: ProgramPieces) -> list[Observed]:
         return [follow(filtered(trajectory, machine.interpolation, lengths, machine.dt), pieces, NOTE)]
 
-    looks = read(pieces)
-    apart = contour.apart(looks, pieces, read)
+    readings = read(pieces)
+    apart = contour.apart(readings, pieces, read)
     check = apart.contour_check(toolpath)
     faults = [check.fault(Kind.FILTERS, toolpath.axes)] if check.broken else []
     faults += apart.vertex_faults(toolpath)
-    faults += findings.order(looks, toolpath, pieces)[2]
-    faults = faults or findings.out_of_order(looks, toolpath, pieces)
+    faults += findings.unvisited(readings, toolpath, pieces)[2]
+    faults = faults or findings.out_of_order(readings, toolpath, pieces)
     return AfterFilters(
         contour=check,
         vertex=apart.vertex_check(toolpath),

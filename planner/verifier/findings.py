@@ -13,7 +13,7 @@ from planner.verifier import limits as rows
 from planner.verifier.excess import FAULTS_OF_A_KIND, Excess, Fault, Kind, first_of, of_check, placed
 from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
-from planner.verifier.stream import Look
+from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
 
@@ -22,7 +22,7 @@ from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
 STOP_ROUNDING = 1e-3
 
 
-def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
+def joint_times(reading: Observed, pieces: ProgramPieces) -> FloatArray:
     """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is nearest, and no earlier than the
     joint before. That of a joint that is not reached is that of the last one before that is: its own is 0.
 
@@ -30,23 +30,25 @@ def joint_times(look: Look, pieces: ProgramPieces) -> FloatArray:
     only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it delays were passed within
     it. An error of the tolerance is allowed there anyway.
     """
-    near: FloatArray = look.seen.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
+    near: FloatArray = reading.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)
 
 
-def measured(looks: list[Look], group: int) -> FloatArray:
+def measured(readings: list[Observed], group: int) -> FloatArray:
     """Largest ratio per axis (A,) of a group of rows, over all readings."""
-    axes = looks[0].seen.worst.at.shape[1]
-    ratios = [look.seen.worst.row[group * axes : (group + 1) * axes, 0] for look in looks]
+    axes = readings[0].worst.at.shape[1]
+    ratios = [reading.worst.row[group * axes : (group + 1) * axes, 0] for reading in readings]
     return np.array(ratios).max(axis=0)
 
 
-def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]) -> list[Excess]:
+def excesses(
+    readings: list[Observed], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]
+) -> list[Excess]:
     """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are of, at the worst place."""
-    found = [each for look in looks for each in look.seen.worst.over.excesses(not_limited)]
+    found = [each for reading in readings for each in reading.worst.over.excesses(not_limited)]
     shown = {each.name for each in found}
     broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
-    back = BACK * looks[0].seen.gap_max  # a difference of positions is of what lies so far behind it
+    back = BACK * readings[0].gap_max  # a difference of positions is of what lies so far behind it
     return found + [of_check(check.name, (check.time - back, check.time), check.ratio) for check in broken]
 
 
@@ -54,16 +56,16 @@ def excesses(looks: list[Look], checks: dict[str, LimitCheck], not_limited: tupl
 
 
 def limit_checks(
-    looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, not_limited: tuple[str, ...]
+    readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces, not_limited: tuple[str, ...]
 ) -> dict[str, LimitCheck]:
     """The worst of every limit that bounds anything, by name."""
     checks = {}
-    for row, (name, _) in enumerate(looks[0].seen.worst.names):
-        bounded = name == "feed" or any(np.isfinite(look.seen.worst.least[row]) for look in looks)
+    for row, (name, _) in enumerate(readings[0].worst.names):
+        bounded = name == "feed" or any(np.isfinite(reading.worst.least[row]) for reading in readings)
         if name and bounded:
-            look = max(looks, key=lambda each: each.seen.worst.row[row, 0])
-            line = line_of(toolpath, pieces, int(look.seen.worst.piece[row]))
-            checks[name] = check_of(look.seen.worst, row, toolpath, line, not_limited, look.note)
+            reading = max(readings, key=lambda each: each.worst.row[row, 0])
+            line = line_of(toolpath, pieces, int(reading.worst.piece[row]))
+            checks[name] = check_of(reading.worst, row, toolpath, line, not_limited, reading.note)
     return checks
 
 
@@ -97,66 +99,70 @@ def check_of(
 
 
 def column_faults(
-    looks: list[Look], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces
+    readings: list[Observed], limits: Limits, toolpath: Toolpath, pieces: ProgramPieces
 ) -> list[Fault]:
     """Columns that do not belong to the positions (formulas in `limits`)."""
-    acceleration = np.maximum(1.0, measured(looks, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
-    jerk = np.maximum(1.0, measured(looks, rows.JERK)) * (1.0 + RATIO_ROUNDING)
+    acceleration = np.maximum(1.0, measured(readings, rows.ACCELERATION)) * (1.0 + RATIO_ROUNDING)
+    jerk = np.maximum(1.0, measured(readings, rows.JERK)) * (1.0 + RATIO_ROUNDING)
     tests = [("velocity", "the positions", rows.GAP_BY_ACCELERATION, acceleration)]
     if limits.jerk_limited:
         tests.append(("velocity", "the positions", rows.GAP_BY_JERK, jerk))
         tests.append(("acceleration", "the velocity column", rows.GAP_OF_ACCELERATION, jerk))
     said, axes = [], len(toolpath.axes)
-    for look, (column, against, group, bound) in itertools.product(looks, tests):
-        worst = look.seen.worst
+    for reading, (column, against, group, bound) in itertools.product(readings, tests):
+        worst = reading.worst
         ratios = worst.row[group * axes : (group + 1) * axes, 0]
         for axis in np.flatnonzero(ratios > bound):
             row, ratio = group * axes + axis, float(ratios[axis])
             time, line = float(worst.time[row]), line_of(toolpath, pieces, int(worst.piece[row]))
             name = f"{column}.{toolpath.axes[axis]}"
             found = f"{name} does not agree with {against} at t = {time:.6g} s, line {line}: "
-            found += look.noted(f"{ratio:.6g} of the difference that the limits allow")
+            found += reading.noted(f"{ratio:.6g} of the difference that the limits allow")
             said.append(Fault(Kind.SAMPLES, "columns", found, ratio=ratio, time=time, line=line))
     return said
 
 
-def largest_chord_error(looks: list[Look]) -> float:
+def largest_chord_error(readings: list[Observed]) -> float:
     """Largest bow over one delivered period [mm]."""
-    worst = looks[0].seen.worst
+    worst = readings[0].worst
     return float(worst.row[rows.GROUPS * worst.at.shape[1] + rows.CHORD, 1])
 
 
 # ---- ends, order, stops -----------------------------------------------------------------------------------------------
 
 
-def end_error(looks: list[Look], toolpath: Toolpath, rounding: FloatArray) -> tuple[float, list[Fault]]:
+def end_error(
+    readings: list[Observed], toolpath: Toolpath, rounding: FloatArray
+) -> tuple[float, list[Fault]]:
     """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it.
 
     rounding : (A,) largest error of a position by its digits [mm]
     """
     worst, said = 0.0, []
     allowed = CONTOUR_ROUNDING + float(np.linalg.norm(rounding))
-    for look in looks:
+    for reading in readings:
         for name, place, wanted, time, line in (
-            ("start", look.seen.first, toolpath.start[0], look.seen.t_first, toolpath.line[0]),
-            ("end", look.seen.last, toolpath.end[-1], look.seen.t_last, toolpath.line[-1]),
+            ("start", reading.first, toolpath.start[0], reading.t_first, toolpath.line[0]),
+            ("end", reading.last, toolpath.end[-1], reading.t_last, toolpath.line[-1]),
         ):
             distance = float(np.linalg.norm(place - wanted))
             worst = max(worst, distance)
             if distance > allowed:
                 text = f"the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
-                text += look.noted(f"{allowed:.2g} mm allowed, line {line}")
+                text += reading.noted(f"{allowed:.2g} mm allowed, line {line}")
                 ratio = distance / allowed
                 said.append(Fault(Kind.ORDER, name, text, ratio=ratio, time=time, line=int(line)))
     return worst, said
 
 
-def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple[Array, bool, list[Fault]]:
+def unvisited(
+    readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces
+) -> tuple[Array, bool, list[Fault]]:
     """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it."""
     lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
-    for look in looks:
-        match = look.seen.match
+    for reading in readings:
+        match = reading.match
         end_reached = (
             match.passed["near"][-1] <= pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
         )
@@ -171,12 +177,12 @@ def order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> tuple
                 " ..." if len(lines) > FAULTS_OF_A_KIND else ""
             )
             said.append(
-                _order(look.noted(f"{len(here)} blocks are not run to their end, line {shown}"), lines[0])
+                _order(reading.noted(f"{len(here)} blocks are not run to their end, line {shown}"), lines[0])
             )
         if match.tally[HELD]:
             line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
             held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
-            said.append(_order(look.noted(held), line))
+            said.append(_order(reading.noted(held), line))
         in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
     return np.unique(pieces.piece["segment"][lost]), in_order, said
 
@@ -185,46 +191,50 @@ def _order(found: str, line: int) -> Fault:
     return Fault(Kind.ORDER, "order", found, line=line)
 
 
-def out_of_order(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
+def out_of_order(readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
     """What is wrong with a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
     been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
-    for look in looks:
-        at = int(look.seen.match.tally[STUCK_AT])
+    for reading in readings:
+        at = int(reading.match.tally[STUCK_AT])
         if at != NOT_LOST:
             line = line_of(toolpath, pieces, at - 1)
             said = f"near enough to all of the path, but not in its order, at the end of line {line}"
-            return [_order("the motion is " + look.noted(said), line)]
+            return [_order("the motion is " + reading.noted(said), line)]
     return []
 
 
-def stop_faults(looks: list[Look], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits) -> list[Fault]:
+def stop_faults(
+    readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces, limits: Limits
+) -> list[Fault]:
     """Full stops that are run through, and dwells cut short."""
     joint = np.flatnonzero(pieces.joint["real"])
     # A motion above its limits leaves a rest faster than they say: it is not called short by that, too.
-    over = np.sqrt(measured(looks, rows.ACCELERATION).max())
+    over = np.sqrt(measured(readings, rows.ACCELERATION).max())
     if limits.jerk_limited:
-        over = max(over, np.cbrt(measured(looks, rows.JERK).max()))
+        over = max(over, np.cbrt(measured(readings, rows.JERK).max()))
     hurry = 2.0 * (1.0 - (1.0 - STOP_ROUNDING) / max(over, 1.0))
     said = []
-    for look in looks:
-        match = look.seen.match
+    for reading in readings:
+        match = reading.match
         stop_ratio = match.passed["stop_ratio"][joint]
         visited = np.isfinite(stop_ratio)  # the others belong to blocks that are not run, which `order` names
         through = np.flatnonzero(
             (pieces.joint["stop"][joint] == 1) & visited & (stop_ratio > 1.0 + STOP_ROUNDING)
         )
         # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
-        unknown = RATIO_ROUNDING * toolpath.dwell + hurry * look.seen.gap_max + 2.0 * limits.time_rounding
+        unknown = RATIO_ROUNDING * toolpath.dwell + hurry * reading.gap_max + 2.0 * limits.time_rounding
         short = toolpath.dwell - match.passed["rest"][joint] > unknown
 
-        def stop_fault(i: int, look: Look = look, ratios: FloatArray = stop_ratio) -> Fault:
+        def stop_fault(i: int, reading: Observed = reading, ratios: FloatArray = stop_ratio) -> Fault:
             by = f"{ratios[i]:.6g} of the speed or distance that a sample next to it can have"
-            found = f"no full stop at {_joint_name(toolpath, i)}: {look.noted(by)}"
+            found = f"no full stop at {_joint_name(toolpath, i)}: {reading.noted(by)}"
             return Fault(Kind.STOP, "stop", found, ratio=float(ratios[i]), line=_line_before(toolpath, i))
 
-        def dwell_fault(i: int, look: Look = look, rest: FloatArray = match.passed["rest"][joint]) -> Fault:
+        def dwell_fault(
+            i: int, reading: Observed = reading, rest: FloatArray = match.passed["rest"][joint]
+        ) -> Fault:
             by = f"{rest[i]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
-            found = f"too short at {_joint_name(toolpath, i)}: {look.noted(by)}"
+            found = f"too short at {_joint_name(toolpath, i)}: {reading.noted(by)}"
             return Fault(Kind.STOP, "dwell", found, line=_line_before(toolpath, i))
 
         said += first_of(through, stop_fault, "such places")

@@ -16,11 +16,11 @@ from planner.verifier.excess import Kind
 from planner.verifier.extruder import extruder_seen
 from planner.verifier.filtered import after_filters, bow_share
 from planner.verifier.given import DERIVATIVES, WHOLE, Given
-from planner.verifier.held import thread_checks, thread_faults
 from planner.verifier.limits import NORMAL_NAME, limits_of
 from planner.verifier.pieces import program_pieces, widened
 from planner.verifier.reading import CHORDS, AnyMotion, Reader, cells_per_period
 from planner.verifier.ringing import ringing_of
+from planner.verifier.spindle_sync import thread_checks, thread_faults
 from planner.verifier.verdict import Verdict
 
 NOT_LIMITED_NAMES = (*DERIVATIVES, "feed", NORMAL_NAME)
@@ -63,16 +63,16 @@ def verify(
     cells = cells_per_period(machine.dt, float(toolpath.tolerance.min()), acceleration)
     between = (cells, True) if machine.interpolation == "cubic" else CHORDS
     reader = Reader(trajectory, motion, limits, given, dt=machine.dt, cells=cells, seed=seed, between=between)
-    looks = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
-    apart = contour.apart(looks, pieces, reader.read)
+    readings = reader.read(pieces, lambda done: None if progress is None else progress(READING * done))
+    apart = contour.apart(readings, pieces, reader.read)
     contour_error, vertex_error = apart.contour_error(), apart.vertex_error()
-    checks = findings.limit_checks(looks, toolpath, pieces, not_limited)
+    checks = findings.limit_checks(readings, toolpath, pieces, not_limited)
     contour_check = apart.contour_check(toolpath)
-    end_error, end_faults = findings.end_error(looks, toolpath, limits.rounding)
-    lost, order, order_faults = findings.order(looks, toolpath, pieces)
+    end_error, end_faults = findings.end_error(readings, toolpath, limits.rounding)
+    lost, order, order_faults = findings.unvisited(readings, toolpath, pieces)
     vertex_faults = apart.vertex_faults(toolpath)
     if not (contour_check.broken or vertex_faults or order_faults):
-        order_faults = findings.out_of_order(looks, toolpath, pieces)
+        order_faults = findings.out_of_order(readings, toolpath, pieces)
         order = not order_faults
     coarse, notes = samples.digits(trajectory, limits, given, not_limited)
     if motion is None:
@@ -80,22 +80,22 @@ def verify(
         sparse = samples.density(trajectory, machine, limits, float(toolpath.tolerance.min()), seen)
         coarse, notes = sparse[0] + coarse, sparse[1] + notes
     of_samples = coarse + reader.delivered.period_faults()
-    of_samples += reader.comparison.faults(limits, looks) if reader.comparison is not None else []
-    of_samples += findings.column_faults(looks, limits, toolpath, pieces)
-    of_samples += samples.rest_faults(reader.delivered, looks, limits)
-    threads = thread_checks(trajectory, looks, toolpath, pieces, machine)
-    extruder = extruder_seen(trajectory, looks, toolpath, pieces, given, not_limited)
+    of_samples += reader.comparison.faults(limits, readings) if reader.comparison is not None else []
+    of_samples += findings.column_faults(readings, limits, toolpath, pieces)
+    of_samples += samples.rest_faults(reader.delivered, readings, limits)
+    threads = thread_checks(trajectory, readings, toolpath, pieces, machine)
+    extruder = extruder_seen(trajectory, readings, toolpath, pieces, given, not_limited)
     checks |= extruder.checks
     notes += extruder.notes
     after = after_filters(trajectory, toolpath, machine, pieces)
     linear_error, angle_error = _both_errors(apart, toolpath)
     corners = error_allocation.check_corners(
         trajectory,
-        looks,
+        readings,
         pieces,
         toolpath,
         machine,
-        motion=motion if len(looks) > 1 else None,
+        motion=motion if len(readings) > 1 else None,
         limits=limits,
         judged="acceleration" not in not_limited,
     )
@@ -106,14 +106,14 @@ def verify(
         *([contour_check.fault(Kind.CONTOUR, toolpath.axes)] if contour_check.broken else []),
         *vertex_faults,
         *order_faults,
-        *findings.stop_faults(looks, toolpath, pieces, limits),
-        *exact_faults(trajectory, looks, toolpath, limits),
+        *findings.stop_faults(readings, toolpath, pieces, limits),
+        *exact_faults(trajectory, readings, toolpath, limits),
         *thread_faults(threads),
         *extruder.faults,
         *(after.faults if after is not None else ()),
         *error_allocation.faults(corners, toolpath.axes),
     )
-    excesses = findings.excesses(looks, checks, not_limited)
+    excesses = findings.excesses(readings, checks, not_limited)
     excesses += apart.excesses() + error_allocation.excesses(corners)
     excesses += () if after is None else after.excesses
     if progress is not None:
@@ -130,11 +130,11 @@ def verify(
         angle_error_deg=angle_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
-        chord_error_mm=bow_share(machine) / bow_share() * findings.largest_chord_error(looks),
+        chord_error_mm=bow_share(machine) / bow_share() * findings.largest_chord_error(readings),
         order=order,
         lost=tuple(int(toolpath.block[k]) for k in lost),
         lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
-        lost_after=contour.lost_after(looks, toolpath, pieces, complete=not len(lost)),
+        lost_after=contour.lost_after(readings, toolpath, pieces, complete=not len(lost)),
         threads=threads,
         faults=faults,
         ringing=ringing_of(trajectory, machine),
@@ -148,7 +148,7 @@ def _both_errors(apart: contour.Apart, toolpath: Toolpath) -> tuple[float | None
     known."""
     if not apart.fits or not set(toolpath.axes) & set(ROTARY_AXES):
         return None, None
-    linear, rotary = np.max([look.seen.apart for look in apart.looks], axis=0)
+    linear, rotary = np.max([reading.apart for reading in apart.readings], axis=0)
     return float(linear), float(np.rad2deg(rotary / toolpath.radius))
 
 

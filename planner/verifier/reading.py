@@ -33,7 +33,7 @@ from planner.verifier.given import Given
 from planner.verifier.limits import ACCELERATION
 from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verifier.samples import Delivered
-from planner.verifier.stream import Look, Watch
+from planner.verifier.stream import Observed, Watch
 from planner.verifier.worst import Limits
 
 SIDE_BY_SIDE = SIZES.read_shared
@@ -46,7 +46,7 @@ class Reader:
 
     trajectory : the delivered samples, which are looked at chunk by chunk
     motion     : what they were taken from; None to read the samples alone
-    dt, cells  : the machine's period [s], and into how many cells it is divided (`look`)
+    dt, cells  : the machine's period [s], and into how many cells it is divided (`motion_between`)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
     between    : into how many parts the machine's way from sample to sample is divided, and whether it is a cubic
@@ -75,7 +75,7 @@ class Reader:
 
     def read(
         self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
-    ) -> list[Look]:
+    ) -> list[Observed]:
         """What both show beside a path; `progress` is called with the fraction done."""
         self.delivered = self._delivered()
         parts, cubic = self._way
@@ -86,12 +86,12 @@ class Reader:
             self._take(seen, chunk)
             progress(seen.seen.samples / len(self.trajectory))
         seen.finish()
-        looks = [Look(seen.seen, "")]
+        readings = [seen.seen]
         if between is not None:
             between.finish()
         if between is not None and between.seen.samples:
-            looks.append(Look(between.seen, "between the samples"))
-        return looks
+            readings.append(between.seen)
+        return readings
 
     def _between(
         self,
@@ -100,42 +100,34 @@ class Reader:
         samples: Iterator[Trajectory],
         progress: Callable[[float], None],
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the motion is evaluated, the
-        one before is read, and the samples of the one before that, which are then compared. What is seen does not depend on the
-        number of threads."""
+        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the motion is
+        evaluated, the one before is read, and the samples beside it. What is seen does not depend on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
-        between = Watch(pieces, self.limits, parts=1)
+        between = Watch(pieces, self.limits, parts=1, note="between the samples")
         self.comparison.begin()
-        parts = look(self.motion, *self._times)
-        evaluated, taken = next(parts, None), None  # not read yet; read, but not compared yet
-        while evaluated is not None or taken is not None:
+        parts = motion_between(self.motion, *self._times)
+        part = next(parts, None)
+        while part is not None:
             found: list[Trajectory] = []
-            tasks = [
-                functools.partial(_evaluate, parts, found),
-                functools.partial(_read, between, evaluated),
-                functools.partial(self._catch_up, seen, samples, taken),
+            tasks: list[Callable[[], None]] = [
+                functools.partial(found.extend, itertools.islice(parts, 1)),
+                functools.partial(between.take, part),
+                functools.partial(self._catch_up, seen, samples, part),
             ]
             if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
                 side_by_side(tasks, lambda: None, lambda: None)
             else:
                 for task in tasks:
                     task()
-            if taken is not None:
-                self.comparison.compare(taken)
-            end = max(self.motion.end, PERIOD_ROUNDING)
-            evaluated_to, read_to, compared_to = (
-                end if part is None else float(part.t[-1])
-                for part in (next(iter(found), None), evaluated, taken)
-            )
-            begun = taken is not None or evaluated is None
-            progress(min(1.0, (evaluated_to + read_to + begun * compared_to) / (3.0 * end)))
-            evaluated, taken = next(iter(found), None), evaluated
+            self.comparison.compare(part)
+            progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            part = next(iter(found), None)
         return between
 
-    def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory | None) -> None:
+    def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory) -> None:
         """Read the samples as far as a part of the motion goes."""
-        while part is not None and seen.seen.t_last < part.t[-1]:
+        while seen.seen.t_last < part.t[-1]:
             chunk = next(samples, None)
             if chunk is None:
                 break
@@ -146,15 +138,6 @@ class Reader:
         self.delivered.take(chunk)
         if self.comparison is not None:
             self.comparison.deliver(chunk)
-
-
-def _evaluate(parts: Iterator[Trajectory], found: list[Trajectory]) -> None:
-    found.extend(itertools.islice(parts, 1))
-
-
-def _read(watch: Watch, part: Trajectory | None) -> None:
-    if part is not None:
-        watch.take(part)
 
 
 class Comparison:
@@ -201,7 +184,7 @@ class Comparison:
         left = slice(int(np.searchsorted(t, seen_t[-1])), None)
         self._sample_t, self._sample = t[left].copy(), self._sample[left].copy()
 
-    def faults(self, limits: Limits, looks: list[Look]) -> list[Fault]:
+    def faults(self, limits: Limits, readings: list[Observed]) -> list[Fault]:
         """What differs."""
         said = []
         if abs(self.first) > PERIOD_ROUNDING or abs(self.end - self.last) > PERIOD_ROUNDING:
@@ -209,7 +192,7 @@ class Comparison:
                 f"it lasts from 0 to {self.end:.9g} s, its samples from {self.first:.9g} to {self.last:.9g} s"
             )
             said.append(Fault(Kind.SAMPLES, "motion", found))
-        bound = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION)) * (1 + RATIO_ROUNDING)
+        bound = limits.per_axis[1] * np.maximum(1.0, measured(readings, ACCELERATION)) * (1 + RATIO_ROUNDING)
         for axis in np.flatnonzero(self.excess > bound):
             time = float(self.time[axis])
             found = f"not the delivered one: {self.axes[axis]} differs at t = {time:.6g} s"
@@ -250,7 +233,9 @@ def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
     )  # neighbouring times are up to two cells apart
 
 
-def look(motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD) -> Iterator[Trajectory]:
+def motion_between(
+    motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD
+) -> Iterator[Trajectory]:
     """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
     draw = np.random.default_rng(seed)
     edges = np.concatenate([[0.0], motion.t, [motion.end]])

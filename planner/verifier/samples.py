@@ -38,7 +38,7 @@ from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import ACCELERATION, JERK
 from planner.verifier.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
 from planner.verifier.stops import STILL
-from planner.verifier.stream import Look
+from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
 # A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the
@@ -182,13 +182,13 @@ def digits(
     return faults, [f"{said}: their differences know {', '.join(shares)}"]
 
 
-def rest_faults(delivered: Delivered, looks: list[Look], limits: Limits) -> list[Fault]:
+def rest_faults(delivered: Delivered, readings: list[Observed], limits: Limits) -> list[Fault]:
     """A first or last sample that is not at rest."""
     t, x, given, axes = delivered.ends["t"], delivered.ends["position"], delivered.given, limits.axes
     if len(t) < 2:
         return []
-    acceleration = limits.per_axis[1] * np.maximum(1.0, measured(looks, ACCELERATION))
-    jerk = limits.per_axis[2] * np.maximum(1.0, measured(looks, JERK))
+    acceleration = limits.per_axis[1] * np.maximum(1.0, measured(readings, ACCELERATION))
+    jerk = limits.per_axis[2] * np.maximum(1.0, measured(readings, JERK))
     said = []
     for name, at, beside, advice in (
         ("start", 0, 1, ""),

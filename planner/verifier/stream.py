@@ -34,6 +34,7 @@ COLUMNS = ("t", "position", *DERIVATIVES)
 class Observed:
     """What a motion showed.
 
+    note        : of which reading: "" for the delivered samples
     match       : the state of the matching
     worst       : of the limits, rows as in limits.py
     apart       : (2,) largest distance of linear and of rotary axes from the path [mm]
@@ -43,6 +44,7 @@ class Observed:
 
     match: Match
     worst: Worst
+    note: str = ""
     apart: FloatArray = field(default_factory=lambda: np.zeros(2))
     samples: int = 0
     first: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -51,6 +53,10 @@ class Observed:
     t_last: float = -np.inf
     gap_max: float = 0.0
 
+    def noted(self, text: str) -> str:
+        """A text with the note of this reading behind it."""
+        return ", ".join(filter(None, (text, self.note)))
+
     def take(self, t: FloatArray, position: FloatArray, skip: int) -> None:
         """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` of them were there before."""
         if not self.samples:
@@ -58,18 +64,6 @@ class Observed:
         self.last, self.t_last = position[-1].copy(), float(t[-1])
         self.samples += len(t) - skip
         self.gap_max = max(self.gap_max, float(np.diff(t[max(skip - 1, 0) :]).max(initial=0.0)))
-
-
-@dataclass(frozen=True)
-class Look:
-    """One reading of the motion: the delivered samples (note "") or the dense ones."""
-
-    seen: Observed
-    note: str
-
-    def noted(self, text: str) -> str:
-        """A text with the note of this reading behind it."""
-        return ", ".join(part for part in (text, self.note) if part)
 
 
 class Watch:
@@ -81,9 +75,17 @@ class Watch:
     seen  : what it has shown so far
     """
 
-    def __init__(self, pieces: ProgramPieces, limits: Limits, *, parts: int, cubic: bool = False):
+    def __init__(
+        self,
+        pieces: ProgramPieces,
+        limits: Limits,
+        *,
+        parts: int,
+        cubic: bool = False,
+        note: str = "",
+    ):
         axes = pieces.vertex.shape[1]
-        self.seen = Observed(match=new_match(pieces), worst=Worst(rows_of(limits), axes))
+        self.seen = Observed(match=new_match(pieces), worst=Worst(rows_of(limits), axes), note=note)
         self._pieces, self._limits, self._parts, self._cubic = pieces, limits, parts, cubic
         self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
         self._travelled = 0.0
@@ -164,7 +166,7 @@ def follow(
     *,
     each: Each | None = None,
     search: bool = True,
-) -> Look:
+) -> Observed:
     """Match a motion with a path.
 
     parts  : of its samples, in order: times (T,) [s], positions (T, A) [mm]
@@ -172,7 +174,7 @@ def follow(
     search : whether a motion that was lost is looked for on the pieces ahead; if not, it is lost for good
     """
     axes = pieces.vertex.shape[1]
-    seen = Observed(match=new_match(pieces), worst=Worst((), axes))
+    seen = Observed(match=new_match(pieces), worst=Worst((), axes), note=note)
     if not search:
         seen.match.tally[SEARCHED] = SEARCH_MAX
     free = np.full(axes, np.inf)
@@ -189,7 +191,7 @@ def follow(
             _ratios(pieces, place.piece, position, ratio)
             each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
         carried_t, carried = t[-1:], position[-1:]
-    return Look(seen, note)
+    return seen
 
 
 @kernel()

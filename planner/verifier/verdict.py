@@ -60,7 +60,7 @@ class LimitCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ThreadCheck:
-    """How far one move in step with the spindle is from where the turns of the spindle want it (held.py).
+    """How far one move in step with the spindle is from where the turns of the spindle want it (spindle_sync.py).
 
     line       : NC line
     feed       : at which the move is to be cut [mm/s]

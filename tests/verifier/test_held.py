@@ -15,7 +15,7 @@ from planner.nc.reader import parse_program
 from planner.planning.job.method import IN_STEP
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.registry import plan
-from planner.verifier.held import room_of
+from planner.verifier.spindle_sync import room_of
 
 LENGTH, FEED = 30.0, 25.0
 

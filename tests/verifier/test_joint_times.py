@@ -21,8 +21,6 @@ from planner.verifier.findings import joint_times
     ],
 )
 def test_joints_are_passed_in_order(near_time: list[float], times: list[float]) -> None:
-    look: Any = SimpleNamespace(
-        seen=SimpleNamespace(match=SimpleNamespace(passed={"near_time": np.array(near_time)}))
-    )
+    reading: Any = SimpleNamespace(match=SimpleNamespace(passed={"near_time": np.array(near_time)}))
     pieces: Any = SimpleNamespace(joint={"real": np.array([True, True, False, True])})
-    assert joint_times(look, pieces).tolist() == times
+    assert joint_times(reading, pieces).tolist() == times

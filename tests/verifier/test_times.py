@@ -6,14 +6,14 @@ from motions import JERK_FREE, Asked, Moves, changed, machine, polyline, sample
 
 from planner.motion.timing import WATCHED
 from planner.verifier import Given, verify
-from planner.verifier.reading import PER_PERIOD, PER_PIECE, cells_per_period, look
+from planner.verifier.reading import PER_PERIOD, PER_PIECE, cells_per_period, motion_between
 
 M = machine()
 LINE = polyline([(0, 0, 0), (30, 0, 0)], jerk=2e5)
 
 
 def times(motion, seed=0, dt=M.dt):
-    return np.concatenate([chunk.t for chunk in look(motion, dt, seed)])
+    return np.concatenate([chunk.t for chunk in motion_between(motion, dt, seed)])
 
 
 @pytest.mark.parametrize("fine", [0.01, 1, 7])
@@ -68,7 +68,7 @@ def test_pieces_that_last_no_time_and_a_motion_without_any_are_no_trouble():
     t = times(Standing((0.01, LINE[1]), M.dt))
     assert (np.diff(t) > 0).all()
     assert not ((t > 0.004) & (t < 0.004 + 5e-10)).any()
-    assert not list(look(Asked((0.0, LINE[1]), M.dt), M.dt, 0))
+    assert not list(motion_between(Asked((0.0, LINE[1]), M.dt), M.dt, 0))
 
 
 @pytest.mark.parametrize("seed", range(8))

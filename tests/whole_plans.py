@@ -23,8 +23,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.motion.time_law import TimeLaw, law_of_solution
-from planner.motion.timing import Motion, MotionInTime, in_chunks, inside_pieces
+from planner.motion.timing import Motion, MotionInTime, TimeLaw, in_chunks, inside_pieces, law_of_solution
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.planning.optimal.geometry import corner_shape

@@ -1,11 +1,16 @@
 """Where compiled kernels lie on the disk.
 
 A file is named by a kernel's function, the types of its arguments, the processor and the versions of Python and numba, and holds a
-digest of what the kernel computes (kernel_content.py). A kernel is compiled again, and takes the place of its file, when it or one that
+digest of what the kernel computes (kernels.py). A kernel is compiled again, and takes the place of its file, when it or one that
 it calls in another file computes something else, and not when a comment changes, a file is copied or gets a new date.
 
-A file begins with the SHA-256 of what is behind: what a disk, a crash or another program has changed is not there, and is compiled
-anew. It says nothing of who wrote the file: kernels come only from where nobody else can write (own_folders.py).
+A file begins with the SHA-256 of what is behind: what a disk, a crash or another program has changed is not there, and is
+compiled anew. It says nothing of who wrote the file: kernels, which are machine code, come only from folders where nobody else
+can put something. Such a folder is named by an absolute path, or it would be one of the folder that a program was downloaded to;
+it and its parents belong to this user, to root, or to the owner of this package, whose code runs already; and no others can write
+them, unless the owner alone can take away what is in them (the sticky bit of /tmp). Symbolic links are followed, and what they
+lie in is looked at as well. Windows has other means than owners and modes, and gives everybody a folder of their own: there the
+path alone is looked at.
 """
 
 from __future__ import annotations
@@ -13,13 +18,70 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import stat
 import sys
 import warnings
 from functools import cache
+from pathlib import Path
 from types import FunctionType
 from typing import NamedTuple
 
-from planner.base.own_folders import fault_of, fault_of_file
+
+def fault_of(folder: str) -> str:
+    """Why files of this folder must not be run, in words after its name; empty if they may. It need not be there yet."""
+    if not os.path.isabs(folder):
+        return "is not an absolute path"
+    if not hasattr(os, "geteuid"):
+        return ""
+    for start in {folder, os.path.realpath(folder)}:
+        for path in (start, *map(str, Path(start).parents)):
+            try:
+                said = fault_of_file(os.stat(path), sticky=path != start)
+            except FileNotFoundError:  # to be made, by this user
+                continue
+            except OSError as fault:
+                said = f"cannot be looked at ({fault.strerror})"
+            if said:
+                return said if path == folder else f"is in {path}, which {said}"
+    return ""
+
+
+def fault_of_file(found: os.stat_result, *, sticky: bool = False) -> str:
+    """Why what this was said of may be somebody else's, in words after its name; empty if it is not.
+
+    sticky : whether others may write a folder in which they can take away nothing that is not theirs
+    """
+    if not hasattr(os, "geteuid"):
+        return ""
+    if found.st_uid not in {0, os.geteuid(), _owner_of_package()}:
+        return f"belongs to user {found.st_uid}"
+    if sticky and found.st_mode & stat.S_ISVTX:
+        return ""
+    if found.st_mode & stat.S_IWOTH:
+        return "can be written by all users"
+    if found.st_mode & stat.S_IWGRP and found.st_gid != 0 and found.st_gid != _private_group():
+        return f"can be written by group {found.st_gid}"
+    return ""
+
+
+@cache
+def _owner_of_package() -> int:
+    return os.stat(__file__).st_uid
+
+
+@cache
+def _private_group() -> int | None:
+    """The group that is this user's alone, as many systems give everybody one of their own name; None without one."""
+    import grp
+    import pwd
+
+    try:
+        user = pwd.getpwuid(os.geteuid())
+        group = grp.getgrgid(user.pw_gid)
+    except KeyError:
+        return None
+    return user.pw_gid if group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name} else None
+
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _DIGEST = hashlib.sha256().digest_size
@@ -99,7 +161,7 @@ def folders() -> list[str]:
     """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the sources of a checkout, or
     the user's cache directory. An installation gets no further files: who removes it removes all of it.
 
-    Folders that others can write are left out (own_folders.py); one that NUMBA_CACHE_DIR names with a warning.
+    Folders that others can write are left out; one that NUMBA_CACHE_DIR names with a warning.
     """
     named = os.environ.get("NUMBA_CACHE_DIR")
     if named:

@@ -1,7 +1,7 @@
 """numba's `njit` for the planner's kernels: `from planner.base.kernels import njit` instead of `from numba import njit`.
 
 A kernel is a function that is compiled when it is first called with arguments of some types (compiling.py), and kept on the disk
-(kernel_files.py). numba is imported when the first kernel is called.
+(kernel_files.py), with a digest of what it computes. numba is imported when the first kernel is called.
 
 A kernel that cannot be kept, because no directory can be written or the disk is full, is compiled again by the next run, which takes a
 minute for all of them, and is nothing to fail for: one warning says so.
@@ -10,15 +10,68 @@ minute for all of them, and is nothing to fail for: one warning says so.
 from __future__ import annotations
 
 import functools
+import hashlib
+import inspect
 import os
 import threading
 import warnings
 from collections.abc import Callable
 from functools import cached_property
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from planner.base.kernel_content import content_of
 from planner.base.kernel_files import KernelCacheWarning
+
+_TOLD_BY_REPR = (bool, int, float, complex, str, bytes, range, type(None), type(...))
+
+
+def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
+    """A digest of what the kernel of a function computes: its bytecode, settings and the values that it uses, and those of every kernel
+    that it calls."""
+    seen = {id(function)}
+
+    def of(value: Any) -> str:
+        if isinstance(value, Kernel):
+            return value.content.hex()
+        if isinstance(value, FunctionType):
+            if id(value) in seen:  # it calls itself
+                return value.__qualname__
+            seen.add(id(value))
+            return of_function(value)
+        if isinstance(value, ModuleType):
+            return value.__name__
+        if isinstance(value, type):
+            return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
+        if isinstance(value, tuple | list):
+            return repr([of(one) for one in value])
+        if isinstance(value, frozenset | set):
+            return repr(sorted(of(one) for one in value))
+        if isinstance(value, CodeType):
+            return repr((value.co_code, [of(one) for one in value.co_consts], value.co_names))
+        if type(value).__module__ == "numpy" and hasattr(value, "tobytes"):
+            return repr((value.dtype, value.shape, value.tobytes()))
+        return repr(value) if isinstance(value, _TOLD_BY_REPR) else f"{type(value)}"
+
+    def of_function(function: FunctionType) -> str:
+        code, known = function.__code__, function.__globals__
+        names = sorted(_names_in(code))
+        uses = [(name, of(known[name])) for name in names if name in known]
+        for module in [known[name] for name in names if isinstance(known.get(name), ModuleType)]:
+            inside = [(name, vars(module)[name]) for name in names if name in vars(module)]
+            uses += [(n, of(value)) for n, value in inside if isinstance(value, (Kernel, *_TOLD_BY_REPR))]
+        enclosed = inspect.getclosurevars(function).nonlocals  # values of the functions around it
+        around = [(name, of(value)) for name, value in sorted(enclosed.items())]
+        return repr((of(code), code.co_varnames, code.co_argcount, uses, around, of(function.__defaults__)))
+
+    options = sorted((name, of(value)) for name, value in settings.items())
+    return hashlib.sha256(f"{of_function(function)} {options}".encode()).digest()
+
+
+def _names_in(code: CodeType) -> set[str]:
+    """The names of globals and attributes in a function and those inside it."""
+    inner = (part for part in code.co_consts if isinstance(part, CodeType))
+    return set(code.co_names).union(*map(_names_in, inner))
+
 
 _one_at_a_time = threading.RLock()
 
@@ -75,7 +128,7 @@ class Kernel:
     def content(self) -> bytes:
         """A digest of what it computes; itself inside, a kernel is known by its name."""
         vars(self)["content"] = self.py_func.__qualname__.encode()
-        return content_of(self.py_func, self._settings, _content)
+        return content_of(self.py_func, self._settings)
 
     @cached_property
     def whole(self) -> Any:
@@ -101,10 +154,6 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """numba's type of it, when another kernel calls it."""
         return self.part._numba_type_
-
-
-def _content(value: Any) -> bytes | None:
-    return value.content if isinstance(value, Kernel) else None
 
 
 _warned = False

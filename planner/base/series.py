@@ -87,10 +87,7 @@ def _power(base: Series, n: float) -> Series:
 def _angle(y: FloatArray, x: FloatArray) -> FloatArray:
     """arctan2(y, x), whose derivative is (x y' - y x')/(x^2 + y^2)."""
     zero = np.zeros_like(x[:1])
-    dx, dy = (
-        np.vstack([x[1:], zero]),
-        np.vstack([y[1:], zero]),
-    )  # good to second order, which is what is needed
+    dx, dy = np.vstack([x[1:], zero]), np.vstack([y[1:], zero])  # good to second order, which is needed
     rate = _quotient(_product(x, dy) - _product(y, dx), _product(x, x) + _product(y, y))
     return np.vstack([np.arctan2(y[0], x[0])[None], rate[:3]])
 
@@ -114,6 +111,10 @@ def _arctan(x: FloatArray) -> tuple[FloatArray, ...]:
     return np.arctan(x), d, -2.0 * x * d**2, (6.0 * x * x - 2.0) * d**3
 
 
+def _log(x: FloatArray) -> tuple[FloatArray, ...]:
+    return np.log(x), 1.0 / x, -1.0 / x**2, 2.0 / x**3
+
+
 def _tan(x: FloatArray) -> tuple[FloatArray, ...]:
     t = np.tan(x)
     d = 1.0 + t * t
@@ -125,9 +126,7 @@ OPERATIONS: dict[np.ufunc, Callable[..., FloatArray]] = {
     np.subtract: lambda a, b: a - b,
     np.multiply: _product,
     np.divide: _quotient,
-    np.power: lambda a, b: _chain(
-        _product(b, _chain(a, FUNCTIONS[np.log](a[0]))), (np.power(a[0], b[0]),) * 4
-    ),
+    np.power: lambda a, b: _chain(_product(b, _chain(a, _log(a[0]))), (np.power(a[0], b[0]),) * 4),
     np.negative: lambda a: -a,
     np.positive: lambda a: a,
     np.arctan2: _angle,
@@ -139,7 +138,7 @@ FUNCTIONS: dict[np.ufunc, Callable[[FloatArray], tuple[FloatArray, ...]]] = {
     np.reciprocal: lambda x: _power_derivatives(x, -1.0),
     np.absolute: lambda x: (np.abs(x), np.sign(x), 0.0 * x, 0.0 * x),
     np.exp: lambda x: (np.exp(x),) * 4,
-    np.log: lambda x: (np.log(x), 1.0 / x, -1.0 / x**2, 2.0 / x**3),
+    np.log: _log,
     np.sin: lambda x: (np.sin(x), np.cos(x), -np.sin(x), -np.cos(x)),
     np.cos: lambda x: (np.cos(x), -np.sin(x), -np.cos(x), np.sin(x)),
     np.tan: _tan,

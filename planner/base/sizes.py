@@ -69,8 +69,7 @@ class Sizes:
     stops_at_once: int = _size(PARTS, 500, 2)  # 5 MB an array
     prices_at_once: int = _size(PARTS, 100_000, 17)  # points of the grid: half a kilobyte each
 
-    # Splines. On six random jobs windows of 120 and 480 end up to 2e-4 and 5e-4 later than those of 240; overlaps of 15 and 60 change
-    # them by -2e-4 to 1e-3 and by -7e-4 to 3e-3. Ranges cost a window more for each of them, 6 % of the work.
+    # Splines. Ranges cost a window more for each of them.
     relaxed_window: int = _size(ROUTES, 240, 120)  # control points relaxed at a time ...
     relaxed_overlap: int = _size(ROUTES, 30, 30)  # ... and of them again with the next window
     relaxed_range: int = _size(ROUTES, 4_000, 140)  # runs of fewer than two are relaxed as one
@@ -81,7 +80,7 @@ class Sizes:
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time
-    # in longer parts both ends are solved; the joining window costs 3 % in them, and needs six
+    # in longer parts both ends are solved; the joining window needs six
     solved_windows: int = _size(ROUTES, 10, 7)
     # steps of a window, which is half as long at least: joins that are searched once more must not touch one another
     searched_window: int = _size(ROUTES, 1_500, 200)

@@ -1,10 +1,20 @@
-"""The error budget of a corner: what chords and filters cost of the tolerance, and what normal acceleration is left (eq. 18 to 20).
+"""The error budget of a corner: how much of it the path may use, and how fast that lets the corner be taken (paper 002, eq. 18-20).
+
+The budget is shared by the rounding, the chord error of the interpolation period and, where FIR filters follow, their error; with
+X = kappa feed^2 the normal acceleration at the apex (docs/papers.md D, three sources):
+
+    eps_ap + c X <= eps,     c = dt^2/8 + sum_i T_i^2/24,     X <= A.
 
 A is the machine's normal acceleration (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes give in
-the direction n of the path's normal: sum_k a_k |n_k|, the support function of the box of axis accelerations. With eps_ap of eps used by
-the rounding, and c X by chords and filters (docs/papers.md D),
+the direction n of the path's normal: sum_k a_k |n_k|, the support function of the box of axis accelerations. With it the closed-form
+speed is a true upper bound: no motion within the axis limits passes the apex faster, whatever it does along the path.
 
-    c = dt^2/8 + sum_i T_i^2/24,     X = min(A, (eps - eps_ap)/c)                                    eq. (18), (20)
+The corner speed sqrt(X eps_ap / K), K = eps_ap kappa_max, grows with X and with eps_ap, so the constraint is tight; X (eps - c X)
+is a parabola with its top at eps/(2c), hence
+
+    X* = min(A, eps / (2c)),   eps_ap = eps - c X*                                   (eq. (20); independent of the angle)
+
+and where a short leg keeps the corner from using eps_ap, X = min(A, (eps - eps_ap)/c).
 """
 
 from __future__ import annotations
@@ -13,6 +23,19 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.machine import Machine
+
+
+def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
+    """How much of the tolerance the rounding may use, eq. (20).
+
+    tol          : (n,) tolerance eps [mm]
+    acceleration : (n,) largest normal acceleration A [mm/s2]
+    rate         : c, from `error_rate` [s2]
+
+    Returns eps_ap (n,) [mm].
+    """
+    return tol - rate * np.minimum(acceleration, tol / (2.0 * rate))
+
 
 NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
 

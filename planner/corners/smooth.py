@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.allocation import allocate
 from planner.corners.blend import BEND_MAX, Shape, error_from_middle, middle_from_tolerance
-from planner.corners.budget import error_rate, normal_at_corners, normal_within_budget
+from planner.corners.budget import allocate, error_rate, normal_at_corners, normal_within_budget
 from planner.corners.sharing import share_legs
 from planner.geometry.legs import Legs, legs_of
 from planner.geometry.spline import Spline, no_spline

@@ -334,9 +334,7 @@ def _joints(
     if not machine.blend_rapids:
         rapid = program.kind[block] == Kind.RAPID
         joint[1:-1][rapid[:-1] != rapid[1:]] = Joint.STOP
-    at = np.searchsorted(
-        block, found.block
-    )  # the joint before the first segment that comes after the standstill
+    at = np.searchsorted(block, found.block)  # the joint before the first segment behind the standstill
     joint[at] = Joint.STOP
     dwell = np.zeros(len(block) + 1)
     np.add.at(dwell, at, found.lasts)

@@ -33,7 +33,7 @@ BEND_MIN = 1e-9
 # Control points off their chord by less than this fraction of it are on it [-]: the rounding of coordinates.
 STRAIGHT = 1e-12
 NOWHERE = 1e-9  # a chord shorter than this is none [mm]: the rounding of coordinates around 1e3 mm
-# What is not even after so many halvings becomes a chord if it is near enough to it. The seven curves of papers need four at most.
+# What is not even after so many halvings becomes a chord if it is near enough to it.
 HALVINGS_EVEN, HALVINGS_MOST = 8, 60
 CHORD_SHARE = 0.01  # of the tolerance [-]
 

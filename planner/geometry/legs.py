@@ -4,8 +4,7 @@ A leg is one arc, one segment of a curve, or all collinear lines that follow one
 CAM system cut a straight line into blocks must not change the motion: a corner may reach back over several short blocks of the same
 line.
 
-The kernels see one numpy record per leg (`leg_dtype`): a single array argument costs numba nothing to pass on, whereas a tuple
-of ten arrays costs ten reference counts per call, measured at 0.25 us against 0.01 us.
+The kernels see one numpy record per leg (`leg_dtype`): a tuple of ten arrays would cost ten reference counts per call.
 """
 
 from __future__ import annotations

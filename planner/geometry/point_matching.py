@@ -34,15 +34,10 @@ MISSED = 2.0
 # Price of a vertex missed by more than its budget [budget^2]: more than that of all points around it. Small moves inside the tolerance
 # would else be entered before their first vertex is reached, at their own, higher feed.
 TOO_FAR = 1e6
-FIRST_WIDER, WIDEST = (
-    1.05,
-    100.0,
-)  # budgets are widened by the first of these, then doubled, up to the second [-]
+FIRST_WIDER, WIDEST = 1.05, 100.0  # budgets are widened by the first, then doubled, up to the second [-]
 ANYWHERE = 1e12  # the same where no point is to be lost
-ENTERED, THROUGH = (
-    1,
-    2,
-)  # bits of a mark: best entered on the chord before its point; best entered when left on the same chord
+# Bits of a mark: best entered on the chord before its point; best entered when left on the same chord.
+ENTERED, THROUGH = 1, 2
 
 
 class PathChain(NamedTuple):

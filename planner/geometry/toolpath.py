@@ -191,9 +191,8 @@ class Toolpath:
     def part(self, kept: Array) -> Toolpath:
         """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of it: where some are left out,
         the path jumps at a full stop."""
-        joints = np.append(
-            True, kept
-        )  # with the joint behind each segment; the first is a full stop, like all that begin a part
+        # with the joint behind each segment; the first is a full stop, like all that begin a part
+        joints = np.append(True, kept)
         columns: dict[str, Any] = {}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)

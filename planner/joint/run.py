@@ -5,7 +5,7 @@ A leg consists of collinear lines with one feed and one budget, or is an arc. Ov
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
 with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
-chord error of the interpolation period and for the filters that follow (corners/allocation.py, eq. (18)-(20)), with the largest
+chord error of the interpolation period and for the filters that follow (corners/budget.py, eq. (18)-(20)), with the largest
 normal acceleration that the axes can give in any direction.
 
 A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that meets P(x(t)) at both ends
@@ -28,8 +28,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
-from planner.corners.allocation import allocate
-from planner.corners.budget import error_rate, normal_anywhere, normal_within_budget
+from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
 from planner.feedrate.constraints.limits import Limits
 from planner.geometry.build import path_per_length
 from planner.geometry.legs import legs_of

@@ -29,10 +29,8 @@ from planner.motion.trajectory import Trajectory
 QUADRATURE_ROUNDING = 1e-9
 # Smallest step of the quadrature [fraction of the piece]; near a kink it is worth its square of the piece's length.
 SMALLEST_STEP = 2.0**-30
-GAUSS_X, GAUSS_W = (
-    (1.0 + np.polynomial.legendre.leggauss(5)[0]) / 2.0,
-    np.polynomial.legendre.leggauss(5)[1] / 2.0,
-)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
 
 
 class _Pieces(NamedTuple):

@@ -25,9 +25,8 @@ from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory
 from planner.motion.vertex_times import passing_times_of
 
-AT_JOINT = (
-    1e-9  # a motion this near to the length at which it rests is at rest there [mm + share of the length]
-)
+# A motion this near to the length at which it rests is at rest there [mm + share of the length].
+AT_JOINT = 1e-9
 
 
 class _Passed(NamedTuple):

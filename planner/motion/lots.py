@@ -108,9 +108,8 @@ def _lengths(lot):
             c = given[k]
             for o in range(LANES):
                 tau = lane[TAU + o]
-                high = 3.0 * c[3 * LANES + o] + tau * (
-                    4.0 * c[4 * LANES + o] + tau * (5.0 * c[5 * LANES + o])
-                )
+                high = 4.0 * c[4 * LANES + o] + tau * (5.0 * c[5 * LANES + o])
+                high = 3.0 * c[3 * LANES + o] + tau * high
                 rate = c[LANES + o] + tau * (2.0 * c[2 * LANES + o] + tau * high)
                 lane[SQUARE + o] += rate * rate
         for o in range(LANES):
@@ -161,9 +160,8 @@ def _in_time(lot):
             second = (bend - m[FIRST + o] * lane[SECOND + o]) * (per * per)
             lane[TOTAL + o] += second * bend
             along = 3.0 * lane[SECOND + o] * second
-            m[TWIST + o] = (m[TWIST + o] - m[FIRST + o] * lane[THIRD + o]) * (per * per * per) - along * (
-                per * per
-            )
+            twist = (m[TWIST + o] - m[FIRST + o] * lane[THIRD + o]) * (per * per * per)
+            m[TWIST + o] = twist - along * (per * per)
             m[BEND + o] = second
     for k in range(axes):
         m = lot.made[k]

@@ -1,8 +1,7 @@
 """Trajectories of long motions: samples that are evaluated when they are asked for.
 
-A sample takes 132 bytes with three axes, an hour at 1 ms 475 MB, a motion by its grid a quarter of a kilobyte per point. What goes
-through all samples (the verifier, the files) takes them chunk by chunk (`Trajectory.chunks`); the same chunk gives the same bytes
-each time. Whoever asks for a whole column gets all of them, kept from then on.
+What goes through all samples (the verifier, the files) takes them chunk by chunk (`Trajectory.chunks`); the same chunk gives the same
+bytes each time. Whoever asks for a whole column gets all of them, kept from then on.
 """
 
 from __future__ import annotations
@@ -37,14 +36,8 @@ class TrajectoryOnDemand(Trajectory):
 
     def __init__(self, motion: _AnyMotion, dt: float, count: int, places: _Places | None = None):
         first = motion.at(np.zeros(1), dt)
-        values = {
-            "axes": first.axes,
-            "radius": first.radius,
-            "dt": dt,
-            "_motion": motion,
-            "_count": count,
-            "_places": places,
-        }
+        values: dict[str, Any] = {"axes": first.axes, "radius": first.radius, "dt": dt}
+        values |= {"_motion": motion, "_count": count, "_places": places}
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -91,9 +84,8 @@ class TrajectoryOnDemand(Trajectory):
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
         k = np.clip(np.ceil(np.asarray(times) / self.dt), 0, len(self) - 1).astype(np.int64)
-        k = np.where(
-            (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times), k - 1, k
-        )  # the quotient is rounded
+        early = (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times)  # the quotient is rounded
+        k = np.where(early, k - 1, k)
         found: Array = np.where(self._times(k) < times, k + 1, k)
         return found
 

@@ -170,9 +170,11 @@ def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
     grid : P points over so many axes; C = `COEFFICIENTS`
     """
     found = np.zeros((len(grid.s), COEFFICIENTS))
-    in_parts(
-        len(found), POINTS_SHARED, lambda first, beyond: _inverses(table, grid, axes, first, beyond, found)
-    )
+
+    def work(first: int, beyond: int) -> None:
+        _inverses(table, grid, axes, first, beyond, found)
+
+    in_parts(len(found), POINTS_SHARED, work)
     return found
 
 
@@ -205,11 +207,9 @@ def _invert(table, on, room, out, c):
     c[0] = max(abs(off[0]), abs(off[1]), abs(off[2]))
     if not c[0] > LENGTH_ROUNDING or c[0] == np.inf:
         return
-    less, same, more = (
-        -off[0] * _slope_at(c, 0.25) / _hump(0.25),
-        -off[1] * _slope_at(c, 0.5) / _hump(0.5),
-        -off[2] * _slope_at(c, 0.75) / _hump(0.75),
-    )
+    less = -off[0] * _slope_at(c, 0.25) / _hump(0.25)
+    same = -off[1] * _slope_at(c, 0.5) / _hump(0.5)
+    more = -off[2] * _slope_at(c, 0.75) / _hump(0.75)
     c[8], c[9], c[10] = same, 2.0 * (more - less), 8.0 * (more - 2.0 * same + less)
     off = _off(table, on, room, out, c, (0.375, 0.625, 0.5))
     left = max(abs(off[0]), abs(off[1]), abs(off[2]))

@@ -232,6 +232,4 @@ class Slowed:
 
 def times_of_pieces(motion: MotionInTime) -> tuple[FloatArray, float]:
     """(L,) when the pieces of a motion begin, or of the one that is slowed, and when it ends [s]."""
-    return (
-        (motion.run_at(motion.motion.t), motion.end) if isinstance(motion, Slowed) else (motion.t, motion.end)
-    )
+    return (motion.run_at(motion.motion.t) if isinstance(motion, Slowed) else motion.t), motion.end

@@ -57,10 +57,8 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     times = np.empty(len(toolpath) + 1)
     for first, last, leaves, arrives in zip(stop[:-1], stop[1:], end[:-1], begin[1:], strict=True):
         run = slice(leaves, arrives + 1)
-        seen, wanted = (
-            _Seen(motion.position[run], motion.s[run], motion.t[run]),
-            _wanted(toolpath, first, last),
-        )
+        seen = _Seen(motion.position[run], motion.s[run], motion.t[run])
+        wanted = _wanted(toolpath, first, last)
         of_run = times[first : last + 1]
         of_run[0] = seen.t[0]
         _pass(seen, wanted, of_run, 1, 0.0, True)

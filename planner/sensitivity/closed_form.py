@@ -2,7 +2,7 @@
 
     v = sqrt(X / kappa_max),    X = min(A, (eps - eps_ap) / (dt^2/8 + sum T^2/24))
 
-with A as in corners/allocation.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
+with A as in corners/budget.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
 the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
 (docs/papers.md C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners
 and for all

@@ -104,9 +104,7 @@ def certify(corridor, knots, site_place, control):
         tau, step = (u - breaks[i]) / h, (following - u) / h
         chord = point[v], along[v], length
         error = _part_error(basis, control, i, tau, tau + step, chord, bezier)
-        if (
-            error > tol_chord[v]
-        ):  # the points of smaller parts are nearer to the curve, by the square of their size
+        if error > tol_chord[v]:  # smaller parts have points nearer to the curve, by the square of their size
             error = 0.0
             for part in range(CUT):
                 a, b = tau + step * part / CUT, tau + step * (part + 1) / CUT

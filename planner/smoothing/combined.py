@@ -38,16 +38,22 @@ from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
-from planner.smoothing.combined_objective import gain_of_step, objective_of_window
-from planner.smoothing.combined_places import Places, places_of_run
+from planner.smoothing.combined_places import Places, gain_of_step, objective_of_window, places_of_run
 from planner.smoothing.combined_rows import rows_of_window
 from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
 from planner.smoothing.relax import shares
 from planner.smoothing.runs import SplineRuns
-from planner.smoothing.sites import Sites, with_radius
-from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
+from planner.smoothing.sites import (
+    Sites,
+    Splines,
+    control_first,
+    run_control,
+    run_knots,
+    run_sites,
+    with_radius,
+)
 from planner.smoothing.windows import TIGHTENED, next_window
 
 WINDOW = SIZES.improved_window
@@ -55,9 +61,8 @@ OVERLAP = SIZES.improved_overlap
 RANGE = SIZES.improved_range
 SPANS_SHARED = SIZES.improved_shared
 ITERATIONS = 40  # per window; 10 to 25 are the rule
-HELD = (
-    3  # control points of theta that stay 0 where a run ends on a straight leg: speed and acceleration go on
-)
+# Control points of theta that stay 0 where a run ends on a straight leg: speed and acceleration go on.
+HELD = 3
 
 
 class MotionLimits(NamedTuple):
@@ -105,10 +110,8 @@ class CombinedRun(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _sites_of_window(sites, lo, hi, spans):
     """The sites that the control points lo .. hi - 1 move, their spans counted from the control point lo - DEGREE, or 0."""
-    a, b = (
-        first_not_before(sites.span, max(lo - DEGREE, 0)),
-        first_not_before(sites.span, min(hi, spans)),
-    )
+    a = first_not_before(sites.span, max(lo - DEGREE, 0))
+    b = first_not_before(sites.span, min(hi, spans))
     return Sites(
         sites.span[a:b] - max(lo - DEGREE, 0), sites.place[a:b], sites.weights[a:b], sites.target[a:b], sites.along[a:b],
         sites.slide[a:b], sites.radius[a:b],

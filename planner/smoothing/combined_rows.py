@@ -27,8 +27,7 @@ from planner.smoothing.combined_matrix import (
 )
 
 # Rows of which the motion uses less than this share are left out [-]: velocities of the axes, accelerations, jerks, and the last two of
-# `Places.bound`. All rows cost three times as much, and eight rounds on the bracket end at the same time to 1e-4; without the jerks
-# below 0.4 they end 1e-3 later.
+# `Places.bound`. Others do not become active in a step.
 NEAR = np.array([0.8, 0.6, 0.2, 0.8])
 LEAST_SLACK = 0.05  # of a start [-]
 
@@ -102,11 +101,8 @@ def _put_row(places, p, kind, factor):
     elif m == 1:
         factor[T0], factor[T1] = -2.0 * jet[1, k] / limit, -jet[0, k] / limit
     else:
-        factor[T0], factor[T1], factor[T2] = (
-            -3.0 * jet[2, k] / limit,
-            -3.0 * jet[1, k] / limit,
-            -jet[0, k] / limit,
-        )
+        factor[T0], factor[T1] = -3.0 * jet[2, k] / limit, -3.0 * jet[1, k] / limit
+        factor[T2] = -jet[0, k] / limit
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -180,7 +176,7 @@ def first_state(rows, y, product):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def weigh(rows, state, lengths, balls, band, residual, push):
-    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (combined_sites.py) to the
+    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (combined_solver.py) to the
     matrix `band`, and the rows to `residual` (n, A+1), what multipliers pull, and to `push`, what drives a step without a barrier.
     Returns sum(s z) and the most that is missing."""
     first, span, basis, along, kinds_of, factor, theta, products = rows

@@ -18,9 +18,8 @@ from planner.geometry.legs import leg_point
 from planner.smoothing.runs import SplineRuns
 
 SAGITTA = 0.01  # of chords on arcs [share of the tolerance], which the corridor is narrower there
-APART = (
-    1e-3  # a change of the feed so near to a run's end is there [share of the tolerance]: no chord is shorter
-)
+# A change of the feed so near to a run's end is there [share of the tolerance]: no chord is shorter.
+APART = 1e-3
 
 
 class Corridor(NamedTuple):

@@ -19,7 +19,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER, derivatives
-from planner.smoothing.splines import control_first, run_control, run_knots
+from planner.smoothing.sites import control_first, run_control, run_knots
 
 # Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, which are of degree 4.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)

@@ -30,18 +30,23 @@ from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.initial import greville_control
 from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
 from planner.smoothing.runs import SplineRuns
-from planner.smoothing.sites import Sites, with_radius
-from planner.smoothing.splines import Splines, control_first, run_control, run_knots, run_sites
+from planner.smoothing.sites import (
+    Sites,
+    Splines,
+    control_first,
+    run_control,
+    run_knots,
+    run_sites,
+    with_radius,
+)
 from planner.smoothing.windows import AGAIN, WINDOW, next_window, tighten_window, window_of
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
-# An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to rounding, which then
-# decides what the spline is, and how long the plan takes, by 17 % on one of two lines. With 1e-6 a job of 99 still depends on it.
+# An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to rounding, which would then
+# decide what the spline is.
 STRAIGHT = 1e-4
-# Of the tolerance that sites may use at first [-]. With 0.99 six random jobs end 2e-4 to 2e-3 slower after three rounds of
-# reshaping; with 0.9999 one ends 3e-3 slower, and the others change by at most 2.4e-4.
-USED = 0.9995
+USED = 0.9995  # of the tolerance that sites may use at first [-]: the relaxation starts strictly inside of it
 # Of tightening, in windows around the sites that need it; 2 are the rule. A run that needs more gets no spline.
 ROUNDS = 20
 SPANS_SHARED = SIZES.relaxed_shared

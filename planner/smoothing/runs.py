@@ -16,9 +16,6 @@ from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.smoothing.basis import DEGREE
 
-# Half and twice as large (END_SPANS 3 and 9, BRAKING_WAYS 1 and 2, MIDDLE 0.1 and 1.5), each by itself, these change the times of six
-# random jobs after three rounds of reshaping by at most 2.3e-4 (END_SPANS), 1.4e-4 (BRAKING_WAYS), 1.6e-3 (LONGEST_WAY) and 2.5e-4
-# (LONGEST_TOLERANCE); LONGEST_DELAY and MIDDLE change none of these six.
 BRAKING_WAYS = 1.5  # of a straight leg that belong to the run beside it ...
 END_SPANS = 6.0  # ... and so many of the longest spans, five of which end on the straight line
 MIDDLE = 0.5  # of that at least is left of a leg in the middle, or the runs on both sides are one [-]

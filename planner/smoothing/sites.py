@@ -1,4 +1,4 @@
-"""Constraint points of a spline ("sites"): the places at which its distance from the programmed path is bounded.
+"""The splines of a path, one for each run, and their sites: the places at which the distance from the path is bounded.
 
 Sites are all vertices of the corridor, each with a ball around it, and between distant ones places on the chords `SITE_SPACING` of a
 span apart, around which the spline may slide along the chord. Site j bounds the weighted distance
@@ -17,10 +17,57 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.basis import DEGREE, ORDER
+from planner.smoothing.basis import DEGREE, ORDER, knots_at
 
-# These constants decide how much the certificate has to ask for later. Twice as large, all of them together with SAGITTA and APART of
-# corridor.py, and half of PARTS of certificate.py, they change the times of the eight jobs of tests/golden by -6e-4 to 4e-4.
+
+class Splines(NamedTuple):
+    """All runs one after the other; run q holds the breaks span_first[q] + q : span_first[q+1] + q + 1, the control points
+    span_first[q] + 5 q : span_first[q+1] + 5 (q+1), and the sites site_first[q] : site_first[q+1]."""
+
+    span_first: Array  # (Q+1,)
+    breaks: FloatArray  # (S+Q,) along the legs [mm]
+    control: FloatArray  # (n, A) [mm]
+    site_first: Array  # (Q+1,)
+    sites: Sites  # (J, ..), their radii the whole tolerance
+    outside: Array  # (S,) spans with a site that the first spline passes too far away
+    fits: Array  # (Q,) True if it is inside the corridor everywhere
+
+
+@njit(cache=True, error_model="numpy")
+def run_knots(splines, q):
+    """The knots of run q."""
+    return knots_at(splines.breaks[splines.span_first[q] + q : splines.span_first[q + 1] + q + 1])
+
+
+@njit(cache=True, error_model="numpy")
+def control_first(splines, q):
+    """Number of the first control point of run q."""
+    return splines.span_first[q] + DEGREE * q
+
+
+@njit(cache=True, error_model="numpy")
+def run_control(splines, q):
+    """The control points of run q."""
+    return splines.control[control_first(splines, q) : control_first(splines, q + 1)]
+
+
+@njit(cache=True, error_model="numpy")
+def run_sites(splines, q):
+    """The sites of run q."""
+    a, b = splines.site_first[q], splines.site_first[q + 1]
+    sites = splines.sites
+    return Sites(
+        sites.span[a:b],
+        sites.place[a:b],
+        sites.weights[a:b],
+        sites.target[a:b],
+        sites.along[a:b],
+        sites.slide[a:b],
+        sites.radius[a:b],
+    )
+
+
+# These constants decide how much the certificate has to ask for later.
 SITE_SPACING = 0.5  # of sites on chords [spans]
 SITE_EDGE = 0.1  # no site on a chord so close to its ends, which are sites themselves [spans]
 # Vertices nearer than this to the site before are left to the certificate [spans] ...

@@ -9,8 +9,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.corners.allocation import allocate
-from planner.corners.budget import error_rate
+from planner.corners.budget import allocate, error_rate
 from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
@@ -21,7 +20,7 @@ from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
-from planner.smoothing.splines import Splines, run_control, run_knots
+from planner.smoothing.sites import Splines, run_control, run_knots
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
@@ -119,11 +118,9 @@ def _same_runs(runs: SplineRuns, known: SplineShape) -> _Same:
 
 def cusps(splines: Splines) -> Array:
     """(Q,) True for runs with a cusp (`cusp_spans`)."""
-    return (
-        np.logical_or.reduceat(cusp_spans(splines), splines.span_first[:-1])
-        if len(splines.fits)
-        else splines.fits
-    )
+    if not len(splines.fits):
+        return splines.fits
+    return np.asarray(np.logical_or.reduceat(cusp_spans(splines), splines.span_first[:-1]))
 
 
 def cusp_spans(splines: Splines) -> Array:
@@ -197,10 +194,8 @@ def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Ar
     first = np.clip(np.minimum(first, last), runs.joint_first[run], runs.joint_last[run])
     last = np.clip(last, first, runs.joint_last[run])
     if fence:
-        before, after = (
-            np.maximum(first - 1, runs.joint_first[run]),
-            np.minimum(last + 1, runs.joint_last[run]),
-        )
+        before = np.maximum(first - 1, runs.joint_first[run])
+        after = np.minimum(last + 1, runs.joint_last[run])
         return path.legs.first[np.unique(np.concatenate([before, after]))]
     theta = path.theta
     most = [a + int(np.argmax(theta[a : b + 1])) for a, b in zip(first, last, strict=True)]

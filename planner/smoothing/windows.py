@@ -15,7 +15,6 @@ from planner.smoothing.sites import site_distance
 TIGHTENED = 0.998  # a tightened site aims at this share of the tolerance [-]: below 1, or rounds would creep towards it
 AGAIN = 0.9  # a tightened window starts from so far between the first spline and its result [-] ...
 WIDER = 1.002  # ... with radii at least so much wider than it needs [-]: strictly inside, as the interior-point method needs it
-# On those six jobs FIRST_GAP = 10 and 100 change the time by up to 2e-3 and 3e-5.
 WINDOW = SIZES.relaxed_window
 OVERLAP = SIZES.relaxed_overlap
 

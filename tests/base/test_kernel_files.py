@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.base import kernel_files, own_folders
-from planner.base.kernel_files import KernelCacheWarning, KernelFile, folders, read, write
-from planner.base.own_folders import fault_of
+from planner.base import kernel_files
+from planner.base.kernel_files import KernelCacheWarning, KernelFile, fault_of, folders, read, write
 
 KERNEL = bytes(range(256)) * 8
 FILE = KernelFile("module.kernel-0123.kernel", bytes(32))
@@ -212,7 +211,7 @@ class TestWhoCanWrite:
         for folder in (self.leaf, self.top):
             os.chown(folder, 1234, 1234)
             assert "belongs to user 1234" in fault_of(str(self.leaf))
-            monkeypatch.setattr(own_folders.os, "geteuid", lambda: 1234)
+            monkeypatch.setattr(kernel_files.os, "geteuid", lambda: 1234)
             assert fault_of(str(self.leaf)) == ""
             monkeypatch.undo()
             os.chown(folder, 0, 0)

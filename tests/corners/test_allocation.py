@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from whole_plans import smooth_path, solve
 
 from benchmarks.jobs import problems
-from planner.corners.allocation import (
+from planner.corners.bezier import BezierCorner
+from planner.corners.budget import (
     allocate,
     error_rate,
+    normal_of_axes,
+    normal_within_budget,
 )
-from planner.corners.bezier import BezierCorner
-from planner.corners.budget import normal_of_axes, normal_within_budget
 from planner.machine import Fir
 from planner.sensitivity.closed_form import corner_table
 

@@ -20,8 +20,7 @@ from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status, active_names, constraint_ratios
 from planner.machine import Machine
-from planner.motion.time_law import law_of_solution
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, law_of_solution
 from planner.nc.program import Program
 
 SOLVERS = ("ipopt", "fatrop")

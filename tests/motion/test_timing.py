@@ -16,8 +16,7 @@ from benchmarks.jobs import problems
 from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.motion.time_law import law_of_moves
-from planner.motion.timing import Motion, sample_motion
+from planner.motion.timing import Motion, law_of_moves, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job

@@ -22,8 +22,7 @@ from planner.smoothing import combined
 from planner.smoothing.basis import knots_at
 from planner.smoothing.combined_places import places_of_run
 from planner.smoothing.combined_rows import first_state, predict, rows_of_window, weigh
-from planner.smoothing.combined_sites import balls_of
-from planner.smoothing.combined_solver import CombinedProblem, improve_window
+from planner.smoothing.combined_solver import CombinedProblem, balls_of, improve_window
 from planner.smoothing.forms import SplineMotion
 from planner.smoothing.sites import Sites
 from planner.smoothing.spline_path import spline_shape, with_spline

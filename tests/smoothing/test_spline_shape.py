@@ -16,8 +16,8 @@ from planner.smoothing import initial as initial_module
 from planner.smoothing import relax as relax_module
 from planner.smoothing.basis import DEGREE, derivatives, knots_at
 from planner.smoothing.forms import third_derivative_energy
+from planner.smoothing.sites import run_control, run_knots
 from planner.smoothing.spline_path import CUSP, spline_shape, turns_little
-from planner.smoothing.splines import run_control, run_knots
 
 MACHINE = problems.machine()
 

@@ -25,7 +25,7 @@ from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 
 # Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their turning from one to the next
-# [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4. Motions of ten jobs hardly depend on it (0.2: 0.004 % slower).
+# [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4.
 SAGITTA, TURN = 0.01, 0.1
 # Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2 ms to 0.35 s, as filters
 # come, each 1.6 times the one before, by which a chord may be slow for longer than it should.

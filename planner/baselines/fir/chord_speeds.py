@@ -53,18 +53,16 @@ from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
 PATIENCE = 40
-# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: 0.03 saves 0.4 % of the time of ten
-# jobs in 1.2 times the planning time, 0.3 costs 0.8 %.
+# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: fewer take more rounds.
 AROUND = 0.1
 # T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits [-].
 MARGINS_MAX = np.array([2.0, 4.0])
 # So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean length reach from rest to
-# rest: half as many are 1.4 % slower on one of ten jobs, 0.4 and 0.08 cost 0.2 and 0.1 % in mean.
+# rest.
 SPEEDS, LOWEST = 18, 0.17
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
-# A mean's speed is good enough when it exceeds nothing by more than this [-]; the motion is measured
-# afterwards, and ten jobs hardly care (0.2: 0.01 % faster).
+# A mean's speed is good enough when it exceeds nothing by more than this [-]: the motion is measured afterwards.
 MEAN_OVER = 0.02
 
 

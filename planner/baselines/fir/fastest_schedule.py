@@ -25,17 +25,14 @@ from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
 # Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others
-# between them, to this natural logarithm of their ratio. Ten jobs take 0.06 % longer with 0.1, and 0.18 % less with 0.01 and 1.2 times
-# the planning time; with 6 or 16 speeds 0.2 and 0.4 % less, but single ones 0.5 % longer.
+# between them, to this natural logarithm of their ratio.
 SPEEDS = 10
 FINEST = 0.03
-# Margins that are tried; from the second on with speeds near the best of the one before. Without any but 1 ten jobs take 2.3 % longer
-# (up to 11), with 1 and 2 alone 0.2 %.
+# Margins that are tried; from the second on with speeds near the best of the one before.
 MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
 NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
-# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]: ten jobs take 8.5 % longer without
-# any, 7.6 % with the first alone and 0.04 % (up to 0.4) with the second alone. At last they are tried at all corners, as a corner may
-# be so slow that a stop is faster: one of 29 random jobs takes 14 % less, and one that had taken 6 % more with more tolerance.
+# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last they are tried at all
+# corners, as a corner may be so slow that a stop is faster.
 STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that fraction
 # In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion by dt^2/8 of it. T1 is at

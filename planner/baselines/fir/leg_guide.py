@@ -16,7 +16,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
 # Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with feed^2, so that this costs
-# half of it in feed; a fifth or four times of it cost 0.1 and 0.5 % of the time of ten jobs.
+# half of it in feed.
 CHORD_FRACTION = 0.05
 
 

@@ -12,8 +12,7 @@ from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
-from planner.motion.time_law import law_of_moves
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, law_of_moves
 from planner.planning.job.job import Job
 from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan

@@ -14,8 +14,7 @@ from planner.feedrate.constraints.limits import FILTER_ERROR
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
-from planner.motion.time_law import law_of_solution
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, law_of_solution
 from planner.smoothing.spline_path import SplineShape
 
 

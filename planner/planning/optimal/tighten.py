@@ -24,8 +24,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.limits_used import ratios
-from planner.motion.time_law import TimeLaw
-from planner.motion.timing import CHUNK, WATCHED, Motion, in_chunks, inside_pieces
+from planner.motion.timing import CHUNK, WATCHED, Motion, TimeLaw, in_chunks, inside_pieces
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again

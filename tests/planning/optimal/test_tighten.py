@@ -18,8 +18,7 @@ from planner.feedrate.solution import ratios_by_limit
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
 from planner.machine.user_limit import JointLimit
-from planner.motion.time_law import law_of_solution
-from planner.motion.timing import Motion
+from planner.motion.timing import Motion, law_of_solution
 from planner.nc.reader import parse_program
 from planner.planning.methods.registry import plan
 from planner.planning.optimal import tighten

@@ -67,6 +67,8 @@ SLOWER = (1.2, 1.5, 1.0)
 WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
 # It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-] does not count.
 NOT_SLOWER = 1e-4
+# By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt needs room there.
+RELAXED = 1e-6
 # A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
 # 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
@@ -198,22 +200,31 @@ class TubeNLP:
             velocity, acceleration = v + h * q * (a + h * q * j / 2), a + h * q * j
             across = acceleration - along[k] * velocity / pace
             rows.append((ca.sumsqr(across) / normal**2, -np.inf, 1.0))
+        from_rest, to_rest = (
+            ca.SX.sym("from_rest"),
+            ca.SX.sym("to_rest"),
+        )  # 0 in the first and in the last step
         for kind in state:
             bound = run.state[kind] / acc
             ordinates = formula(ca, kind, (v, ordinate, v1), (a, a1), run.linear, REST * pace)
-            for pushed, along_it in ordinates:
-                rows += [((sign * pushed / bound - along_it) / pace, -np.inf, 0.0) for sign in (1.0, -1.0)]
+            for there, (pushed, along_it) in zip(
+                (from_rest, from_rest * to_rest, from_rest * to_rest, to_rest), ordinates, strict=True
+            ):
+                row = [there * (sign * pushed / bound - along_it) / pace for sign in (1.0, -1.0)]
+                rows += [(one, -np.inf, RELAXED) for one in row]
 
         # ---- constraints of all steps, stage by stage: gaps first -----------------------------------------------------------
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
         numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
         numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, mean_next)
+        numbers = ca.vertcat(numbers, from_rest, to_rest)
         of_step = ca.Function(
             "step", [*of_stage, numbers], [following, ca.vertcat(*(row for row, _, _ in rows))]
         )
+        moving = np.arange(steps) > 0, np.arange(steps) < steps - 1  # at both ends of a step
         data = step_numbers(run, guess, mean_step[:-1], length, speed, acc)
         reached, limited = of_step.map(steps)(
-            node, step, ca.DM(np.column_stack([data, mean_step[1:] / length]).T)
+            node, step, ca.DM(np.column_stack([data, mean_step[1:] / length, *moving]).T)
         )
         constraints = ca.vec(ca.vertcat(after - reached, limited))
         low, high = (np.concatenate([np.full(row[0].numel(), row[k]) for row in rows]) for k in (1, 2))
@@ -228,7 +239,7 @@ class TubeNLP:
                 [run.vertex[end] / length, np.zeros(2 * axes), [run.offset[end] / mean_step[end]]]
             )
             node_min[end] = node_max[end] = rest
-        longer = LONGER_WATCHED if watched or state else LONGER
+        longer = LONGER_WATCHED if watched else LONGER
         step_high = np.column_stack(
             [np.tile(j_max, (steps, 1)), h_guess * longer, np.full((steps, 3 + watched), np.inf)]
         )

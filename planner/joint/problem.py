@@ -107,8 +107,7 @@ def _limits(
         normal, state = normal / narrow[1], state / narrow[1][:, None]
     axes = np.stack([run.jerk / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed])
     h = guess.h[lo:hi] / second
-    watched = np.isfinite(run.across_max[leg]).any() or len(run.state)
-    longer = LONGER_WATCHED if watched else LONGER
+    longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER
     curved = run.curvature[leg] > 0
     on = _present(run, leg, at_vertex)
     for step, node in (

@@ -140,41 +140,46 @@ def put_state_rows(limits, i, x, u, g, out):
 
 @njit(cache=True, error_model="numpy")
 def add_state_curvature(W, limits, i, x, u, z):
-    """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i: of b.w, which is
-    (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,) are their multipliers."""
+    """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i across the
+    motion: of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,): multipliers."""
     axes = len(u) - 1
-    h = u[axes]
-    alpha, e, square = np.zeros(4), np.empty(axes), np.zeros(3)
+    h, w, square = u[axes], np.empty((3, axes)), np.zeros(3)
+    alpha, e, across = np.zeros(4), np.empty(axes), np.empty((axes, axes))
     for k in range(axes):
-        v, a = x[axes + k], x[2 * axes + k]
-        square[0] += limits.linear[k] * v**2
-        square[1] += limits.linear[k] * (v + 0.5 * h * a) ** 2
-        square[2] += limits.linear[k] * (v + h * (a + 0.5 * h * u[k])) ** 2
-    for kind in range(limits.state.shape[1]):
-        bound = limits.state[i, kind]
-        for pair in range(5):
-            r, m, n = (
-                (0, 1, 1, 2, 2)[pair],
-                (0, 0, 1, 1, 2)[pair],
-                (0, 1, 0, 1, 0)[pair],
-            )  # of the row, w and b
-            share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[pair]
-            time = max(np.sqrt(square[m]), REST * limits.pace[i]) / bound
-            for side in range(2):
-                by = 0.5 * share * z[ROWS * kind + 3 * side + r] / (bound * bound)
-                per = (1.0 - 2.0 * side) / time
-                of_j = 0.5 * h * h if m == 2 else 0.0
-                alpha[1], alpha[2], alpha[3] = per, 1.0 + 0.5 * per * m * h, n * h + per * of_j
-                for k in range(axes):
-                    a, j = x[2 * axes + k], u[k]
-                    e[k] = n * j + per * (0.5 * a if m == 1 else a + h * j if m == 2 else 0.0)
-                for k in range(axes):
-                    g = by * limits.linear[k]
-                    W[4 * axes, 4 * axes] += g * e[k] * e[k]
-                    for s in range(1, 4):
-                        W[4 * axes, s * axes + k] += g * e[k] * alpha[s]
-                        for t in range(1, s + 1):
-                            W[s * axes + k, t * axes + k] += g * alpha[s] * alpha[t]
+        v, a = limits.linear[k] * x[axes + k], limits.linear[k] * x[2 * axes + k]
+        w[0, k], w[1, k], w[2, k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * limits.linear[k] * u[k])
+        for m in range(3):
+            square[m] += w[m, k] ** 2
+    for pair in range(5 * limits.state.shape[1]):
+        kind, which = pair // 5, pair % 5
+        r, m, n = (
+            (0, 1, 1, 2, 2)[which],
+            (0, 0, 1, 1, 2)[which],
+            (0, 1, 0, 1, 0)[which],
+        )  # of the row, w and b
+        share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[which]
+        bound, moving = limits.state[i, kind], square[m] + (REST * limits.pace[i]) ** 2
+        time = np.sqrt(moving) / bound
+        for side in range(2):
+            by = 0.5 * share * z[ROWS * kind + 3 * side + r] / (bound * bound)
+            per, of_j = (1.0 - 2.0 * side) / time, 0.5 * h * h if m == 2 else 0.0
+            alpha[1], alpha[2], alpha[3] = per, 1.0 + 0.5 * per * m * h, n * h + per * of_j
+            for k in range(axes):
+                a, j = x[2 * axes + k], u[k]
+                e[k] = n * j + per * (0.5 * a if m == 1 else a + h * j if m == 2 else 0.0)
+                for c in range(axes):
+                    one = limits.linear[k] if c == k else 0.0
+                    across[k, c] = by * (one - w[m, k] * w[m, c] / moving)
+            for k in range(axes):
+                along = 0.0
+                for c in range(axes):
+                    along += across[k, c] * e[c]
+                W[4 * axes, 4 * axes] += e[k] * along
+                for s in range(1, 4):
+                    W[4 * axes, s * axes + k] += alpha[s] * along
+                    for t in range(1, s + 1):
+                        for c in range(axes):
+                            W[s * axes + k, t * axes + c] += alpha[s] * alpha[t] * across[k, c]
 
 
 @njit(cache=True, error_model="numpy")

@@ -23,7 +23,7 @@ PROGRAMS = {
     "pentagon": problems.pentagon(side=6.0),
     "pushed": problems.polyline([[0, 0], [4, 0], [4, 4]]),  # along which a tangential acceleration holds
 }
-MACHINES = {"pushed": MACHINE.model_copy(update={"tangential_acceleration": 900.0})}
+MACHINES = {"pushed": MACHINE.model_copy(update={"tangential_acceleration": 300.0})}
 
 
 @cache

@@ -24,7 +24,9 @@ from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.constraints.own_axes import own_inside
 from planner.feedrate.sampling.samples import sample_path
 from planner.motion.limits_used import ratios
+from planner.verifier import verify
 from planner.verifier.filtered import filtered
+from planner.verifier.given import Given
 
 RADIUS, TURNS, ARC = 10.0, 3, 0.4 * np.pi
 PROGRAMMED = 80.0  # [mm/s]
@@ -199,6 +201,18 @@ def test_the_judge_finds_the_tangential_acceleration_used_up():
     limits = Limits.of(machine, toolpath.axes)
     used = [ratio.max() for order, ratio in ratios(limits, sample(motion, machine.dt)) if order == 2]
     assert used == [pytest.approx(1.0, abs=CLOSE)]
+
+
+@pytest.mark.parametrize("columns", [("velocity", "acceleration", "jerk"), ()], ids=["columns", "positions"])
+def test_the_judge_finds_a_tangential_acceleration_beyond_its_limit(columns):
+    """By a twentieth, also where positions are all that it has: then it takes off what the curve may hide."""
+    machine = machine_with(tangential_acceleration=900.0)
+    length, curve = helix((RADIUS, 0.0, 0.0), (0.0, 0.0), 2.0 * np.pi * TURNS)
+    motion = along(length, curve, rest_to_rest(length, PROGRAMMED, 1.05 * 900.0, 4e4))
+    delivered = sample(motion, machine.dt)
+    verdict = verify(delivered, circle().toolpath(machine), machine, given=Given(columns=columns))
+    assert verdict.limits[TANGENTIAL.name].ratio == pytest.approx(1.05, abs=CLOSE if columns else 0.03)
+    assert [fault.name for fault in verdict.faults] == [TANGENTIAL.name]
 
 
 @pytest.mark.parametrize("own", [Along(), Belt()], ids=lambda limit: limit.name)

@@ -6,8 +6,9 @@ beside it, and is the best only if no other passed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,16 +130,22 @@ def row_of(
     from planner import plan
 
     label = method if isinstance(method, str) else _label(method)
-    try:
-        made = plan(program, machine, method=method, tolerance=tolerance, progress=progress)
-        row = row_of_plan(label, made)
-        if shown and made.solved:
-            from planner.report.html.data import samples_of  # only pages need it
+    how = {"method": method, "tolerance": tolerance, "progress": progress}
+    row, made = tried(label, partial(plan, program, machine, **how))  # type: ignore[arg-type]
+    if shown and made is not None and made.solved:
+        from planner.report.html.data import samples_of  # only pages need it
 
-            row = replace(row, shown=samples_of(made, shown))
-        return row
+        row = replace(row, shown=samples_of(made, shown))
+    return row
+
+
+def tried(label: str, make: Callable[[], Plan]) -> tuple[Row, Plan | None]:
+    """The row of a plan that is made now, with the reason where it is refused, and the plan."""
+    try:
+        plan = make()
     except (InputError, NotSolvedError) as fault:
-        return refused(label, fault)
+        return Row(method=label, outcome="refused", sentence=str(fault)), None
+    return row_of_plan(label, plan), plan
 
 
 def _label(method: Method) -> str:
@@ -190,11 +197,6 @@ def _ringing(verdict: Verdict) -> float | None:
         if axis in LINEAR_AXES
     ]
     return float(max(after)) if after else None
-
-
-def refused(method: str, fault: Exception) -> Row:
-    """The row of a method that cannot plan the job, with the reason."""
-    return Row(method=method, outcome="refused", sentence=str(fault))
 
 
 def best_of(rows: list[Row]) -> Row | None:

@@ -32,8 +32,9 @@ from planner.verifier import DERIVATIVES, Given
 Format = Literal["parquet", "csv", "npz"]
 FORMATS: tuple[Format, ...] = ("parquet", "csv", "npz")
 CSV_METADATA = ".meta.json"  # takes the place of the suffix .csv
+PREFIXES = ("", "v", "a", "j")  # of the columns of an axis
 KNOWN = {"t", "s", "feed", "line", "block"} | {
-    prefix + axis for prefix in ("", "v", "a", "j") for axis in (*ALL_AXES, EXTRUDER)
+    prefix + axis for prefix in PREFIXES for axis in (*ALL_AXES, EXTRUDER)
 }
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
@@ -225,19 +226,13 @@ def _assemble(
         raise InputError(f"the columns differ in length: {lengths}", source=source)
     t, time_rounding, end_rounding, notes = _times(source, columns["t"])
     inside = np.array([RAD_PER_DEG if axis in ROTARY_AXES else 1.0 for axis in axes])  # at a radius of 1 mm
-    levels = [np.stack([columns[axis] for axis in axes], axis=1).astype(np.float64) * inside]
-    order_of = [0]  # order of the last level that the file holds, to differentiate from
-    for prefix, word in (("v", "velocity"), ("a", "acceleration"), ("j", "jerk")):
-        lacking = [prefix + axis for axis in axes if prefix + axis not in columns]
-        if lacking:
-            base, order = levels[order_of[-1]], len(levels) - order_of[-1]
-            levels.append(divided_difference(t, base, order))
-            notes.append(f"{word} derived from the {_LEVELS[order_of[-1]]} (no column {', '.join(lacking)})")
-        else:
-            order_of.append(len(levels))
-            levels.append(
-                np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64) * inside
-            )
+    levels, there = _levels(columns, axes, t)
+    levels = [level * inside for level in levels]
+    for order, word in enumerate(DERIVATIVES, start=1):
+        if order not in there:
+            base = max(level for level in there if level < order)
+            lacking = [PREFIXES[order] + axis for axis in axes if PREFIXES[order] + axis not in columns]
+            notes.append(f"{word} derived from the {_LEVELS[base]} (no column {', '.join(lacking)})")
     position, velocity, acceleration, jerk = levels
     linear = [k for k, axis in enumerate(axes) if axis not in ROTARY_AXES]
     fill: dict[str, Callable[[], Array]] = {
@@ -261,7 +256,7 @@ def _assemble(
         **rest,
     )
     delivered = Given(
-        columns=tuple(DERIVATIVES[level - 1] for level in order_of[1:]),
+        columns=tuple(DERIVATIVES[order - 1] for order in there[1:]),
         position_rounding=tuple(rounding(columns[axis]) * inside[k] for k, axis in enumerate(axes)),
         time_rounding=time_rounding,
         end_rounding=end_rounding,
@@ -274,14 +269,23 @@ def _extruder(columns: dict[str, Array], t: FloatArray) -> FloatArray:
     """(T, 4) the columns of the extruder, what is missing as differences of its place; (0, 4) without one."""
     if EXTRUDER not in columns:
         return np.zeros((0, 4))
-    place = columns[EXTRUDER].astype(np.float64)
-    rates = [
-        columns[prefix + EXTRUDER].astype(np.float64)
-        if prefix + EXTRUDER in columns
-        else divided_difference(t, place[:, None], order)[:, 0]
-        for order, prefix in enumerate(("v", "a", "j"), start=1)
-    ]
-    return np.stack([place, *rates], axis=1)
+    return np.concatenate(_levels(columns, (EXTRUDER,), t)[0], axis=1)
+
+
+def _levels(
+    columns: dict[str, Array], axes: tuple[str, ...], t: FloatArray
+) -> tuple[list[FloatArray], list[int]]:
+    """(T, A) positions and their three derivatives, what is missing as differences of the last level that is there; and
+    the orders that are there."""
+    levels: list[FloatArray] = []
+    there: list[int] = []
+    for order, prefix in enumerate(PREFIXES):
+        if all(prefix + axis in columns for axis in axes):
+            there.append(order)
+            levels.append(np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64))
+        else:
+            levels.append(divided_difference(t, levels[there[-1]], order - there[-1]))
+    return levels, there
 
 
 def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:

@@ -15,19 +15,16 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from planner.base.errors import InputError, NotSolvedError
+from planner.base.errors import InputError
 from planner.commands.study.settings import Setting, StudiedJob
+from planner.report.compare import tried
 from planner.report.replace import check_output, replacing_file
 from planner.report.summary import json_ready, versions
 
-if TYPE_CHECKING:
-    from planner.planning.job.plan import Plan
-    from planner.verifier import Verdict
-
 ABOUT, POINTS, TABLE, FIGURE = "sweep.json", "points", "sweep.parquet", "sweep.png"
-PASSED, FAILED, NOT_SOLVED, REFUSED = "passed", "failed", "not solved", "refused"
+PASSED, FAILED, NOT_SOLVED = "passed", "failed", "not solved"
 _HELD = 3  # limits that a point names
 
 
@@ -44,31 +41,21 @@ def planned_point(job: StudiedJob, settings: Sequence[Setting]) -> dict[str, Any
     began = time.process_time()
     row: dict[str, Any] = {setting.name: setting.value for setting in settings}
     try:
-        plan = job.changed(settings).plan()
-    except (InputError, NotSolvedError) as fault:
-        row |= {"outcome": REFUSED, "sentence": str(fault)}
+        made, plan = tried("", lambda: job.changed(settings).plan())
+        row |= {"outcome": made.outcome, "sentence": made.sentence}
     except MemoryError as fault:
         row |= {"outcome": NOT_SOLVED, "sentence": f"the memory is used up ({fault})"}
-    else:
-        row |= _found(plan)
+        plan = None
+    if plan is not None and made.cycle_time is not None:
+        active = plan.grid.percents()[:_HELD] if plan.grid is not None else ()
+        row |= {
+            "cycle_time_s": made.cycle_time,
+            "contour_error_mm": made.contour_error,
+            "vertex_error_mm": made.vertex_error,
+            "corner_ratio": made.corner_ratio,
+            "held_by": ", ".join(f"{name} {percent} %" for name, percent in active),
+        }
     return json_ready(row | {"planning_cpu_s": time.process_time() - began})
-
-
-def _found(plan: Plan) -> dict[str, Any]:
-    if plan.trajectory is None or plan.verdict is None:
-        return {"outcome": NOT_SOLVED, "sentence": plan.sentence}
-    verdict: Verdict = plan.verdict
-    return {
-        "outcome": PASSED if verdict.passed else FAILED,
-        "sentence": plan.sentence if verdict.passed else str(verdict.faults[0]),
-        "cycle_time_s": plan.trajectory.cycle_time,
-        "contour_error_mm": verdict.contour_error_mm,
-        "vertex_error_mm": verdict.vertex_error_mm,
-        "corner_ratio": verdict.corners.worst_ratio,
-        "held_by": ""
-        if plan.grid is None
-        else ", ".join(f"{name} {percent} %" for name, percent in plan.grid.percents()[:_HELD]),
-    }
 
 
 class SweepFolder:

@@ -23,19 +23,20 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.base.errors import InputError, NotSolvedError
+from planner.base.errors import InputError
 from planner.base.units import MICROMETRE
 from planner.commands.study.points import PASSED, TABLE
 from planner.commands.study.settings import FEED, TOLERANCE, Setting, StudiedJob, unit_of, value_of
 from planner.feedrate.constraints.limits import LIMITS
 from planner.machine import Machine
-from planner.report.compare import Row, refused, row_of_plan
+from planner.report.compare import Row, row_of_plan, tried
 from planner.report.summary import json_ready
 from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 from planner.sensitivity.records import PriceList
@@ -88,16 +89,13 @@ def what_if(
     rows: list[WhatIf] = []
     time, prices = None, None
     for label, chosen, variant in changed:
-        try:
-            plan = variant.plan(None if progress is None else _named(progress, label))
-            row = row_of_plan(label, plan)
-        except (InputError, NotSolvedError) as fault:
-            if not chosen:
-                raise
-            row = refused(label, fault)
-        if not chosen:
-            plan.require()
-            time, prices = row.cycle_time, plan.prices
+        make = partial(variant.plan, None if progress is None else partial(progress, label))
+        if chosen:
+            row, _ = tried(label, make)
+        else:
+            plan = make().require()
+            row, prices = row_of_plan(label, plan), plan.prices
+            time = row.cycle_time
         assert time is not None
         rows.append(
             WhatIf(
@@ -109,10 +107,6 @@ def what_if(
             )
         )
     return rows
-
-
-def _named(progress: Callable[[str, str, float], None], label: str) -> Callable[[str, float], None]:
-    return lambda stage, fraction: progress(label, stage, fraction)
 
 
 class Forecast(NamedTuple):

@@ -306,10 +306,6 @@ class _Function:
     def _modes(self, modes: tree.Modes) -> None:
         self.blocks.put(f"run.modes({modes.action!r},{tuple(modes.place)!r})", modes.place)
 
-    def _turning(self, turning: tree.Turning) -> None:
-        place = tuple(turning.place)
-        self.blocks.put(f"run.turning({turning.action!r},{turning.letters!r},{place!r})", turning.place)
-
     def _made(self, made: tree.MadeRows) -> None:
         given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
         self.blocks.put(f"run.made({made.maker!r},({given}),{tuple(made.place)!r})", made.place)
@@ -328,6 +324,5 @@ _WRITE: dict[type, Callable[..., None]] = {
     tree.Return: _Function._return,
     tree.Message: _Function._message,
     tree.Modes: _Function._modes,
-    tree.Turning: _Function._turning,
     tree.MadeRows: _Function._made,
 }

@@ -24,6 +24,7 @@ from planner.nc.language.heidenhain.flow import files as heidenhain_files
 from planner.nc.language.heidenhain.parser import HeidenhainParser
 from planner.nc.language.linuxcnc import parser
 from planner.nc.language.linuxcnc.parser import LinuxcncParser
+from planner.nc.language.makers import with_makers
 from planner.nc.language.rows import AppendedRows
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import text as siemens_text
@@ -64,7 +65,7 @@ def expand(
     front = _FRONTS[dialect]
     run = ProgramRun(interpreter, rows, front.language, front.variables(interpreter))
     run.tee = tee or run.tee
-    run.lathe = LatheCycles(run) if dialect == LATHE else None
+    front.set_up(run)
     files = _Files(run, rows, front, integers)
     found = files.read(words, interpreter.source)
     if not found:
@@ -87,12 +88,17 @@ def expand(
 
 @dataclass(frozen=True)
 class _Front:
-    """The reader of a dialect. files : names, in small letters, of the file that holds a subprogram."""
+    """The reader of a dialect.
+
+    files  : names, in small letters, of the file that holds a subprogram
+    set_up : gives a run the makers of its rows
+    """
 
     language: Language
     variables: type[SystemVariables]
     parser: Callable[[Source], Parser]
     files: Callable[[str], frozenset[str]]
+    set_up: Callable[[ProgramRun], object] = lambda run: None
 
 
 _FRONTS = {
@@ -100,9 +106,11 @@ _FRONTS = {
         parser.LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
     ),
     FANUC: _Front(calls.LANGUAGE, FanucVariables, FanucParser, fanuc_files),
-    LATHE: _Front(calls.LANGUAGE, LatheVariables, LatheParser, fanuc_files),
-    HEIDENHAIN: _Front(heidenhain_text.LANGUAGE, PositionVariables, HeidenhainParser, heidenhain_files),
-    SIEMENS: _Front(siemens_text.LANGUAGE, PositionVariables, SiemensParser, siemens_files),
+    LATHE: _Front(calls.LANGUAGE, LatheVariables, LatheParser, fanuc_files, LatheCycles),
+    HEIDENHAIN: _Front(
+        heidenhain_text.LANGUAGE, PositionVariables, HeidenhainParser, heidenhain_files, with_makers
+    ),
+    SIEMENS: _Front(siemens_text.LANGUAGE, PositionVariables, SiemensParser, siemens_files, with_makers),
 }
 
 

@@ -25,13 +25,13 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain import cycles as heidenhain_cycles
+from planner.nc.language.heidenhain import patterns
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import ASSUMED, Maker, Making, Row
+from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import turned
 from planner.nc.program import Kind
@@ -164,8 +164,8 @@ def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
     """Words that APPR and DEP have in common."""
     return {
         "kind": KINDS[round(given["kind"])],
-        "line": making.line,
-        "at": making.at,
+        "line": making.place.line,
+        "at": making.place.at,
         "frame": making.frame,
         "length": given.get("LEN", 0.0) * making.unit,
         "radius": given.get("R", 0.0) * making.unit,
@@ -178,7 +178,7 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """A rounding or chamfer at the end of the next move: kind (index in corner_moves.KINDS) and size."""
     if given["size"] < 0.0:
         raise ValueError("a rounding or chamfer is not negative")
-    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.line)
+    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.place.line)
     return []
 
 
@@ -271,29 +271,6 @@ def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
 
 
-def keep(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """Before a cycle: keep G90 or G91, the motion code and the feed, and switch to G90."""
-    state, travel, shared = making.interpreter.state, making.travel, making.shared
-    absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
-    shared[_KEPT[0]], shared[_KEPT[1]] = float(absolute), float(motion)
-    shared[_KEPT[2]] = (
-        state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
-    )
-    return [] if absolute else [[("G", 90.0)]]
-
-
-def bring_back(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """Behind a cycle: what `keep` kept; the feed where `feed` is 1."""
-    absolute, motion, feed = (making.shared[name] for name in _KEPT)
-    if not absolute:
-        yield [("G", 91.0)]
-    if motion in (0.0, 1.0) and motion != making.interpreter.state.motion:
-        yield [("G", motion)]
-    if given["feed"] and feed > 0.0:
-        yield [("F", feed)]
-
-
-_KEPT = ("_kept absolute", "_kept motion", "_kept feed")
 _FLAT = 1e-9  # relative, below which three points are on a line
 
 MAKERS: dict[str, Maker] = {
@@ -305,12 +282,15 @@ MAKERS: dict[str, Maker] = {
     "heidenhain frame": heidenhain,
     "out of plane": out_of_plane,
     "assume": _assume,
-    "keep": keep,
-    "bring back": bring_back,
     **siemens_cycles.MAKERS,
-    **heidenhain_cycles.MAKERS,
+    **patterns.MAKERS,
     "corner": corner,
     "tangent arc": tangent_arc,
     "arc through": arc_through,
     "frame in force": in_force,
 }
+
+
+def with_makers(run: ProgramRun) -> None:
+    """Programs of Heidenhain and Siemens have these makers."""
+    run.makers = MAKERS

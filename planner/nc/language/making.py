@@ -14,10 +14,12 @@ that feed as its upper limit, not in step with the spindle; a note says so.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.travel import Travel
+from planner.nc.language.travel_rows import TravelRow
 from planner.nc.language.tree import ZERO, MadeRows, SourcePlace, made
 
 ASSUMED = {
@@ -46,16 +48,32 @@ ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
 @dataclass(frozen=True)
 class Making:
     """interpreter, travel : of the running program
-    shared             : its variables that all calls share
-    line, at, frame    : line, byte offset and call of the command
+    shared, numbered   : its variables that all calls share, and its parameters by number
+    place, frame       : of the command, and its call
+    execute            : executes rows
     """
 
     interpreter: Interpreter
     travel: Travel
     shared: dict[str, float]
-    line: int
-    at: int
+    numbered: list[float | None]
+    place: SourcePlace
     frame: int
+    execute: Callable[[list[TravelRow]], None]
+    _rows: list[TravelRow] = field(default_factory=list)
+
+    def take(self, rows: Iterable[Row]) -> None:
+        """Rows to execute, all of them at the end, or where their maker asks for it by `flush`."""
+        for row in rows:
+            words = [(ord(letter), value, self.place.at) for letter, value in row]
+            self._rows.append(TravelRow(words, self.place.line, self.frame))
+        self.flush()
+
+    def flush(self) -> None:
+        """Execute the rows so far."""
+        if self._rows:
+            self.execute(self._rows)
+            self._rows.clear()
 
     @property
     def unit(self) -> float:
@@ -81,7 +99,25 @@ class Making:
         """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
         if self.interpreter.findings.strict:
             raise ValueError(f"{text} (assumed without --strict)")
-        self.interpreter.findings.assume(text, self.line)
+        self.interpreter.findings.assume(text, self.place.line)
+
+
+def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
+    """The rows of a cycle under G90; behind them G91, the motion code, and with `feed` the feed as they were before."""
+    state, travel = making.interpreter.state, making.travel
+    absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
+    before = state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
+    if not absolute:
+        yield [("G", 90.0)]
+        making.flush()
+    yield from rows
+    making.flush()
+    if not absolute:
+        yield [("G", 91.0)]
+    if motion in (0, 1) and motion != state.motion:
+        yield [("G", float(motion))]
+    if feed and before > 0.0:
+        yield [("F", before)]
 
 
 def equal_steps(whole: float, most: float) -> int:
@@ -101,7 +137,7 @@ _COARSE = {
     3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 7: 1.0, 8: 1.25, 9: 1.25, 10: 1.5, 11: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5,
     22: 2.5, 24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0,
 }  # fmt: skip  # leads of metric coarse threads by their size [mm], ISO 261
-BREAK = 0.2  # mm by which the tool goes back to break a chip, where the program does not say it
+BREAK = 0.2  # mm by which the tool goes back to break a chip, and above the depth drilled where feed begins, unless the program says
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Mapping
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import Compiled, whole
-from planner.nc.language.making import Making
+from planner.nc.language.making import Maker, Making
 from planner.nc.language.rows import AppendedRows, NotFinite
 from planner.nc.language.stops import Endless, TooDeep, last_statement, sentence, statement_of
 from planner.nc.language.system_variables import Modes, SystemVariables
@@ -40,16 +39,6 @@ _MESSAGES_MAX = 1_000  # different messages that are kept
 Load = Callable[[str], bool]
 
 
-class Cycles(Protocol):
-    """Cycles of lathes, which read a profile aside."""
-
-    def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
-        """Do a part of a cycle (tree.Turning)."""
-
-    def leave(self) -> SourcePlace | None:
-        """Give up a profile that was not read to its end; the place of its cycle, or None for no such profile."""
-
-
 class Ended(Exception):
     """The program has come to its end."""
 
@@ -59,7 +48,8 @@ class ProgramRun:
 
     numbered : values of the numbered parameters, by number
     shared   : values of the named parameters that all calls share
-    lathe    : its cycles of a lathe
+    makers   : of the rows of `tree.MadeRows`
+    leave_profile : gives up a profile that a cycle of a lathe has not read to its end, and says where that stands
     resume   : the label where the caller of a procedure goes on, or None
     """
 
@@ -87,7 +77,8 @@ class ProgramRun:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
-        self.lathe: Cycles | None = None
+        self.makers: Mapping[str, Maker] = {}
+        self.leave_profile: Callable[[], SourcePlace | None] = lambda: None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
         system.travel = self.travel
@@ -95,7 +86,7 @@ class ProgramRun:
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
         stopped = self._run(main)
-        left = None if self.lathe is None else self.lathe.leave()
+        left = self.leave_profile()
         if stopped is None and left is not None:
             return ProgramFault(
                 left, "the program ends inside the profile of this cycle; end it behind the cycles"
@@ -274,26 +265,18 @@ class ProgramRun:
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 
-    def turning(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
-        """Do a part of a lathe's cycle."""
-        assert self.lathe is not None
-        self.lathe.act(action, letters, place)
-
     def made(self, maker: str, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
         """Execute the rows that a maker makes of values; each row a list of letters and numbers."""
-        from planner.nc.language.makers import MAKERS  # for programs of Heidenhain and Siemens
+        self.flush()
+        state = self.interpreter, self.travel, self.shared, self.numbered
+        making = Making(*state, SourcePlace(*place), self._frame, self._execute_made)
+        making.take(self.makers[maker](making, dict(given)))
+        self.tick(0)
+        self.flush()
 
-        self.flush()
-        making = Making(self.interpreter, self.travel, self.shared, place[1], place[2], self._frame)
-        made = MAKERS[maker](making, dict(given))
-        rows = [
-            TravelRow([(ord(letter), value, place[2]) for letter, value in row], place[1], self._frame)
-            for row in made
-        ]
-        if rows:
-            self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
-        self.tick(1)
-        self.flush()
+    def _execute_made(self, rows: list[TravelRow]) -> None:
+        self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
+        self.tick(0)
 
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""

@@ -220,16 +220,8 @@ class Modes(NamedTuple):
     action: str
 
 
-class Turning(NamedTuple):
-    """A part of a lathe's cycle (`lathe_cycles.LatheCycles.act`); the letters whose values stand in shared names."""
-
-    place: SourcePlace
-    action: str
-    letters: str = ""
-
-
 class MadeRows(NamedTuple):
-    """Rows that Python makes of values while the program runs: a pocket, a change of frame (`makers.MAKERS`)."""
+    """Rows that Python makes of values while the program runs: a cycle, a change of frame (`makers.MAKERS`)."""
 
     place: SourcePlace
     maker: str
@@ -271,7 +263,7 @@ class OpenStatement:
 
 
 Statement = (
-    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | Turning | MadeRows
+    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | MadeRows
 )  # fmt: skip
 
 

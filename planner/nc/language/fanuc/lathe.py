@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language.fanuc.calls import code_of
-from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, shared
+from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, of_shared, shared
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
     Call,
@@ -34,8 +34,8 @@ from planner.nc.language.tree import (
     ProgramFault,
     SourcePlace,
     Statement,
-    Turning,
     Word,
+    made,
     row,
 )
 
@@ -130,13 +130,13 @@ class LatheParser(LatheWords):
         name = _profile_name(profile)
         call = Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
         if cycle == "G70":
-            self.body += [Turning(line.place, "start"), call, Turning(line.place, "back")]
+            self.body += [made(line.place, "start"), call, made(line.place, "back")]
             return
         values = _ROUGHING[cycle](
             self, {letter: self._length(word, cycle, line) for letter, word in given.items()}, line
         )
-        self.body += [shared(values, line), Turning(line.place, "profile"), call]
-        self.body.append(Turning(line.place, cycle, "".join(values)))
+        self.body += [shared(values, line), made(line.place, "profile"), call]
+        self.body.append(of_shared(line.place, cycle, values))
 
     @staticmethod
     def _is_first(cycle: str, given: dict[str, Word]) -> bool:
@@ -190,8 +190,7 @@ class LatheParser(LatheWords):
             self._message_once(line)
         values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
         values["F"] = self.feed
-        self.body.append(shared(values, line))
-        self.body.append(Turning(line.place, "G76", "".join(values)))
+        self.body.append(made(line.place, "G76", **values))
         self.threading = False
 
     def _message_once(self, line: SourceLine) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Notes
+from planner.nc.language.making import Maker, Making, Row
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.tree import SourcePlace
 from planner.nc.lathe_cuts import (
@@ -25,7 +26,7 @@ from planner.nc.lathe_cuts import (
     single_thread,
     thread_passes,
 )
-from planner.nc.lexer import Words as LexedWords
+from planner.nc.lexer import Words
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
 from planner.nc.turning import (
@@ -43,7 +44,6 @@ RETRACT = 0.5  # e where the program does not give it; controls have a setting [
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
 _WRONG = {(Kind.DWELL, Kind.STOP): "a dwell or a stop", (Kind.SPLINE,): "a spline"}
 
-Words = list[tuple[str, float]]
 Given = Mapping[str, float]
 
 
@@ -53,47 +53,46 @@ class LatheCycles:
     def __init__(self, run: ProgramRun):
         self.run = run
         self._start = np.zeros(3)
-        self._aside: tuple[State, BlockTable, Callable[[LexedWords], None]] | None = None
-        self._place = SourcePlace(0, 0, 0)  # of the cycle
+        self._aside: tuple[State, BlockTable, Callable[[Words], None]] | None = None
+        self._place = SourcePlace(0, 0, 0)  # of the cycle whose profile is read
+        run.makers, run.leave_profile = self._makers(), self.leave
 
-    def act(self, action: str, letters: str, place: tuple[int, int, int]) -> None:
-        """Do a part of a cycle; its values by letter stand in the run's shared names. Raises ValueError.
+    def _makers(self) -> dict[str, Maker]:
+        return {
+            "start": self._begin_at_once,
+            "profile": self._begin,
+            "back": lambda making, given: [self._fast(self._point(self._start))],
+            "G71": lambda making, given: self._removal(making, given, facing=False),
+            "G72": lambda making, given: self._removal(making, given, facing=True),
+            "G73": self._pattern,
+            "G74": lambda making, given: self._pecking(making, given, grooving=False),
+            "G75": lambda making, given: self._pecking(making, given, grooving=True),
+            "G76": self._thread,
+            "G90": lambda making, given: self._single(given, facing=False),
+            "G92": self._single_thread,
+            "G94": lambda making, given: self._single(given, facing=True),
+        }
 
-        action : "start" keeps where the tool is, "profile" reads the blocks that follow aside, "back" leads to where the tool was, and
-                 the name of a cycle makes its passes
-        """
-        self.run.flush()
-        self._place = SourcePlace(*place)
-        given = {letter: float(self.run.shared[name_of(letter)]) for letter in letters}
-        if action == "start":
-            self._start = self.run.interpreter.state.programmed().copy()
-            return
-        if action == "profile":
-            self._begin()
-            return
-        rows = [self._fast(self._point(self._start))] if action == "back" else _CYCLES[action](self, given)
-        for words in rows:
-            row = [(ord(letter), place[2], value) for letter, value in words]
-            self.run.rows.pending.append(self.run.rows.add_row(place[1], row))
-        self.run.flush()
+    def _begin_at_once(self, making: Making, given: Given) -> Iterable[Row]:
+        """G70 keeps where the tool is."""
+        self._start = self.run.interpreter.state.programmed().copy()
+        return []
 
     # --- the profile --------------------------------------------------------------------------------------------------------
 
-    def _begin(self) -> None:
+    def _begin(self, making: Making, given: Given) -> Iterable[Row]:
+        """The blocks that follow are read aside."""
         if self._aside is not None:
             raise ValueError("a cycle stands in the profile of another one; write it behind that")
-        interpreter = self.run.interpreter
+        self._here()
+        self._place, interpreter = making.place, self.run.interpreter
         state = interpreter.state
-        if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
-            raise ValueError(_NEEDS)
-        self._start = state.programmed().copy()
         self._aside = copy.deepcopy(state), interpreter.table, self.run.tee
         interpreter.go_on_with(state, BlockTable())
         self.run.tee = lambda words: None
-        state.feed_mode, state.feed = (
-            "per minute",
-            1.0,
-        )  # any feed does: moves whose feed depends on the diameter are divided
+        # any feed does: moves whose feed depends on the diameter are divided
+        state.feed_mode, state.feed = "per minute", 1.0
+        return []
 
     def leave(self) -> SourcePlace | None:
         """Go back to what was set aside for a profile that was not read to its end; returns where its cycle stands, None for no such
@@ -120,11 +119,11 @@ class LatheCycles:
 
     # --- cycles -------------------------------------------------------------------------------------------------------------
 
-    def _removal(self, given: Given, *, facing: bool) -> Iterable[Words]:
+    def _removal(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
         contour, unit = self._contour(), self._unit
         if "R" not in given:
-            self.run.interpreter.findings.assume(
-                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", self._place.line
+            making.interpreter.findings.assume(
+                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", making.place.line
             )
         roughing = Roughing(
             depth=abs(given["D"]) * unit,
@@ -134,7 +133,7 @@ class LatheCycles:
         )
         return self._rows(stock_removal(contour, roughing, facing=facing))
 
-    def _pattern(self, given: Given) -> Iterable[Words]:
+    def _pattern(self, making: Making, given: Given) -> Iterable[Row]:
         contour = self._contour()
         shift = complex(given.get("K", 0.0), given.get("I", 0.0)) * self._unit
         return self._rows(pattern_repeat(contour, round(given["D"]), shift, self._allowance(given)))
@@ -143,7 +142,7 @@ class LatheCycles:
         part = 0.5 if self.run.interpreter.state.diameters else 1.0
         return complex(given.get("W", 0.0), part * given.get("U", 0.0)) * self._unit
 
-    def _thread(self, given: Given) -> Iterable[Words]:
+    def _thread(self, making: Making, given: Given) -> Iterable[Row]:
         state, unit = self.run.interpreter.state, self._unit
         start = self._point(state.programmed())
         part = 0.5 if state.diameters else 1.0
@@ -163,21 +162,21 @@ class LatheCycles:
         )
         return self._passes("G76", start, thread_passes(thread))
 
-    def _single(self, given: Given, *, facing: bool) -> Iterable[Words]:
+    def _single(self, given: Given, *, facing: bool) -> Iterable[Row]:
         start = self._here()
         taper = given.get("R", 0.0) * self._unit
         return self._rows(single_cut(start, self._end(given, start), taper, facing=facing))
 
-    def _single_thread(self, given: Given) -> Iterable[Words]:
+    def _single_thread(self, making: Making, given: Given) -> Iterable[Row]:
         start = self._here()
         taper, lead = given.get("R", 0.0) * self._unit, given["F"] * self._unit
         return self._passes("G92", start, single_thread(start, self._end(given, start), taper, lead))
 
-    def _pecking(self, given: Given, *, grooving: bool) -> Iterable[Words]:
+    def _pecking(self, making: Making, given: Given, *, grooving: bool) -> Iterable[Row]:
         start = self._here()
         if "K" in given and "R" not in given:
-            self.run.interpreter.findings.assume(
-                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", self._place.line
+            making.interpreter.findings.assume(
+                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", making.place.line
             )
         pecking = Pecking(
             start=start,
@@ -209,7 +208,7 @@ class LatheCycles:
     def _unit(self) -> float:
         return self.run.interpreter.state.unit
 
-    def _rows(self, steps: Iterable[TurningStep]) -> list[Words]:
+    def _rows(self, steps: Iterable[TurningStep]) -> list[Row]:
         rows, at = [], self._point(self._start)
         try:
             for step in steps:
@@ -229,9 +228,9 @@ class LatheCycles:
             raise ValueError(str(fault)) from fault
         return rows
 
-    def _passes(self, cycle: str, at: complex, passes: Iterable[Pass]) -> Iterable[Words]:
+    def _passes(self, cycle: str, at: complex, passes: Iterable[Pass]) -> Iterable[Row]:
         """Moves of a thread. Raises ValueError for what contradicts itself in it."""
-        rows: list[Words] = []
+        rows: list[Row] = []
         try:
             for one in passes:
                 if one.pitch:
@@ -243,30 +242,12 @@ class LatheCycles:
             raise ValueError(f"{cycle}: {fault}") from fault
         return rows
 
-    def _fast(self, point: complex) -> Words:
+    def _fast(self, point: complex) -> Row:
         return [("G", 0.0), *self._to(point)]
 
-    def _to(self, point: complex) -> Words:
+    def _to(self, point: complex) -> Row:
         part = 2.0 if self.run.interpreter.state.diameters else 1.0
         return [("X", part * point.imag / self._unit), ("Z", point.real / self._unit)]
-
-
-_CYCLES: dict[str, Callable[[LatheCycles, Given], Iterable[Words]]] = {
-    "G71": lambda cycles, given: cycles._removal(given, facing=False),
-    "G72": lambda cycles, given: cycles._removal(given, facing=True),
-    "G73": LatheCycles._pattern,
-    "G74": lambda cycles, given: cycles._pecking(given, grooving=False),
-    "G75": lambda cycles, given: cycles._pecking(given, grooving=True),
-    "G76": LatheCycles._thread,
-    "G90": lambda cycles, given: cycles._single(given, facing=False),
-    "G92": LatheCycles._single_thread,
-    "G94": lambda cycles, given: cycles._single(given, facing=True),
-}
-
-
-def name_of(letter: str) -> str:
-    """The shared name that holds a cycle's word while it is run."""
-    return f"cycle {letter.lower()}"
 
 
 def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour:

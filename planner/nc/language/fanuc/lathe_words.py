@@ -20,22 +20,25 @@ Refused: drilling cycles, G50 with coordinates.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from planner.nc.language.fanuc.calls import code_of
-from planner.nc.language.fanuc.lathe_cycles import name_of
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tree import (
     Expression,
     Line,
+    MadeRows,
     Message,
     Named,
     Number,
     Numbered,
     Parameter,
-    Turning,
+    SourcePlace,
     Word,
     assign,
+    made,
     row,
     word,
 )
@@ -232,7 +235,7 @@ class LatheWords(FanucParser):
             text = "G92: the control's setting for the chamfer of a thread is taken as 0"
             self.body.append(Message(line.place, (text,)))
         self.body.append(shared(values, line))
-        self.body.append(Turning(line.place, self.cut, "".join(sorted(self.cut_given))))
+        self.body.append(of_shared(line.place, self.cut, sorted(self.cut_given)))
         self.threading = False
 
     def _pecking(self, cycle: str, words: tuple[Word, ...], line: SourceLine) -> None:
@@ -258,8 +261,7 @@ class LatheWords(FanucParser):
                 values["D"] = own[letter].value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
-        self.body.append(shared(values, line))
-        self.body.append(Turning(line.place, cycle, "".join(values)))
+        self.body.append(made(line.place, cycle, **values))
         self.threading = False
 
     def _rest(self, words: tuple[Word, ...], own: set[str], line: SourceLine) -> None:
@@ -285,5 +287,14 @@ def absolute(given: dict[str, Expression]) -> dict[str, Expression]:
 
 
 def shared(values: dict[str, Expression], line: SourceLine) -> Line:
-    """The words in shared names, where `lathe_cycles.LatheCycles.act` finds them."""
-    return assign(line.place, *((Named(name_of(letter), True), value) for letter, value in values.items()))
+    """The words in shared names, for a cycle that is made later."""
+    return assign(line.place, *((_shared(letter), value) for letter, value in values.items()))
+
+
+def of_shared(place: SourcePlace, cycle: str, letters: Iterable[str]) -> MadeRows:
+    """A cycle of the words in shared names."""
+    return made(place, cycle, **{letter: _shared(letter) for letter in letters})
+
+
+def _shared(letter: str) -> Named:
+    return Named(f"cycle {letter.lower()}", True)

@@ -1,5 +1,8 @@
-"""Cycles of conversational programs whose rows are made while the program runs.
+"""Cycles of conversational programs, whose rows are made while the program runs.
 
+    200, 201, 240            drilling, reaming, centring: Q202 infeed, Q206 feed, Q208 feed out (201), Q210 dwell above. Back in the
+                             hole it goes at rapid speed to 0.2 mm above the depth already drilled
+    1 pecking                of older controls, for which the tool stands at the clearance above the surface
     202 boring               Q208 feed out, Q214 direction in which the tool leaves the wall by 0.2 mm
     203, 205 pecking         Q202 infeed, less by Q212 each time but at least Q205; Q256 retract to break the chip, Q208 feed out;
                              203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks, Q258 and Q259 how far
@@ -13,7 +16,7 @@
         Q215 0 all, 1 roughing, 2 finishing; Q368 Q369 allowances; Q202 infeed, Q338 for finishing; Q207 Q206 Q385 feeds; Q351 1 climb,
         -1 conventional; Q370 times the tool's radius between two paths
 
-In all of them Q200 clearance, Q201 depth, Q203 surface, Q204 second clearance, Q211 dwell.
+In all of them Q200 clearance, Q201 depth, Q203 surface, Q204 second clearance, Q211 dwell at the bottom.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import islice
+from typing import Any
 
 from planner.nc.language.making import (
     BREAK,
@@ -39,22 +44,8 @@ from planner.nc.language.making import (
 )
 from planner.nc.language.milling import ArcSlot, PocketPlan, PocketShape, RoundedRectangle, pocket_rows
 
-# Q parameters of all cycles (module text), and of all pockets.
-_HOLE = (200, 201, 203, 204, 211)
-_POCKET = (200, 201, 202, 203, 204, 206, 207, 215, 338, 351, 366, 368, 369, 370, 385)
-PARAMETERS: dict[int, tuple[int, ...]] = {
-    202: (*_HOLE, 206, 208, 214),
-    203: (*_HOLE, 202, 205, 206, 208, 210, 212, 213, 256),
-    205: (*_HOLE, 202, 205, 206, 208, 212, 256, 257, 258, 259, 379),
-    206: (*_HOLE, 206),
-    207: (*_HOLE, 239),
-    208: (*_HOLE, 206, 334, 335, 342, 351),
-    209: (*_HOLE, 239, 256, 257),
-    251: (*_POCKET, 218, 219, 220, 224, 367),
-    252: (*_POCKET, 223, 367),
-    253: (*_POCKET, 218, 219, 367, 374),
-    254: (*_POCKET, 216, 217, 219, 248, 367, 375, 376, 377, 378),
-}
+_FIRST, _LAST = 200, 385  # Q parameters of cycles
+_FEEDS = (206, 207, 208, 385)  # that inch programs give in tenths of an inch per minute
 _AWAY = {1: (-1, 0), 2: (0, -1), 3: (1, 0), 4: (0, 1)}  # directions of Q214
 _AWAY_BY = 0.2  # mm
 _OVERLAP = 1.0  # of the tool's radius between two paths, where Q370 is 0
@@ -78,6 +69,57 @@ def _end(hole: HolePlan) -> Iterator[Row]:
         yield go(hole.retract)
 
 
+def parameters(making: Making) -> dict[str, float]:
+    """Q parameters of cycles by name, feeds in the program's unit per minute."""
+    scale = 1.0 if making.unit == 1.0 else 0.1
+    values = enumerate(making.numbered[_FIRST + 1 : _LAST + 2], start=_FIRST)
+    return {f"Q{n}": (value or 0.0) * (scale if n in _FEEDS else 1.0) for n, value in values}
+
+
+def _pecked(making: Making, given: Mapping[str, float], out: float = 0.0, **pecks: Any) -> Iterator[Row]:
+    """Cycles 1, 200, 203 and 205: by infeeds, out at a feed or, where it is 0, at rapid speed."""
+    hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
+    usual = {
+        "infeed": given["Q202"],
+        "less": 0.0,
+        "least": 0.0,
+        "back": given["Q256"] or gap,
+        "ahead": (gap, gap),
+    }
+    yield from pecked(hole, Pecks(**usual | pecks))
+    yield go(hole.clear, out or None)
+    yield from _end(hole)
+
+
+def _old_pecking(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+    """The tool stands at the clearance above the surface already."""
+    surface = making.shared["_z"] - given["Q200"]
+    making.numbered[203 + 1], making.numbered[204 + 1] = surface, 0.0
+    return islice(_pecked(making, parameters(making), above=given["Q210"]), 1, None)
+
+
+def _universal(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+    decreasing = {"less": given["Q212"], "least": given["Q205"], "breaks": round(given["Q213"])}
+    return _pecked(making, given, given["Q208"], above=given["Q210"], **decreasing)
+
+
+def _pecking(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+    if given["Q379"]:
+        raise ValueError("Q379, a starting point that is drilled already, is not read")
+    decreasing = {"less": given["Q212"], "least": given["Q205"], "chip": given["Q257"]}
+    return _pecked(making, given, given["Q208"], ahead=(given["Q258"], given["Q259"]), **decreasing)
+
+
+def _at_once(making: Making, given: Mapping[str, float], out: float) -> Iterator[Row]:
+    """Cycles 201 and 240: without infeeds, out at a feed or, where it is 0, at rapid speed."""
+    hole = _hole(given, given["Q206"])
+    yield go(hole.clear)
+    yield go(hole.bottom, hole.feed)
+    yield from dwell_rows(hole.dwell)
+    yield go(hole.clear, out if out > 0.0 else None)
+    yield from _end(hole)
+
+
 def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     hole, (x, y, _) = _hole(given, given["Q206"]), making.here()
     yield go(hole.clear)
@@ -95,42 +137,10 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     yield [("G", 0.0), ("X", x), ("Y", y)]
 
 
-def _universal(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
-    pecks = Pecks(
-        infeed=given["Q202"],
-        less=given["Q212"],
-        least=given["Q205"],
-        back=given["Q256"] or gap,
-        ahead=(gap, gap),
-        breaks=round(given["Q213"]),
-        above=given["Q210"],
-    )
-    yield from pecked(hole, pecks)
-    yield go(hole.clear, given["Q208"] or None)
-    yield from _end(hole)
-
-
-def _pecking(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    if given["Q379"]:
-        raise ValueError("Q379, a starting point that is drilled already, is not read")
-    hole = _hole(given, given["Q206"])
-    pecks = Pecks(
-        infeed=given["Q202"],
-        less=given["Q212"],
-        least=given["Q205"],
-        back=given["Q256"] or BREAK / making.unit,
-        ahead=(given["Q258"], given["Q259"]),
-        chip=given["Q257"],
-    )
-    yield from pecked(hole, pecks)
-    yield go(hole.clear, given["Q208"] or None)
-    yield from _end(hole)
-
-
-def _tapped(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _tapped(making: Making, given: Mapping[str, float], lead: float | None = None) -> Iterable[Row]:
+    """At the lead, or at the feed of cycle 206."""
     hole, speed = _hole(given), making.interpreter.state.spindle.speed
-    lead = given["Q239"] if "Q239" in given else (given["Q206"] / speed if speed else 0.0)
+    lead = (given["Q206"] / speed if speed else 0.0) if lead is None else lead
     yield from tapped(making, hole, lead, speed)
     yield from _end(hole)
 
@@ -263,16 +273,20 @@ def _slots_on_circle(making: Making, given: Mapping[str, float]) -> Iterable[Row
         yield from _cut(making, shape, given, at, k * given["Q378"])
 
 
-MAKERS: dict[str, Maker] = {
-    "cycle 202": _bored,
-    "cycle 203": _universal,
-    "cycle 205": _pecking,
-    "cycle 206": _tapped,
-    "cycle 207": _tapped,
-    "cycle 208": _milled,
-    "cycle 209": _tapped_by_breaks,
-    "cycle 251": _rectangle,
-    "cycle 252": _circle,
-    "cycle 253": _slot,
-    "cycle 254": _slots_on_circle,
+CYCLES: dict[int, Maker] = {
+    1: _old_pecking,
+    200: lambda making, given: _pecked(making, given, above=given["Q210"]),
+    201: lambda making, given: _at_once(making, given, given["Q208"]),
+    202: _bored,
+    203: _universal,
+    205: _pecking,
+    206: _tapped,
+    207: lambda making, given: _tapped(making, given, given["Q239"]),
+    208: _milled,
+    209: _tapped_by_breaks,
+    240: lambda making, given: _at_once(making, given, 0.0),
+    251: _rectangle,
+    252: _circle,
+    253: _slot,
+    254: _slots_on_circle,
 }

@@ -10,7 +10,7 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
-from planner.nc.language.heidenhain import contour, cycles, drilling
+from planner.nc.language.heidenhain import contour, cycles, patterns
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import (
@@ -50,8 +50,8 @@ def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict
     return found
 
 
-READ = (*drilling.CYCLES, *cycles.PARAMETERS, *drilling.PATTERNS)
-_FEEDS = (206, 207, 208, 385)  # Q parameters, in tenths of an inch per minute in inch programs
+READ = (*cycles.CYCLES, *patterns.PATTERNS)
+_OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
 # Q parameters that are read where they are 0 only.
 _REFUSED = {
     365: "Q365 1, moves between the places on the circle, is not read; write 0",
@@ -120,7 +120,10 @@ class Definitions(Flow):
     cycles : numbers of those that the program defines
     oversizes : a tool call of the program has DR
     tool_names : numbers of tools that have names
+    source     : the file
     """
+
+    source: Source
 
     def __init__(self) -> None:
         super().__init__()
@@ -210,9 +213,9 @@ class Definitions(Flow):
             if int(entry.group(1)) in _REFUSED and number != tree.ZERO:
                 raise block.fault(_REFUSED[int(entry.group(1))], column + entry.start())
             given.append((self._q(block, int(entry.group(1))), number))
-        if cycle in drilling.PATTERNS:
-            called = [*self._call_cycle(block), looked_up(block)]
-            return [tree.assign(block.place, *given), *drilling.pattern(block, cycle, called)]
+        if cycle in patterns.PATTERNS:
+            self._call_cycle(block)
+            return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
         return [tree.assign(block.place, *given, (own("cycle"), tree.Number(float(cycle))))]
 
     def _old_cycle(
@@ -243,34 +246,15 @@ class Definitions(Flow):
         if part == 0:
             return [tree.assign(block.place, (own("cycle"), tree.ONE))]
         match = _PECKING.match(block.text, column)
-        if match is None or not 1 <= part <= len(drilling.PECKING):
+        if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
         number, _ = value(block, match.end())
-        return [tree.assign(block.place, (parameter(drilling.PECKING[part - 1]), number))]
+        return [tree.assign(block.place, (parameter(_OLD_PECKING[part - 1]), number))]
 
     def _call_cycle(self, block: ConversationalBlock) -> list[tree.Statement]:
-        known = sorted(self.cycles & {*drilling.CYCLES, *cycles.PARAMETERS})
-        if not known:
+        if not self.cycles & cycles.CYCLES.keys():
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
-        branches = tuple(
-            (tree.op("EQ", own("cycle"), tree.Number(float(cycle))), self._one_cycle(block, cycle))
-            for cycle in known
-        )
-        nothing = tree.Message(block.place, ("a cycle is called before it is defined: nothing is drilled",))
-        return [tree.If(block.place, branches, [nothing])]
-
-    def _one_cycle(self, block: ConversationalBlock, cycle: int) -> list[tree.Statement]:
-        """A cycle at the present place, and the feed as it was before."""
-        keep, back = tree.made(block.place, "keep"), tree.made(block.place, "bring back", feed=tree.ONE)
-        if cycle in drilling.CYCLES:
-            return [keep, *drilling.drilled(block, cycle, self.moves, self.unit), back]
-        given = {
-            f"Q{q}": self.moves.scaled(parameter(q)) if q in _FEEDS else parameter(q)
-            for q in cycles.PARAMETERS[cycle]
-        }
-        return [keep, tree.made(block.place, f"cycle {cycle}", **given), back, looked_up(block)]
-
-    source: Source
+        return [tree.made(block.place, "cycle in force")]
 
     def _codes(
         self, block: ConversationalBlock, given: Items, *, straight: bool = False

@@ -2,7 +2,7 @@
 
     BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP CTP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = .., FN 0-14
     RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
-    CYCL DEF 1 200 201 240 (`drilling`) 202 to 209, 251 to 254 (`cycles`) 220 221 (`patterns`)    CYCL CALL [POS], M99    STOP, M codes
+    CYCL DEF 1 200 to 209, 220 221 240, 251 to 254 (`cycles`)    CYCL CALL [POS], M99    STOP, M codes
 
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
 LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.

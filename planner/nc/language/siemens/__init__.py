@@ -1,2 +1,2 @@
-"""Siemens' language (Sinumerik): `text` its expressions and words, `codes` its tables, `control` loops and jumps, `commands` and
-`drilling` what is no word, `parser` all of it as statements."""
+"""Siemens' language (Sinumerik): `text` its expressions, words, loops and jumps, `commands` its tables and what is no word, `cycles`,
+`block_words` rows of words, `parser` all of it as statements."""

@@ -11,25 +11,13 @@ from __future__ import annotations
 import re
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.making import assumed_row
-from planner.nc.language.siemens import commands, cycles, drilling
+from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.commands import Commands
 from planner.nc.language.siemens.text import LineTokens, position
 from planner.nc.language.source import Source
-from planner.nc.language.tree import (
-    ONE,
-    ZERO,
-    Expression,
-    Line,
-    MadeRows,
-    Number,
-    Parameter,
-    Word,
-    made,
-    row,
-    word,
-)
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
@@ -48,11 +36,11 @@ class BlockWords(Commands):
 
     def _words(self, reader: LineTokens) -> None:
         """A row of words, commands that move nothing, and assignments."""
-        words: list[Word] = []
-        assigned: list[tuple[Parameter, Expression]] = []
+        words: list[tree.Word] = []
+        assigned: list[tuple[tree.Parameter, tree.Expression]] = []
         found: set[float] = set()
         stops = moved = False
-        before: list[MadeRows] = []  # corners and compensation, before the row
+        before: list[tree.MadeRows] = []  # corners and compensation, before the row
         arc, through = "", {}
         while not reader.ended:
             token, at = reader.tokens[reader.next], reader.at()
@@ -65,7 +53,7 @@ class BlockWords(Commands):
                 arc, self.circular = name, True
             elif name in CORNERS:
                 reader.expect("=")
-                corner = made(reader.place, "corner", kind=CORNERS.index(name), size=reader.expression())
+                corner = tree.made(reader.place, "corner", kind=CORNERS.index(name), size=reader.expression())
                 before.append(corner)
             elif name in ("I1", "J1", "K1") and arc == "CIP":
                 axis = "XYZ"["IJK".index(name[0])]
@@ -73,8 +61,8 @@ class BlockWords(Commands):
                 assert value is not None
                 through[f"{axis}1"] = self._absolute(axis, value)
             elif name == "SUPA":
-                words.append(word("G", at, 53.0))
-            elif name in drilling.ARGUMENTS or name in cycles.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
+                words.append(tree.word("G", at, 53.0))
+            elif name in cycles.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
                 self._cycle(reader, name)
             elif name == "KONT" and self.compensates:
                 raise reader.fault("KONT, another approach to the contour, is not read; write NORM", token.at)
@@ -98,9 +86,11 @@ class BlockWords(Commands):
             else:
                 for one in self._word(reader, name, at):
                     letter, code = chr(one.letter), one.value
-                    if letter == "G" and isinstance(code, Number):
+                    if letter == "G" and isinstance(code, tree.Number):
                         if code.value in _SIDES:
-                            before.insert(0, made(reader.place, "compensate", side=_SIDES[int(code.value)]))
+                            before.insert(
+                                0, tree.made(reader.place, "compensate", side=_SIDES[int(code.value)])
+                            )
                             continue
                         self.circular &= code.value not in (0.0, 1.0, 2.0, 3.0)
                         found.add(code.value)
@@ -120,25 +110,25 @@ class BlockWords(Commands):
         ended = [
             one
             for one in words
-            if one.letter == ord("M") and isinstance(one.value, Number) and one.value.value in returns
+            if one.letter == ord("M") and isinstance(one.value, tree.Number) and one.value.value in returns
         ]
         words = [one for one in words if one not in ended]
-        words += [word("M", one.at, 30.0) for one in ended if not self.source.file]
+        words += [tree.word("M", one.at, 30.0) for one in ended if not self.source.file]
         self.body += before
         if self.circular and any(chr(one.letter) in "XYZ" for one in words):
             words = self._circle(reader, arc, words, through)
         if words or assigned:
-            self.body.append(Line(reader.place, tuple(words), tuple(assigned)))
+            self.body.append(tree.Line(reader.place, tuple(words), tuple(assigned)))
         if stops:
-            self.body.append(row(reader.place, ("G", 4.0), ("P", ZERO)))
+            self.body.append(tree.row(reader.place, ("G", 4.0), ("P", tree.ZERO)))
         if moved and self.cycle is not None:
             self.body += self.cycle
         if ended and self.source.file:
             self._return(reader)
 
     def _circle(
-        self, reader: LineTokens, arc: str, words: list[Word], through: dict[str, Expression]
-    ) -> list[Word]:
+        self, reader: LineTokens, arc: str, words: list[tree.Word], through: dict[str, tree.Expression]
+    ) -> list[tree.Word]:
         """An arc of CIP or CT with the coordinates among the words; returns the other words."""
         if not arc:
             raise reader.fault(
@@ -151,13 +141,13 @@ class BlockWords(Commands):
                 given[letter] = self._absolute(letter, one.value)
             elif letter == "F":
                 given["F"] = one.value
-        self.body.append(made(reader.place, _ARCS[arc], **given))
+        self.body.append(tree.made(reader.place, _ARCS[arc], **given))
         return [one for one in words if chr(one.letter) not in "XYZF"]
 
-    def _absolute(self, axis: str, given: Expression) -> Expression:
+    def _absolute(self, axis: str, given: tree.Expression) -> tree.Expression:
         return given if self.absolute else position(axis) + given
 
-    def _word(self, reader: LineTokens, name: str, at: int) -> list[Word]:
+    def _word(self, reader: LineTokens, name: str, at: int) -> list[tree.Word]:
         """The words of RS274NGC for one word. Raises ProgramFault."""
         number = float(name[1:]) if reader.tokens[reader.next - 1].kind == "word" else None
         letter = name[0] if number is not None else re.sub(r"\d+\Z", "", name)
@@ -167,18 +157,18 @@ class BlockWords(Commands):
             reader.expect("=")
             value = reader.expression()
             letter = "R" if name == "CR" else "P"
-            return [word(letter, at, value + ONE if name == "TURN" else value)]
+            return [tree.word(letter, at, value + tree.ONE if name == "TURN" else value)]
         if letter in ("A", "B", "C") and name != letter and number is None:
             raise reader.fault(f"{name}=, a direction of the tool, is not read; {_ANGLES}", at - reader.start)
         if len(letter) != 1 or letter not in "XYZIJKFSTMDHABC" or (number is None and reader.peek() != "="):
             raise reader.fault(f"{name} is not read; {commands.REMEDY}", at - reader.start)
-        given = Number(number) if number is not None else self._given(reader, letter, at)
+        given = tree.Number(number) if number is not None else self._given(reader, letter, at)
         if letter == "D":
             self.body.append(assumed_row(reader.place, "tool offset"))
         # A tool by its name has no number.
-        return [] if given is None or letter == "D" else [word(letter, at, given)]
+        return [] if given is None or letter == "D" else [tree.word(letter, at, given)]
 
-    def _code(self, reader: LineTokens, code: int, at: int) -> list[Word]:
+    def _code(self, reader: LineTokens, code: int, at: int) -> list[tree.Word]:
         if code in (90, 91):
             self.absolute = code == 90
             if reader.peek() == "(":
@@ -195,15 +185,17 @@ class BlockWords(Commands):
             self.body.append(assumed_row(reader.place, "tool centre feed"))
         if code == 500:
             origin = (("G", 10.0), ("L", 2.0), ("P", 9.0), ("X", 0.0), ("Y", 0.0), ("Z", 0.0))
-            self.body.append(Line(reader.place, tuple(word(letter, at, value) for letter, value in origin)))
+            self.body.append(
+                tree.Line(reader.place, tuple(tree.word(letter, at, value) for letter, value in origin))
+            )
         if code in (*_SIDES, 9):
-            return [word("G", at, float(code))]
+            return [tree.word("G", at, float(code))]
         if code == 641:
-            return [word("G", at, 64.0)]
+            return [tree.word("G", at, 64.0)]
         if code in commands.CODES:
-            return [word("G", at, one) for one in commands.CODES[code]]
+            return [tree.word("G", at, one) for one in commands.CODES[code]]
         if code in (*commands.SAME_CODES, 4):
-            return [word("G", at, float(code))]
+            return [tree.word("G", at, float(code))]
         raise reader.fault(f"G{code} of Siemens is not read; {commands.REMEDY}", at - reader.start)
 
 

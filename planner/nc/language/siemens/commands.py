@@ -15,23 +15,10 @@ from __future__ import annotations
 
 import re
 
+from planner.nc.language import tree
 from planner.nc.language.makers import ADDED, SIEMENS
-from planner.nc.language.siemens import cycles, drilling
+from planner.nc.language.siemens import cycles
 from planner.nc.language.siemens.text import LineTokens, SiemensControl, handed_over, position, variable
-from planner.nc.language.tree import (
-    ONE,
-    ZERO,
-    Call,
-    Expression,
-    Message,
-    Number,
-    Parameter,
-    Return,
-    Statement,
-    assign,
-    made,
-    row,
-)
 
 # Letters of words with the same meaning in RS274NGC.
 PLAIN_LETTERS = "NGXYZIJKFSM"
@@ -104,10 +91,10 @@ class Commands(SiemensControl):
 
     def __init__(self) -> None:
         super().__init__()
-        self.names = {"_DEPTH", "_STEP"}
+        self.names: set[str] = set()
         self.absolute = True
         self.unit = 1.0
-        self.cycle: list[Statement] | None = None
+        self.cycle: list[tree.Statement] | None = None
         self.compensates = False
         self.at_tip = False
 
@@ -115,37 +102,36 @@ class Commands(SiemensControl):
         place = reader.place
         given = self._arguments(reader)
         if name == "CYCLE800":
-            if any(one is not None and one not in (ZERO, Number(-0.0)) for one in given[4:]):
+            if any(one is not None and one not in (tree.ZERO, tree.Number(-0.0)) for one in given[4:]):
                 raise reader.fault("CYCLE800 with angles tilts the part; axes that turn are not planned yet")
         elif name == "CYCLE832":
-            if given and given[0] is not None and given[0] != ZERO:
-                self.body.append(row(place, ("G", 64.0), ("P", given[0])))
+            if given and given[0] is not None and given[0] != tree.ZERO:
+                self.body.append(tree.row(place, ("G", 64.0), ("P", given[0])))
         else:
             self.body += self._drilled(reader, name, given)
 
-    def _drilled(self, reader: LineTokens, name: str, given: list[Expression | None]) -> list[Statement]:
+    def _drilled(
+        self, reader: LineTokens, name: str, given: list[tree.Expression | None]
+    ) -> list[tree.Statement]:
         """A cycle, and what it keeps as it was. Raises ProgramFault."""
         place = reader.place
-        known = (cycles.ARGUMENTS | drilling.ARGUMENTS)[name]
+        known = cycles.ARGUMENTS[name]
         for k, more in enumerate(given[len(known) :]):
-            if more not in (None, ZERO, Number(-0.0)):
+            if more not in (None, tree.ZERO, tree.Number(-0.0)):
                 raise reader.fault(
                     f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out",
                     0,
                 )
+        values = {key: value for key, value in zip(known, given, strict=False) if value is not None}
         try:
-            if name in cycles.ARGUMENTS:
-                values = {k: v for k, v in zip(known, given, strict=False) if v is not None}
-                rows: list[Statement] = [made(place, name, **values)]
-            else:
-                rows = drilling.drilled_rows(place, name, given, self.unit)
+            cycles.check(name, values)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
-        return [made(place, "keep"), *rows, made(place, "bring back", feed=ZERO)]
+        return [tree.made(place, name, **values)]
 
-    def _arguments(self, reader: LineTokens) -> list[Expression | None]:
+    def _arguments(self, reader: LineTokens) -> list[tree.Expression | None]:
         """The arguments in the brackets behind a cycle; None for what is left out or a text."""
-        given: list[Expression | None] = []
+        given: list[tree.Expression | None] = []
         if not reader.take("("):
             return given
         while not reader.take(")"):
@@ -167,7 +153,7 @@ class Commands(SiemensControl):
             raise reader.fault(f"{name} stands behind MCALL with a drilling cycle, which it repeats", 0)
         given = self._arguments(reader)
         try:
-            self.body += drilling.pattern_rows(reader.place, name, given, self.cycle)
+            self.body += cycles.pattern_rows(reader.place, name, given, self.cycle)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
 
@@ -177,7 +163,7 @@ class Commands(SiemensControl):
             return
         name = reader.peek()
         reader.next += 1
-        known = [one for one in drilling.ARGUMENTS | cycles.ARGUMENTS if one not in cycles.POCKETS]
+        known = [one for one in cycles.ARGUMENTS if one not in cycles.POCKETS]
         if name not in known:
             raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
         self.cycle = self._drilled(reader, name, self._arguments(reader))
@@ -186,7 +172,7 @@ class Commands(SiemensControl):
         """TRANS, ROT, SCALE, MIRROR: a frame; ATRANS and the others: one beside the one before."""
         name, place = reader.peek(-1), reader.place
         kind = SIEMENS.index(name.removeprefix("A")) + (ADDED if name.startswith("A") else 0)
-        given: dict[str, Expression] = {}
+        given: dict[str, tree.Expression] = {}
         while not reader.ended:
             token, at = reader.tokens[reader.next], reader.at()
             reader.next += 1
@@ -194,12 +180,16 @@ class Commands(SiemensControl):
             single = token.kind == "word" or len(token.text) == len(letter)
             if letter not in ("X", "Y", "Z", "RPL") or not single:
                 raise reader.fault(f"{name} takes X, Y and Z; {token.text} comes", token.at)
-            value = Number(float(token.text[1:])) if token.kind == "word" else self._given(reader, letter, at)
+            value = (
+                tree.Number(float(token.text[1:]))
+                if token.kind == "word"
+                else self._given(reader, letter, at)
+            )
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
-        self.body.append(made(place, "siemens frame", kind=kind, **given))
-        self.body.append(made(place, "frame in force"))
+        self.body.append(tree.made(place, "siemens frame", kind=kind, **given))
+        self.body.append(tree.made(place, "frame in force"))
 
     def _define(self, reader: LineTokens) -> None:
         kind = reader.peek()
@@ -212,8 +202,8 @@ class Commands(SiemensControl):
                 raise reader.fault("the name of a variable is expected here; arrays are not read")
             reader.next += 1
             self.names.add(name)
-            value = reader.expression() if reader.take("=") else ZERO
-            self.body.append(assign(reader.place, (variable(name), value)))
+            value = reader.expression() if reader.take("=") else tree.ZERO
+            self.body.append(tree.assign(reader.place, (variable(name), value)))
             if not reader.take(","):
                 return
 
@@ -221,7 +211,7 @@ class Commands(SiemensControl):
         match = re.search(r'"([^"]*)"', reader.text)
         reader.next = len(reader.tokens)
         if match and match.group(1):
-            self.body.append(Message(reader.place, (match.group(1),)))
+            self.body.append(tree.Message(reader.place, (match.group(1),)))
 
     def _refused(self, reader: LineTokens) -> None:
         raise reader.fault(f"{reader.peek(-1)} is not read; {REMEDY}", reader.tokens[reader.next - 1].at)
@@ -234,7 +224,7 @@ class Commands(SiemensControl):
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
             raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
         if self.at_tip:
-            self.body.append(row(reader.place, ("M", TOOL_POINT[name])))
+            self.body.append(tree.row(reader.place, ("M", TOOL_POINT[name])))
         elif name == "TRAORI":
             raise reader.fault(
                 "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
@@ -243,7 +233,7 @@ class Commands(SiemensControl):
     def _idle(self, reader: LineTokens) -> None:
         reader.next = len(reader.tokens)
 
-    def _given(self, reader: LineTokens, letter: str, at: int) -> Expression | None:
+    def _given(self, reader: LineTokens, letter: str, at: int) -> tree.Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
         reader.expect("=")
         if not reader.ended and reader.tokens[reader.next].kind == "text":
@@ -258,8 +248,8 @@ class Commands(SiemensControl):
         return reader.expression()
 
     def _coordinate(
-        self, letter: str, value: Expression, absolute: bool, reader: LineTokens, at: int
-    ) -> Expression:
+        self, letter: str, value: tree.Expression, absolute: bool, reader: LineTokens, at: int
+    ) -> tree.Expression:
         if letter in "IJK":
             return value - position("XYZ"["IJK".index(letter)]) if absolute else value
         if letter not in "XYZ":
@@ -284,11 +274,11 @@ class Commands(SiemensControl):
         """NAME, NAME P3, NAME(values)."""
         name = reader.peek()
         reader.next += 1
-        times: Expression = ONE
+        times: tree.Expression = tree.ONE
         given = self._arguments(reader)
         if match := _TIMES.fullmatch(reader.peek()):
             reader.next += 1
-            times = Number(float(match.group(1)))
+            times = tree.Number(float(match.group(1)))
         if not reader.ended:
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
@@ -304,27 +294,27 @@ class Commands(SiemensControl):
             "",
             re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1]),
         )
-        self._append_call(reader, name.upper(), [], ONE)
+        self._append_call(reader, name.upper(), [], tree.ONE)
 
     def _append_call(
-        self, reader: LineTokens, name: str, given: list[Expression | None], times: Expression
+        self, reader: LineTokens, name: str, given: list[tree.Expression | None], times: tree.Expression
     ) -> None:
         if len(given) > _NAMES_MAX:
             raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
-        handed: list[tuple[Parameter, Expression]] = [
-            (handed_over(k), given[k] if k < len(given) and given[k] is not None else ZERO)  # type: ignore[misc]
+        handed: list[tuple[tree.Parameter, tree.Expression]] = [
+            (handed_over(k), given[k] if k < len(given) and given[k] is not None else tree.ZERO)  # type: ignore[misc]
             for k in range(_NAMES_MAX if given else 0)
         ]
         if handed:
-            self.body.append(assign(reader.place, *handed))
-        self.body.append(Call(reader.place, name.lower(), None, name, times))
+            self.body.append(tree.assign(reader.place, *handed))
+        self.body.append(tree.Call(reader.place, name.lower(), None, name, times))
 
     def _procedure(self, reader: LineTokens) -> None:
         """PROC NAME(REAL A, INT B)."""
         if reader.ended or reader.tokens[reader.next].kind != "name":
             raise reader.fault("PROC is followed by the subprogram's name")
         reader.next += 1
-        taken: list[tuple[Parameter, Expression]] = []
+        taken: list[tuple[tree.Parameter, tree.Expression]] = []
         if reader.take("("):
             while not reader.take(")"):
                 kind, name = reader.peek(), reader.peek(1)
@@ -337,11 +327,11 @@ class Commands(SiemensControl):
                     raise reader.fault(") is missing")
         reader.next = len(reader.tokens)  # SAVE, DISPLOF and others
         if taken:
-            self.body.append(assign(reader.place, *taken))
+            self.body.append(tree.assign(reader.place, *taken))
 
     def _return(self, reader: LineTokens) -> None:
         """RET."""
-        self.body.append(Return(reader.place))
+        self.body.append(tree.Return(reader.place))
 
 
 def siemens_files(name: str) -> frozenset[str]:

@@ -1,7 +1,11 @@
-"""Cycles of Sinumerik controls whose rows are made while the program runs.
+"""Cycles of Sinumerik controls, at the present place; their rows are made while the program runs.
 
     RTP retract plane    RFP reference plane    SDIS distance above it    DP depth, or DPR below the reference plane    DTB dwell
 
+    CYCLE81, CYCLE82    in and, after a dwell, rapid out
+    CYCLE83             by infeeds: the first to FDEP (or FDPR below the reference plane), each of the others less by DAM, but not less
+                        than DAM; between them a dwell below (DTB), and out to RFP + SDIS with a dwell there (DTS; VARI 1), or back by
+                        1 mm to break the chip (VARI 0)
     CYCLE84, CYCLE840   tapping: SDAC, MPIT (size) or PIT (lead), SST and SST1 speed in and out;  SDR, SDAC, ENC, MPIT, PIT
     CYCLE85             FFR in, RFF out                 CYCLE86   stopped spindle, away by RPA RPO RPAP, rapid out
     CYCLE87, CYCLE88    spindle stop and M0 on the ground (CYCLE88: after a dwell), rapid out
@@ -13,13 +17,32 @@
 
 Arguments of later controls behind these (units, modes) change the meaning of the others; they are refused where they are not 0 or left
 out.
+
+Patterns of holes, each drilled by the cycle of MCALL:
+
+    HOLES1(SPCA, SPCO, STA1, FDIS, DBH, NUM)    a row, n = 0 ... NUM - 1:  (SPCA, SPCO) + (FDIS + n DBH) (cos STA1, sin STA1)
+    HOLES2(CPA, CPO, RAD, STA1, INDA, NUM)      a circle:  (CPA, CPO) + RAD (cos a, sin a),  a = STA1 + n INDA (0: n 360 / NUM)
+
+Controls may begin a row at its other end, if that is nearer; here it begins at its first hole.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
-from planner.nc.language.making import HolePlan, Maker, Making, Row, coarse_lead, dwell_rows, go, tapped
+from planner.nc.language import tree
+from planner.nc.language.making import (
+    HolePlan,
+    Maker,
+    Making,
+    Row,
+    around,
+    coarse_lead,
+    dwell_rows,
+    equal_steps,
+    go,
+    tapped,
+)
 from planner.nc.language.milling import (
     HELIX,
     RAPID,
@@ -29,10 +52,14 @@ from planner.nc.language.milling import (
     RoundedRectangle,
     pocket_rows,
 )
+from planner.nc.language.siemens.text import variable
 
 _DEPTH = ("RTP", "RFP", "SDIS", "DP", "DPR")
 _CUTTING = ("MID", "FAL", "FALD", "FFP1", "FFD", "CDIR", "VARI", "MIDA", "AP1")
 ARGUMENTS = {
+    "CYCLE81": _DEPTH,
+    "CYCLE82": (*_DEPTH, "DTB"),
+    "CYCLE83": (*_DEPTH, "FDEP", "FDPR", "DAM", "DTB", "DTS", "FRF", "VARI"),
     "CYCLE84": (*_DEPTH, "DTB", "SDAC", "MPIT", "PIT", "POSS", "SST", "SST1"),
     "CYCLE840": (*_DEPTH, "DTB", "SDR", "SDAC", "ENC", "MPIT", "PIT"),
     "CYCLE85": (*_DEPTH, "DTB", "FFR", "RFF"),
@@ -44,23 +71,84 @@ ARGUMENTS = {
     "POCKET4": ("RTP", "RFP", "SDIS", "DP", "PRAD", "PA", "PO", *_CUTTING, "AD", "RAD1", "DP1"),
 }  # fmt: skip
 POCKETS = ("POCKET3", "POCKET4")
+_DRILLING = ("CYCLE81", "CYCLE82", "CYCLE83")
+_APART = 1.0  # mm by which the tool goes back to break a chip, and above the depth already drilled where feed begins
+_SHORT = 1e-9  # an infeed that is none
 _OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
 _LEFT = 4.0  # SDIR, SDAC: M4
+_HALT: tuple[Row, Row] = ([("M", 5.0)], [("M", 0.0)])  # the spindle stops, then the program
 
 
-def _required(name: str, given: Mapping[str, float], *keys: str) -> None:
+PATTERNS = {
+    "HOLES1": ("SPCA", "SPCO", "STA1", "FDIS", "DBH", "NUM"),
+    "HOLES2": ("CPA", "CPO", "RAD", "STA1", "INDA", "NUM"),
+}
+_TURN = tree.Number(360.0)  # [degrees]
+
+
+def pattern_rows(
+    place: tree.SourcePlace,
+    name: str,
+    given: Sequence[tree.Expression | None],
+    drilled: Sequence[tree.Statement],
+) -> list[tree.Statement]:
+    """Moves to the holes with the statements of their cycle behind each.
+
+    Raises ValueError for arguments that are missing.
+    """
+    known = {key: value for key, value in zip(PATTERNS[name], given, strict=False) if value is not None}
+    missing = [key for key in PATTERNS[name] if key not in known and key != "INDA"]
+    if missing:
+        raise ValueError(f"{name} needs {missing[0]}")
+    n, angle, radius = variable("_hole"), variable("_angle"), variable("_radius")
+    if name == "HOLES1":
+        along, turned = known["FDIS"] + n * known["DBH"], known["STA1"]
+        first = known["SPCA"], known["SPCO"]
+    else:
+        step = known.get("INDA", tree.ZERO)
+        even = tree.op("EQ", step, tree.ZERO)  # 1 where the holes are spread evenly
+        along, turned = known["RAD"], known["STA1"] + n * (step + even * (_TURN / known["NUM"]))
+        first = known["CPA"], known["CPO"]
+    x, y = (start + radius * tree.op(part, angle) for start, part in zip(first, ("COS", "SIN"), strict=True))
+    turn: list[tree.Statement] = [
+        tree.assign(place, (angle, turned), (radius, along)),
+        tree.row(place, ("G", tree.ZERO), ("X", x), ("Y", y)),
+        *drilled,
+        tree.assign(place, (n, n + tree.ONE)),
+    ]
+    loop = tree.Loop(place, "while", f"{name} {place.at}", tree.op("LT", n, known["NUM"]), turn)
+    return [tree.assign(place, (n, tree.ZERO)), loop]
+
+
+def check(name: str, given: Container[str]) -> None:
+    """Raises ValueError for arguments that are missing: those of CYCLE81 to CYCLE83 are looked at in the text."""
+    if name in _DRILLING:
+        _required(name, given, "RTP", "RFP", "SDIS")
+        for pair in (("DP", "DPR"), ("FDEP", "FDPR"))[: 1 + (name == "CYCLE83")]:
+            _require_depth(name, given, *pair)
+
+
+def _required(name: str, given: Container[str], *keys: str) -> None:
     for key in keys:
         if key not in given:
             raise ValueError(f"{name} needs {key}")
 
 
+def _require_depth(name: str, given: Container[str], absolute: str, below: str) -> None:
+    if absolute not in given and below not in given:
+        raise ValueError(f"{name} needs {absolute} or {below}")
+
+
+def _depth(given: Mapping[str, float], absolute: str, below: str) -> float:
+    return given[absolute] if absolute in given else given["RFP"] - abs(given[below])
+
+
 def _hole(name: str, given: Mapping[str, float]) -> HolePlan:
     _required(name, given, "RTP", "RFP", "SDIS")
-    if "DP" not in given and "DPR" not in given:
-        raise ValueError(f"{name} needs DP or DPR")
+    _require_depth(name, given, "DP", "DPR")
     top = given["RFP"]
-    bottom = given["DP"] if "DP" in given else top - abs(given["DPR"])
-    return HolePlan(top + abs(given["SDIS"]), top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
+    clear, bottom = top + abs(given["SDIS"]), _depth(given, "DP", "DPR")
+    return HolePlan(clear, top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
 
 
 def _lead(given: Mapping[str, float], unit: float) -> float:
@@ -100,7 +188,7 @@ def _drilled(hole: HolePlan, given: Mapping[str, float]) -> Iterator[Row]:
     if "SDIR" in given:
         yield [("M", 4.0 if given["SDIR"] == _LEFT else 3.0)]
     yield go(hole.clear)
-    yield [("G", 1.0), ("Z", hole.bottom)]
+    yield _in(hole.bottom)
     yield from dwell_rows(hole.dwell)
 
 
@@ -114,22 +202,43 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     yield [("G", 0.0), ("X", x), ("Y", y), ("Z", hole.retract)]
 
 
-def _stopped(name: str) -> Maker:
+def _straight(name: str, *behind: Row, out: bool = False) -> Maker:
+    """Down at the feed, then what comes `behind`, and with `out` back at the feed, else at rapid speed."""
+
     def rows(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
         hole = _hole(name, given)
         yield from _drilled(hole, given)
-        yield [("M", 5.0)]
-        yield [("M", 0.0)]
+        yield from behind
+        if out:
+            yield _in(hole.clear)
         yield go(hole.retract)
 
     return rows
 
 
-def _out_at_feed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole = _hole("CYCLE89", given)
-    yield from _drilled(hole, given)
-    yield [("G", 1.0), ("Z", hole.clear)]
+def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+    hole, less = _hole("CYCLE83", given), abs(given.get("DAM", 0.0))
+    first, apart = _depth(given, "FDEP", "FDPR"), _APART / making.unit
+    depth, step = max(first, hole.bottom), hole.top - first
+    equal_steps(hole.top - hole.bottom, less or max(step, _SHORT))
+    yield go(hole.clear)
+    yield _in(depth)
+    while depth > hole.bottom:
+        yield from dwell_rows(hole.dwell)
+        if given.get("VARI", 0.0):
+            yield go(hole.clear)
+            yield from dwell_rows(given.get("DTS", 0.0))
+        yield go(depth + apart)
+        step = max(step - less, less) if less > 0.0 else step
+        depth = max(depth - step, hole.bottom)
+        yield _in(depth)
+    yield from dwell_rows(hole.dwell)
     yield go(hole.retract)
+
+
+def _in(z: float) -> Row:
+    """To z at the feed of the program."""
+    return [("G", 1.0), ("Z", z)]
 
 
 def _pocket(name: str) -> Maker:
@@ -210,13 +319,23 @@ def _plan(making: Making, name: str, given: Mapping[str, float], radius: float) 
     )
 
 
-MAKERS: dict[str, Maker] = {
+_CYCLES: dict[str, Maker] = {
+    "CYCLE81": _straight("CYCLE81"),
+    "CYCLE82": _straight("CYCLE82"),
+    "CYCLE83": _deep,
     "CYCLE84": _rigid,
     "CYCLE840": _chuck,
     "CYCLE85": _reamed,
     "CYCLE86": _bored,
-    "CYCLE87": _stopped("CYCLE87"),
-    "CYCLE88": _stopped("CYCLE88"),
-    "CYCLE89": _out_at_feed,
+    "CYCLE87": _straight("CYCLE87", *_HALT),
+    "CYCLE88": _straight("CYCLE88", *_HALT),
+    "CYCLE89": _straight("CYCLE89", out=True),
     **{name: _pocket(name) for name in POCKETS},
 }
+
+
+def _kept(maker: Maker) -> Maker:
+    return lambda making, given: around(making, maker(making, given), feed=False)
+
+
+MAKERS = {name: _kept(maker) for name, maker in _CYCLES.items()}

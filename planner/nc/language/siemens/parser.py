@@ -4,7 +4,7 @@
                X Y Z I J K with = AC() IC(), CR= TURN= F S T D M, N, CIP CT RND= CHR= CHF= (`block_words`)
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
                REPEATB label P=n
-    commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 82 83 (`drilling`), CYCLE84 to 89, 840,
+    commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 to 89, 840,
                POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`commands.IDLE`);
                TRAORI and TRAFOOF on a machine with kinematics
 
@@ -22,7 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.nc.language.makers import SIEMENS
-from planner.nc.language.siemens import commands, drilling
+from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
@@ -64,8 +64,7 @@ class SiemensParser(BlockWords):
             done = row + 1
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
-        own = ["_depth", "_step", *(f"_count{k}" for k in range(self.counters))]
-        first = assign(start, *((variable(name), ZERO) for name in own))
+        first = assign(start, *((variable(f"_count{k}"), ZERO) for k in range(self.counters)))
         return [Procedure("file" if self.source.file else "", start, [first, *self.main])]
 
     def _special(self) -> list[int]:
@@ -179,7 +178,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], None]] = {
     **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
     **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),
     "MCALL": SiemensParser._modal_call,
-    **dict.fromkeys(drilling.PATTERNS, SiemensParser._pattern),
+    **dict.fromkeys(cycles.PATTERNS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
     **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
     **dict.fromkeys(commands.TOOL_POINT, SiemensParser._tool_point),

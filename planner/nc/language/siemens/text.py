@@ -19,22 +19,6 @@ from planner.nc.language import tree
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
-from planner.nc.language.tree import (
-    ONE,
-    ZERO,
-    Expression,
-    Goto,
-    If,
-    Label,
-    Loop,
-    Named,
-    Number,
-    OpenStatement,
-    SourcePlace,
-    Statement,
-    assign,
-    op,
-)
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
 LANGUAGE = tree.Language(
@@ -170,28 +154,28 @@ class SiemensControl:
     """
 
     def __init__(self) -> None:
-        self.main: list[Statement] = []
+        self.main: list[tree.Statement] = []
         self.body = self.main
-        self.open: list[OpenStatement] = []
+        self.open: list[tree.OpenStatement] = []
         self.labels: dict[str, int] = {}
         self.counters = 0
-        self.lines: dict[str, list[Statement]] = {}
+        self.lines: dict[str, list[tree.Statement]] = {}
 
-    def _label(self, name: str, place: SourcePlace) -> None:
-        self.body.append(Label(place, self._number_of(name)))
+    def _label(self, name: str, place: tree.SourcePlace) -> None:
+        self.body.append(tree.Label(place, self._number_of(name)))
 
     def _number_of(self, label: str) -> int:
         return self.labels.setdefault(label, len(self.labels) + 1)
 
-    def _begin(self, kind: str, reader: LineTokens, condition: Expression | None) -> OpenStatement:
+    def _begin(self, kind: str, reader: LineTokens, condition: tree.Expression | None) -> tree.OpenStatement:
         if len(self.open) >= _NESTED_MAX:
             raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
-        opened = OpenStatement(kind, reader.place, condition)
+        opened = tree.OpenStatement(kind, reader.place, condition)
         self.open.append(opened)
         self.body = opened.body
         return opened
 
-    def _close(self, kind: str, reader: LineTokens) -> OpenStatement:
+    def _close(self, kind: str, reader: LineTokens) -> tree.OpenStatement:
         if not self.open or self.open[-1].kind != kind:
             raise reader.fault(f"there is no {kind} open that this ends", 0)
         closed = self.open.pop()
@@ -202,9 +186,9 @@ class SiemensControl:
         condition = reader.expression()
         if reader.peek().startswith("GOTO"):
             reader.next += 1
-            body: list[Statement] = []
+            body: list[tree.Statement] = []
             self._jump(reader, body)
-            self.body.append(If(reader.place, ((condition, body),), []))
+            self.body.append(tree.If(reader.place, ((condition, body),), []))
         else:
             self._begin("IF", reader, condition)
 
@@ -222,14 +206,14 @@ class SiemensControl:
         self._begin("WHILE", reader, reader.expression())
 
     def _loop(self, reader: LineTokens) -> None:
-        self._begin("LOOP", reader, ONE)
+        self._begin("LOOP", reader, tree.ONE)
 
     def _end_loop(self, reader: LineTokens) -> None:
         kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
         closed = self._close(kind, reader)
         assert closed.condition is not None
         self.body.append(
-            Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
+            tree.Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
         )
 
     def _for(self, reader: LineTokens) -> None:
@@ -241,16 +225,18 @@ class SiemensControl:
         first = reader.expression()
         reader.expect("TO")
         last = reader.expression()
-        self.body.append(assign(reader.place, (target, first)))
+        self.body.append(tree.assign(reader.place, (target, first)))
         self._begin("FOR", reader, None).count = (target, last)
 
     def _end_for(self, reader: LineTokens) -> None:
         closed = self._close("FOR", reader)
         assert closed.count is not None
         target, last = closed.count
-        closed.body.append(assign(closed.place, (target, target + ONE)))
+        closed.body.append(tree.assign(closed.place, (target, target + tree.ONE)))
         self.body.append(
-            Loop(closed.place, "while", f"FOR {closed.place.at}", op("LE", target, last), closed.body)
+            tree.Loop(
+                closed.place, "while", f"FOR {closed.place.at}", tree.op("LE", target, last), closed.body
+            )
         )
 
     def _repeat(self, reader: LineTokens) -> None:
@@ -260,27 +246,33 @@ class SiemensControl:
             return
         label, counter, times = self._repeated(reader, self.labels)
         place = reader.place
-        again: list[Statement] = [
-            assign(place, (counter, counter + ONE)),
-            Goto(place, Number(float(self.labels[label]))),
+        again: list[tree.Statement] = [
+            tree.assign(place, (counter, counter + tree.ONE)),
+            tree.Goto(place, tree.Number(float(self.labels[label]))),
         ]
-        self.body.append(If(place, ((op("LT", counter, times), again),), [assign(place, (counter, ZERO))]))
+        self.body.append(
+            tree.If(
+                place, ((tree.op("LT", counter, times), again),), [tree.assign(place, (counter, tree.ZERO))]
+            )
+        )
 
     def _repeat_block(self, reader: LineTokens) -> None:
         """REPEATB label P=n: the line of the label, n times more."""
         label, counter, times = self._repeated(reader, self.lines)
         place = reader.place
-        self.body.append(assign(place, (counter, ZERO)))
-        body = [*self.lines[label], assign(place, (counter, counter + ONE))]
-        self.body.append(Loop(place, "while", f"REPEATB {place.at}", op("LT", counter, times), body))
+        self.body.append(tree.assign(place, (counter, tree.ZERO)))
+        body = [*self.lines[label], tree.assign(place, (counter, counter + tree.ONE))]
+        self.body.append(
+            tree.Loop(place, "while", f"REPEATB {place.at}", tree.op("LT", counter, times), body)
+        )
 
-    def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, Named, Expression]:
+    def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
         """The label of a repeat, a counter of its own, and how often. Raises ProgramFault for a label that is not known."""
         label = reader.peek()
         reader.next += 1
         if label not in known:
             raise reader.fault(f"there is no label {label} above this line", 0)
-        times: Expression = ONE
+        times: tree.Expression = tree.ONE
         if reader.take("P"):
             reader.expect("=")
             times = reader.expression()
@@ -290,15 +282,21 @@ class SiemensControl:
     def _until(self, reader: LineTokens) -> None:
         closed = self._close("REPEAT", reader)
         self.body.append(
-            Loop(closed.place, "do", f"REPEAT {closed.place.at}", op("NOT", reader.expression()), closed.body)
+            tree.Loop(
+                closed.place,
+                "do",
+                f"REPEAT {closed.place.at}",
+                tree.op("NOT", reader.expression()),
+                closed.body,
+            )
         )
 
     def _goto(self, reader: LineTokens) -> None:
         self._jump(reader, self.body)
 
-    def _jump(self, reader: LineTokens, body: list[Statement]) -> None:
+    def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
         label = reader.peek()
         if not label:
             raise reader.fault("a label is expected here")
         reader.next += 1
-        body.append(Goto(reader.place, Number(float(self._number_of(label)))))
+        body.append(tree.Goto(reader.place, tree.Number(float(self._number_of(label)))))

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from planner.base.arrays import FloatArray
 from planner.base.units import MM_PER_INCH
@@ -54,52 +55,32 @@ class Arc:
     sweep: float
 
 
-def arc_from_centre(
-    start: FloatArray,
-    end: FloatArray,
-    centre: FloatArray,
-    *,
-    normal: int,
-    clockwise: bool,
-    turns: int,
-    unit: float,
-) -> Arc:
-    """The arc about a given centre.
+class ArcWay(NamedTuple):
+    """How an arc leads from its start to its end.
 
-    start, end, centre : (3,) [mm]
-    normal             : index of the axis normal to its plane
-    turns              : 1 for less than a full turn, one more for every further turn
-    unit               : mm per programmed length unit, which decides how far start and end may be off one circle
-
-    Raises ArcError if start and end are not on one circle.
+    normal : index of the axis normal to its plane
+    turns  : 1 for less than a full turn, one more for every further turn
+    unit   : mm per programmed length unit, which decides how far start and end may be off one circle
     """
-    fault = _not_closed(start, end, centre, normal, unit)
+
+    normal: int
+    clockwise: bool
+    turns: int
+    unit: float
+
+
+def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> Arc:
+    """The arc about a given centre; all (3,) [mm]. Raises ArcError if start and end are not on one circle about it."""
+    fault = not_closed(start, end, centre, way.normal, way.unit)
     if fault:
         raise ArcError(fault)
-    return Arc(centre, _sweep(start, end, centre, normal, clockwise, turns))
+    return Arc(centre, _sweep(start, end, centre, way))
 
 
-def is_hardly_turned(arc: Arc) -> bool:
-    """True if it turns so little that some controls make a full turn of it."""
-    return abs(arc.sweep) <= FULL_TURN
-
-
-def arc_from_radius(
-    start: FloatArray,
-    end: FloatArray,
-    radius: float,
-    *,
-    normal: int,
-    clockwise: bool,
-    turns: int,
-    unit: float,
-) -> Arc:
-    """The arc of a given radius [mm], more than half a turn if it is negative.
-
-    start, end : (3,) [mm]; the others as of `arc_from_centre`
-
-    Raises ArcError if there is none.
-    """
+def arc_from_radius(start: FloatArray, end: FloatArray, radius: float, way: ArcWay) -> Arc:
+    """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,) [mm]. Raises ArcError if there
+    is none."""
+    normal, clockwise, turns, unit = way
     a, b = IN_PLANE[normal]
     da, db = end[a] - start[a], end[b] - start[b]
     half, size = math.hypot(da, db) / 2.0, abs(radius)
@@ -121,14 +102,8 @@ def arc_from_radius(
     return Arc(centre, -angle if clockwise else angle)
 
 
-def closes(start: FloatArray, end: FloatArray, centre: FloatArray, *, normal: int, unit: float) -> bool:
-    """True if start and end lie on one circle about the centre, (3,) each [mm]; the others as of `arc_from_centre`."""
-    return _not_closed(start, end, centre, normal, unit) is None
-
-
-def _not_closed(
-    start: FloatArray, end: FloatArray, centre: FloatArray, normal: int, unit: float
-) -> str | None:
+def not_closed(start: FloatArray, end: FloatArray, centre: FloatArray, normal: int, unit: float) -> str:
+    """Why start and end do not lie on one circle about the centre, (3,) each [mm]; empty where they do."""
     a, b = IN_PLANE[normal]
     r0 = math.hypot(start[a] - centre[a], start[b] - centre[b])
     r1 = math.hypot(end[a] - centre[a], end[b] - centre[b])
@@ -137,16 +112,15 @@ def _not_closed(
     gap, closure = abs(r0 - r1), CLOSURE[unit]
     allowed = min(100.0 * closure, max(closure, CLOSURE_RELATIVE * max(r0, r1)))
     if gap <= allowed:
-        return None
+        return ""
     return (
         f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end: {gap:.6g} mm apart, allowed are "
         f"{allowed:.6g} mm (centre at {AXES[a]} {centre[a]:.6g}, {AXES[b]} {centre[b]:.6g})"
     )
 
 
-def _sweep(
-    start: FloatArray, end: FloatArray, centre: FloatArray, normal: int, clockwise: bool, turns: int
-) -> float:
+def _sweep(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> float:
+    normal, clockwise, turns, _ = way
     a, b = IN_PLANE[normal]
     ua, ub = start[a] - centre[a], start[b] - centre[b]
     da, db = end[a] - start[a], end[b] - start[b]

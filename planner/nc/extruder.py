@@ -54,14 +54,9 @@ def with_extruder(
         return program
     of_line, factor = zip((0, 1.0), *factors, strict=True)
     fed.feed[:] *= np.array(factor)[np.searchsorted(of_line, words.line[:rows], side="right") - 1]
-    flow = np.flatnonzero(
-        (words.letter[: words.first[rows]] == _M) & (words.value[: words.first[rows]] == _FLOW)
-    )
-    for row in {words.row(word) for word in flow.tolist()}:
-        given = words.value[words.first[row] : words.first[row + 1]][
-            words.letter[words.first[row] : words.first[row + 1]] == ord("S")
-        ]
-        if (given != _WHOLE_FLOW).any():
+    for row in words.rows_with(words.find("M", _FLOW)):
+        letter, value = words.of_rows(row)
+        if row < rows and (value[letter == ord("S")] != _WHOLE_FLOW).any():
             _refuse(program, words.line[row : row + 1], "a flow that is not 100 % (M221)")
     given = np.flatnonzero(fed.amount)
     line = words.line[given]

@@ -41,16 +41,14 @@ class DwellWords:
 
     def find(self, words: Words) -> list[int]:
         """Indices of the P words of a chunk that are dwells."""
-        of_g = words.letter == ord("G")
-        motion = np.flatnonzero(of_g & np.isin(words.value, _MOTIONS))
+        motion = words.find("G", *_MOTIONS)
         cycle = np.append(self._in_cycle, np.isin(words.value[motion], _CYCLES))
         found = []
         for word in np.flatnonzero(words.letter == ord("P")).tolist():
             row = words.row(word)
-            span = slice(int(words.first[row]), int(words.first[row + 1]))
-            value, letter = words.value[span], words.letter[span]
+            letter, value = words.of_rows(row)
             if _DWELL in value[letter == ord("G")] or (
-                cycle[np.searchsorted(motion, span.stop)] and not _is_other(letter, value)
+                cycle[np.searchsorted(motion, words.first[row + 1])] and not _is_other(letter, value)
             ):
                 found.append(word)
         self._in_cycle = bool(cycle[-1])
@@ -88,7 +86,7 @@ class Integers:
         rows = len(words.line)
         if self.increment is None:
             return np.ones(rows)
-        switch = np.flatnonzero((words.letter == ord("G")) & np.isin(words.value, (20.0, 21.0)))
+        switch = words.find("G", 20.0, 21.0)
         inch = np.append(False, words.value[switch] == 20.0)
         at = np.searchsorted(switch, words.first[1:], side="left")  # switches up to the end of each row
         return np.where(inch[at], self.increment * INCH_INCREMENT, self.increment)

@@ -107,9 +107,25 @@ class Words:
         """The row that holds a word."""
         return int(np.searchsorted(self.first, word, side="right")) - 1
 
+    def rows_with(self, words: Array) -> list[int]:
+        """The rows, ascending, that hold words (n,)."""
+        found: list[int] = np.unique(np.searchsorted(self.first, words, side="right") - 1).tolist()
+        return found
+
+    def of_rows(self, first: int, last: int = 0) -> tuple[Array, FloatArray]:
+        """Letters (n,) and values (n,) of the rows `first` to `last` - 1, or of the first alone."""
+        span = slice(int(self.first[first]), int(self.first[last or first + 1]))
+        return self.letter[span], self.value[span]
+
+    def find(self, letter: str, *numbers: float) -> Array:
+        """(n,) the words of a letter with one of the numbers, ascending."""
+        return np.flatnonzero((self.letter == ord(letter)) & np.isin(self.value, numbers))
+
     def column(self, word: int) -> int:
         """1-based column of a word, in characters."""
-        return len(self._line_before(word).decode("utf-8", "replace")) + 1
+        at = int(self.at[word])
+        before = self.data[self.data.rfind(b"\n", 0, at) + 1 : at].removeprefix(_BOM)
+        return len(before.decode("utf-8", "replace")) + 1
 
     def text(self, word: int) -> str:
         """The word as it is written, up to the next word, comment or end of line; one character of what is unreadable."""
@@ -124,11 +140,6 @@ class Words:
         at = int(self.at[word]) + 1
         end = self.data.find(b"\n", at)
         return self.data[at : end if end >= 0 else len(self.data)].decode("utf-8", "replace").strip()
-
-    def _line_before(self, word: int) -> bytes:
-        at = int(self.at[word])
-        start = self.data.rfind(b"\n", 0, at) + 1
-        return self.data[start:at].removeprefix(_BOM)
 
 
 _BOM = b"\xef\xbb\xbf"

@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import auxiliary, codes, drilling, moves, offsets, threads
-from planner.nc.arcs import is_hardly_turned
+from planner.nc.arcs import FULL_TURN
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings, IgnoredWords
@@ -296,7 +296,7 @@ class Mover:
                 text = "no G17, G18 or G19 before the first arc: G17; a Fanuc control starts with what is set in it"
                 self.findings.assume(text, block.line, block.motion_word())
             arc, normal = moves.arc(state, block, target)
-            if is_hardly_turned(arc):
+            if abs(arc.sweep) <= FULL_TURN:
                 length = moves.arc_length(state.position, target, arc, normal)
                 text = f"an arc of {length:.4g} mm hardly turns; some controls make a full circle of it"
                 self.findings.assume(text, block.line, block.motion_word())

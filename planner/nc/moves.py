@@ -19,7 +19,16 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import codes
-from planner.nc.arcs import AXES, IN_PLANE, Arc, ArcError, arc_from_centre, arc_from_radius, closes
+from planner.nc.arcs import (
+    AXES,
+    IN_PLANE,
+    Arc,
+    ArcError,
+    ArcWay,
+    arc_from_centre,
+    arc_from_radius,
+    not_closed,
+)
 from planner.nc.settings import Setting
 from planner.nc.state import REFUSED_MOTION, State
 
@@ -192,10 +201,10 @@ def plane_of(state: State) -> tuple[int, bool]:
 def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
     turned, opposite = plane_of(state)
     start, normal, unit = state.position, state.normal, state.unit
-    clockwise = (state.motion == 2) != opposite
     a, b = IN_PLANE[normal]
     plane = f"{AXES[a]} {AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
+    way = ArcWay(turned, (state.motion == 2) != opposite, turns, unit)
     along = block.value.get("IJK"[normal])  # many programs write K0 in G17
     if along is not None and (along != 0.0 or state.strict):
         raise ArcError(
@@ -206,17 +215,14 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
             raise ArcError("R and I J K on one line both define the centre; write one of them")
         if not block.has("XYZ"[a] + "XYZ"[b]):
             raise ArcError(f"an arc with R needs an end point in the {plane} plane")
-        radius = block.value["R"] * unit
-        arc = arc_from_radius(start, end, radius, normal=turned, clockwise=clockwise, turns=turns, unit=unit)
-        return arc, turned
+        return arc_from_radius(start, end, block.value["R"] * unit, way), turned
     if not block.has("IJK"):
         raise ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
     centre = _centre(state, block, absolute=state.absolute_centre)
     try:
-        arc = arc_from_centre(start, end, centre, normal=turned, clockwise=clockwise, turns=turns, unit=unit)
+        return arc_from_centre(start, end, centre, way), turned
     except ArcError as fault:
         raise ArcError(f"{fault}; {_remedy(state, block, end, turned)}") from fault
-    return arc, turned
 
 
 def arc_length(start: FloatArray, end: FloatArray, arc: Arc, normal: int) -> float:
@@ -249,7 +255,7 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
         other = _centre(state, block, absolute=not state.absolute_centre)
     except ArcError:
         return "correct the centre or the end point"
-    if not closes(state.position, end, other, normal=normal, unit=state.unit):
+    if not_closed(state.position, end, other, normal, state.unit):
         return "correct the centre or the end point"
     way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
     return f"{_CLOSES_IF} {way} before it"

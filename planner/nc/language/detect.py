@@ -15,7 +15,6 @@ import re
 
 import numpy as np
 
-from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
@@ -122,7 +121,7 @@ LATHE_NOTE = (
 )
 G_FURTHER = 54.1
 # Codes that call and return, save and restore modes.
-_CALLS = {ord("M"): (70, 71, 72, 73, 97, 98, 99), ord("G"): (65, 66, 67)}
+_CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
 _LINUXCNC = re.compile(
@@ -141,13 +140,11 @@ _CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
 _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 
 
-def may_compute(words: Words) -> Array:
-    """(n,) rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
+def may_compute(words: Words) -> list[int]:
+    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
     found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
-    for letter, numbers in _CALLS.items():
-        codes = np.flatnonzero(words.letter == letter)
-        found.append(codes[np.isin(words.value[codes], numbers)])
-    return np.unique(np.searchsorted(words.first, np.concatenate(found), side="right") - 1)
+    found += [words.find(letter, *numbers) for letter, numbers in _CALLS.items()]
+    return words.rows_with(np.concatenate(found))
 
 
 def bare(text: str) -> str:
@@ -163,7 +160,7 @@ def computes(text: str) -> bool:
 def dialect_of(words: Words, reading: Reading) -> str | None:
     """The language that a program computes in, or None if it does not. `Reading.dialect` decides where it is given."""
     found, end = None, _first_end(words)
-    for row in may_compute(words).tolist():
+    for row in may_compute(words):
         if row > end and found is None:
             return None  # what follows the end of a program that computes nothing is not read
         text = bare(row_text(words, row))
@@ -188,7 +185,7 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
     if dialect == LINUXCNC and any(
-        _LINUXCNC.search(bare(row_text(words, row))) for row in may_compute(words).tolist()
+        _LINUXCNC.search(bare(row_text(words, row))) for row in may_compute(words)
     ):
         return False
     if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
@@ -200,10 +197,8 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     if letters >= set("XZ") and letters & (set("UW") - own):
         return not letters & set(reading.ignore)
     for codes, needed in (((70.0, 71.0, 72.0, 73.0), "PQ"), ((76.0,), "KD")):
-        cycles = np.flatnonzero((words.letter == ord("G")) & np.isin(words.value, codes))
-        for row in np.unique(np.searchsorted(words.first, cycles, side="right") - 1).tolist():
-            if np.isin([ord(c) for c in needed], words.letter[words.first[row] : words.first[row + 1]]).all():
-                return True
+        if any(letters >= set(needed) for letters in _rows_with(words, "G", *codes)):
+            return True
     return letters >= set("XZ") and _has_signs(words)
 
 
@@ -236,9 +231,8 @@ def _has_signs(words: Words) -> bool:
 
 def _rows_with(words: Words, letter: str, *codes: float) -> list[set[str]]:
     """The letters of each row with one of the codes."""
-    at = np.flatnonzero((words.letter == ord(letter)) & np.isin(words.value, codes)).tolist()
-    rows = sorted({words.row(word) for word in at})
-    return [{chr(c) for c in words.letter[words.first[row] : words.first[row + 1]]} for row in rows]
+    rows = words.rows_with(words.find(letter, *codes))
+    return [{chr(c) for c in words.of_rows(row)[0]} for row in rows]
 
 
 def _has(words: Words, letter: str) -> bool:
@@ -247,12 +241,12 @@ def _has(words: Words, letter: str) -> bool:
 
 def has_further_systems(words: Words) -> bool:
     """True if a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas' know."""
-    return _has(words, "L") and bool(((words.value == G_FURTHER) & (words.letter == ord("G"))).any())
+    return _has(words, "L") and len(words.find("G", G_FURTHER)) > 0
 
 
 def _first_end(words: Words) -> int:
     """The first row with M2 or M30, or the number of rows."""
-    ends = np.flatnonzero((words.letter == ord("M")) & np.isin(words.value, (2, 30)))
+    ends = words.find("M", 2, 30)
     return words.row(int(ends[0])) if len(ends) else len(words.line)
 
 

@@ -59,7 +59,7 @@ class Source:
     def _statements(self) -> list[int]:
         """Rows, ascending, that are statements of the language rather than words."""
         words = self.words
-        bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words).tolist())
+        bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words))
         return [row for row, text in bare_texts if computes(text) or _PROGRAM.match(text)]
 
     def _message_lines(self) -> list[tuple[int, SourceLine]]:
@@ -113,13 +113,12 @@ class Source:
     def plain(self, first: int, last: int) -> list[PlainRows]:
         """Statements for the rows `first` to `last` - 1; those that may end the program stand alone."""
         words = self.words
-        span = slice(int(words.first[first]), int(words.first[last]))
-        letter, value = words.letter[span], words.value[span]
+        letter, value = words.of_rows(first, last)
         ends = (letter == ord("%")) | ((letter == ord("M")) & np.isin(value, (2, 30)))
-        at = np.flatnonzero(ends) + span.start
+        at = np.flatnonzero(ends) + int(words.first[first])
         runs: list[PlainRows] = []
         begin = first
-        for row in np.unique(np.searchsorted(words.first, at, side="right") - 1).tolist():
+        for row in words.rows_with(at):
             runs.append(self._run(begin, row + 1, may_end=True))
             begin = row + 1
         if begin < last:
@@ -128,9 +127,8 @@ class Source:
 
     def has_end(self, rows: PlainRows) -> bool:
         """True if the rows hold M2 or M30."""
-        words, first = self.words, rows.first - self.first_row
-        span = slice(int(words.first[first]), int(words.first[rows.last - self.first_row]))
-        return bool(((words.letter[span] == ord("M")) & np.isin(words.value[span], (2, 30))).any())
+        letter, value = self.words.of_rows(rows.first - self.first_row, rows.last - self.first_row)
+        return bool(((letter == ord("M")) & np.isin(value, (2, 30))).any())
 
     def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
         place = SourcePlace(

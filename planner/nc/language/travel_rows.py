@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, arc_from_centre, arc_from_radius, in_plane
+from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, ArcWay, arc_from_centre, arc_from_radius, in_plane
 from planner.nc.lexer import Words
 from planner.nc.state import System
 
@@ -220,12 +220,12 @@ class Coordinates:
         self.check_even()
         if RADIUS not in given and not set(CENTRES) & set(given):
             raise ValueError("an arc needs a centre or a radius")
-        how = {"normal": self.normal, "clockwise": clockwise, "turns": round(given.get(TURNS, 1.0))}
+        way = ArcWay(self.normal, clockwise, round(given.get(TURNS, 1.0)), unit)
         if RADIUS in given:
-            arc = arc_from_radius(start, end, given[RADIUS], unit=unit, **how)  # type: ignore[arg-type]
+            arc = arc_from_radius(start, end, given[RADIUS], way)
         else:
             centre = start + np.array([given.get(letter, 0.0) for letter in CENTRES])
-            arc = arc_from_centre(start, end, centre, unit=unit, **how)  # type: ignore[arg-type]
+            arc = arc_from_centre(start, end, centre, way)
         return Arc(self.mapped(arc.centre), -arc.sweep if self.mirrored else arc.sweep)
 
     def _plane_size(self) -> float:

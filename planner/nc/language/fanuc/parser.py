@@ -103,9 +103,8 @@ class FanucParser(FanucControl):
         words = self.source.words
         begin = rows.first
         for row in range(rows.first, rows.last):
-            span = slice(int(words.first[row - first]), int(words.first[row - first + 1]))
-            letters = words.letter[span]
-            number = int(words.value[span.start]) if len(letters) and letters[0] == ord("N") else None
+            letters, values = words.of_rows(row - first)
+            number = int(values[0]) if len(letters) and letters[0] == ord("N") else None
             used = number is not None and (self.targets is None or number in self.targets)
             if used and row > begin:
                 self.body.append(self.source.part(rows, begin, row))
@@ -265,8 +264,5 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
 
 
 def _is_percent(source: Source, rows: tree.PlainRows) -> bool:
-    words = source.words
-    span = slice(
-        int(words.first[rows.first - source.first_row]), int(words.first[rows.last - source.first_row])
-    )
-    return bool((words.letter[span] == ord("%")).all())
+    letter, _ = source.words.of_rows(rows.first - source.first_row, rows.last - source.first_row)
+    return bool((letter == ord("%")).all())

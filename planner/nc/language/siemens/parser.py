@@ -76,8 +76,8 @@ class SiemensParser(BlockWords):
         same &= (letter != ord("M")) | ~np.isin(value, commands.RETURNS if self.source.file else (17,))
         targets = [int(label) for label in _TARGETS.findall(words.data)]
         same &= ~((letter == ord("N")) & np.isin(value, targets))
-        found = np.unique(np.searchsorted(words.first, np.flatnonzero(~same), side="right") - 1)
-        return [int(row) for row in found if letter[words.first[row]] != ord("%")]
+        found = words.rows_with(np.flatnonzero(~same))
+        return [row for row in found if letter[words.first[row]] != ord("%")]
 
     def _plain(self, first: int, last: int) -> None:
         """Rows of plain words; while a cycle is modal, each that moves is followed by it."""
@@ -91,8 +91,7 @@ class SiemensParser(BlockWords):
             for row in range(first, last):
                 for one in self.source.plain(row, row + 1):
                     self.body.append(one)
-                span = slice(int(self.source.words.first[row]), int(self.source.words.first[row + 1]))
-                if np.isin(self.source.words.letter[span], (ord("X"), ord("Y"))).any():
+                if np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any():
                     self.body += self.cycle
             return
 
@@ -100,8 +99,7 @@ class SiemensParser(BlockWords):
         """Plain rows behind CIP or CT: a motion code comes before coordinates. Raises ProgramFault."""
         words = self.source.words
         for row in range(first, last):
-            span = slice(int(words.first[row]), int(words.first[row + 1]))
-            letter, value = words.letter[span], words.value[span]
+            letter, value = words.of_rows(row)
             if ((letter == ord("G")) & np.isin(value, (0, 1, 2, 3))).any():
                 self.circular = False
                 return
@@ -112,10 +110,9 @@ class SiemensParser(BlockWords):
 
     def _follow_modes(self, run: PlainRows) -> None:
         """G90 and G91 of plain rows, the last one counts."""
-        words = self.source.words
-        first, last = run.first - self.source.first_row, run.last - self.source.first_row
-        span = slice(int(words.first[first]), int(words.first[last]))
-        modes = words.value[span][(words.letter[span] == ord("G")) & np.isin(words.value[span], (90, 91))]
+        source = self.source
+        letter, value = source.words.of_rows(run.first - source.first_row, run.last - source.first_row)
+        modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
         if len(modes):
             self.absolute = bool(modes[-1] == 90)
 

@@ -78,8 +78,10 @@ def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way:
 
 
 def arc_from_radius(start: FloatArray, end: FloatArray, radius: float, way: ArcWay) -> Arc:
-    """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,) [mm]. Raises ArcError if there
-    is none."""
+    """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,) [mm].
+
+    Raises ArcError if there is none.
+    """
     normal, clockwise, turns, unit = way
     a, b = IN_PLANE[normal]
     da, db = end[a] - start[a], end[b] - start[b]

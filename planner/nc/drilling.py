@@ -144,7 +144,7 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
     """Execute the line. Raises WordFault for words that are missing or contradict each other."""
     a, b = IN_PLANE[state.normal]
     c = state.normal
-    here = _per_unit(state)
+    here = state.programmed() / state.unit
     series = _series(state, state.motion, float(here[c]))
     words = _words(state, block, series)
     _check_words(state, block, words, findings)
@@ -176,7 +176,11 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
         raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
     if code in DWELLING and words["P"] < 0:
         raise block.fault("a dwell must not be negative; write its seconds, such as P0.5", "P")
-    _check_spindle(state, code, word)
+    turning, needed = state.spindle.turning, TAPPING.get(code)
+    if needed is not None and turning != needed:
+        raise WordFault(word, f"{name} needs the spindle turning {'M3' if needed > 0 else 'M4'} before it")
+    if code in STOPPING and not turning:
+        raise WordFault(word, f"{name} stops the spindle, which does not turn; write M3 or M4 before it")
     if "P" in block.value and code in DWELLING | TAPPING.keys():
         auxiliary.assume_seconds(state, block, words["P"], findings)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
@@ -267,15 +271,6 @@ def _meaning(letter: str) -> str:
     return what.get(letter, f"its depth as {letter}" if letter in "XYZ" else f"{letter}: the offsets I J K")
 
 
-def _check_spindle(state: State, code: int, word: int) -> None:
-    turning, needed = state.spindle.turning, TAPPING.get(code)
-    name = f"G{codes.number(code)}"
-    if needed is not None and turning != needed:
-        raise WordFault(word, f"{name} needs the spindle turning {'M3' if needed > 0 else 'M4'} before it")
-    if code in STOPPING and not turning:
-        raise WordFault(word, f"{name} stops the spindle, which does not turn; write M3 or M4 before it")
-
-
 def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
     """Execute a step."""
     table.make_room(1)
@@ -294,10 +289,6 @@ def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
         if step.kind == Kind.LINE or (end != state.place).any():
             state.position[:], state.actual = end, None
             table.add(step.kind, line, state)
-
-
-def _per_unit(state: State) -> np.ndarray:
-    return state.programmed() / state.unit
 
 
 def _length(state: State, words: dict[str, float], axis: int) -> float:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.units import SECONDS_PER_MINUTE
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, mover, moves, offsets
 from planner.nc.block_reader import read_block
@@ -33,7 +33,7 @@ from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.set_limits import LimitsInForce
-from planner.nc.state import REFUSED_MOTION, Setup, State, set_units
+from planner.nc.state import REFUSED_MOTION, Setup, State
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
 _FEED_LEAST = (
@@ -88,7 +88,7 @@ class Interpreter:
         self._timed = False  # a feed is in inverse time
         self._words: Words | None = None  # of the last chunk
         self._begun = False
-        self._read = 0  # rows of the last chunk
+        self.rows_read = 0  # of the last chunk, up to the end of the program
         self._units_known = False  # by a G20 or G21, or it was said that there was none before the first move
 
     @property
@@ -156,7 +156,7 @@ class Interpreter:
                 self._begun = True
                 after += 1
             row = after
-        self._read = row
+        self.rows_read = row
         self._assume_units()
         self.mover.splines.keep(words)
         refused = self.table.refused_word[: self.table.refusals]
@@ -168,7 +168,7 @@ class Interpreter:
 
     def note_what_follows(self, words: Words) -> None:
         """Say it if the last chunk, `words`, goes on after the end of the program."""
-        row = self._read
+        row = self.rows_read
         if not (words.letter[words.first[row] :] == ord("%")).all():
             end, after = int(words.line[row - 1]), int(words.line[row])
             self.findings.note(f"the program ends; what follows from line {after} on is not read", end)
@@ -177,11 +177,6 @@ class Interpreter:
     def feed_factors(self) -> list[tuple[int, float]]:
         """Factors of F that the program sets, and their lines."""
         return self._limits.factors
-
-    @property
-    def rows_read(self) -> int:
-        """Rows of the last chunk up to the end of the program."""
-        return self._read
 
     @property
     def all_arcs_close_otherwise(self) -> bool:
@@ -279,7 +274,7 @@ class Interpreter:
         if "plane" in g:
             state.normal, state.plane_known = {170: 2, 180: 1, 190: 0}[g["plane"]], True
         if "units" in g:
-            set_units(state, g["units"])
+            state.unit = MM_PER_INCH if g["units"] == 200 else 1.0
             self._assume_units()
             self._units_known = True
         if "lathe diameter mode" in g:

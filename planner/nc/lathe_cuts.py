@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from planner.nc.turning import PASSES_MAX, SAME, ContourFault, Leg, TurningStep, exchanged
 
@@ -145,16 +145,11 @@ class Pecking:
     retract: float
     relief: float = 0.0
 
-    def exchanged(self) -> Pecking:
-        """The words with x and z exchanged."""
-        return replace(self, start=exchanged(self.start), end=exchanged(self.end))
-
 
 def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[TurningStep]:
     """The moves of G90, or with `facing` of G94 [mm]."""
     if facing:
-        for step in single_cut(exchanged(start), exchanged(end), taper, facing=False):
-            yield step.exchanged()
+        yield from map(exchanged, single_cut(exchanged(start), exchanged(end), taper, facing=False))
         return
     yield TurningStep(Leg(complex(start.real, end.imag + taper)), fast=True)
     yield TurningStep(Leg(end))
@@ -177,8 +172,7 @@ def single_thread(start: complex, end: complex, taper: float, lead: float) -> It
 def pecked(given: Pecking, *, grooving: bool) -> Iterator[TurningStep]:
     """The moves of G74, or with `grooving` of G75 [mm]. Raises ContourFault."""
     if grooving:
-        for step in pecked(given.exchanged(), grooving=False):
-            yield step.exchanged()
+        yield from map(exchanged, pecked(exchanged(given), grooving=False))
         return
     deep, wide = given.end.real - given.start.real, given.end.imag - given.start.imag
     if abs(deep) < SAME:

@@ -14,11 +14,6 @@ nothing disappears silently, and the lines after it are still read.
 Numbers are rounded correctly, so a coordinate is the same double as float(text): the digits form an integer below 2^53 and the
 point a power of ten up to 1e22, both exact, and one division of exact numbers rounds once. Longer numbers are marked NaN by the
 compiled loop and read by Python.
-
-Text before the first % of a program: names of parts, lists of tools, what a serial line needed. Controls skip it.
-
-It is skipped here too where it cannot be a program: some line of it is no words, and no line that is words has a code or a coordinate.
-Parameters and expressions (# [ < =) are no such text.
 """
 
 from __future__ import annotations
@@ -32,33 +27,6 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-
-_LOOKED_AT = 20_000  # bytes at the start of a file in which the first % is looked for
-_SHOWN = 30  # characters of the text in the note
-_FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
-_LANGUAGE = re.compile(rb"[#\[<=]")
-_DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
-
-
-def without_leader(data: bytes) -> tuple[bytes, str]:
-    """The program with blanks for the text before its first %, and the beginning of that text; ("" where there is none).
-
-    Offsets and lines stay as they are.
-    """
-    match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
-    text = data[: match.start()] if match else b""
-    if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
-        return data, ""
-    shown = " ".join(text.decode("utf-8", "replace").split())[:_SHOWN]
-    return re.sub(rb"[^\r\n]", b" ", text) + data[len(text) :], shown
-
-
-def _is_text(text: bytes) -> bool:
-    words = split_words(text, block_delete=False)
-    odd = np.add.reduceat(words.letter == FAULT, words.first[:-1]) if len(words.letter) else np.zeros(0)
-    does = np.add.reduceat(np.isin(words.letter, _DOES), words.first[:-1]) if len(words.letter) else odd
-    return bool((odd > 0).any() and not ((odd == 0) & (does > 0)).any())
-
 
 # The longest source line without its comments [bytes]. RS274NGC stops at 255; a line beyond this is not a program's.
 LINE_MAX = 4096

@@ -54,12 +54,6 @@ def _refusal(name: str) -> str:
     return f"{name} while cutter radius compensation is on; write G40 before it"
 
 
-def check_motion(state: State, block: Block) -> None:
-    """Cycles and threads are not compensated. Raises WordFault."""
-    if state.motion > 3:
-        raise block.fault(_refusal(f"G{codes.number(state.motion)}"))
-
-
 def switch(
     state: State, table: BlockTable, block: Block, on: Cutter | None, findings: Findings
 ) -> Cutter | None:
@@ -191,8 +185,10 @@ class Mover:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault under compensation."""
         state = self.state
         self._take_code(block)
-        if block.g.get("one-shot") in COVET_AXES or _gives_offsets(block):
+        if block.g.get("one-shot") in COVET_AXES:
             return
+        if block.g.get("tool length") in (431, 432) and "motion" not in block.g:
+            return  # the axis words are those of G43.1 or G43.2
         if block.g.get("one-shot") == 530:
             moves.check_machine_coordinates(state, block)
             offsets.assume_origin(state, "G53", block, self.findings)
@@ -231,7 +227,8 @@ class Mover:
             threads.stop(state, self.table, block.line)
         if self.cutter is not None:
             offsets.refuse(state, block, "under cutter radius compensation")
-            check_motion(state, block)
+            if state.motion > 3:  # cycles and threads are not compensated
+                raise block.fault(_refusal(f"G{codes.number(state.motion)}"))
         if state.motion > 3:
             offsets.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
@@ -337,8 +334,3 @@ class Mover:
         (points, weights), line = found
         state.position[:] = points[-1, -1]
         self.table.add_spline(points, weights, line, state)
-
-
-def _gives_offsets(block: Block) -> bool:
-    """True if the axis words are those of G43.1 or G43.2."""
-    return block.g.get("tool length") in (431, 432) and "motion" not in block.g

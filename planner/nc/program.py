@@ -141,11 +141,6 @@ class Origins:
         return (self.offset[row], bool(self.turned[row])) if row >= 0 else (np.zeros(3), False)
 
 
-def no_origins() -> Origins:
-    """Programmed zero at machine zero throughout."""
-    return Origins(block=np.zeros(0), offset=np.zeros((0, 3)), turned=np.zeros(0))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
@@ -231,7 +226,9 @@ class Program:
     synchronised: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
-    origins: Origins = field(default_factory=no_origins)
+    origins: Origins = field(
+        default_factory=lambda: Origins(block=np.zeros(0), offset=np.zeros((0, 3)), turned=np.zeros(0))
+    )
     notes: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))

@@ -26,8 +26,9 @@ from planner.nc.language.detect import (
     is_turned,
     language_of,
     refuse_models,
+    without_leader,
 )
-from planner.nc.lexer import Words, split_words, text_alone, without_leader
+from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, LATHE, SIEMENS, Reading

@@ -279,10 +279,5 @@ def system_name(code: int) -> str:
     return f"G{code // 10}" + (f".{code % 10}" if code % 10 else "")
 
 
-def set_units(state: State, code: int) -> None:
-    """G20 (code 200): inches, G21: millimetres, from here on."""
-    state.unit = MM_PER_INCH if code == 200 else 1.0
-
-
 def _vector(given: dict[str, float]) -> FloatArray:
     return np.array([given.get(letter, 0.0) for letter in LINEAR_AXES])

@@ -18,8 +18,9 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 PASSES_MAX = 10_000  # of a cycle: more are a mistake in its depth
 SAME = 1e-9  # lengths below this are none [mm]: the rounding of coordinates around 1e3 mm
@@ -41,10 +42,6 @@ class Leg:
         """The leg, moved."""
         return replace(self, end=self.end + by, centre=self.centre + by)
 
-    def exchanged(self) -> Leg:
-        """The leg with x and z exchanged."""
-        return Leg(exchanged(self.end), -self.turning, exchanged(self.centre))
-
 
 @dataclass(frozen=True)
 class Contour:
@@ -54,10 +51,6 @@ class Contour:
     fast: bool
     legs: tuple[Leg, ...]
 
-    def exchanged(self) -> Contour:
-        """The profile with x and z exchanged."""
-        return Contour(exchanged(self.start), self.fast, tuple(leg.exchanged() for leg in self.legs))
-
 
 @dataclass(frozen=True)
 class TurningStep:
@@ -65,10 +58,6 @@ class TurningStep:
 
     leg: Leg
     fast: bool = False
-
-    def exchanged(self) -> TurningStep:
-        """The move with x and z exchanged."""
-        return TurningStep(self.leg.exchanged(), self.fast)
 
 
 @dataclass(frozen=True)
@@ -89,12 +78,9 @@ class Roughing:
 
 def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[TurningStep]:
     """The moves of G71, or with `facing` of G72. Raises ContourFault."""
-    if not facing:
-        yield from _removal(contour, given)
-        return
-    turned = replace(given, allowance=exchanged(given.allowance), more=exchanged(given.more))
-    for step in _removal(contour.exchanged(), turned):
-        yield step.exchanged()
+    if facing:
+        return map(exchanged, _removal(exchanged(contour), exchanged(given)))
+    return _removal(contour, given)
 
 
 def pattern_repeat(
@@ -207,6 +193,13 @@ def _directions(start: complex, leg: Leg) -> list[complex]:
     return [1j * leg.turning * from_centre * cmath.exp(1j * leg.turning * m) for m in middles]
 
 
-def exchanged(point: complex) -> complex:
-    """A point with x and z exchanged."""
-    return complex(point.imag, point.real)
+def exchanged(one: Any) -> Any:
+    """A point with x and z exchanged, and a record with all of its points so."""
+    if isinstance(one, complex):
+        return complex(one.imag, one.real)
+    if isinstance(one, tuple):
+        return tuple(map(exchanged, one))
+    if not is_dataclass(one):
+        return one
+    values = {field.name: exchanged(getattr(one, field.name)) for field in fields(one)}
+    return replace(one, **values | ({"turning": -values["turning"]} if isinstance(one, Leg) else {}))  # type: ignore[type-var]

@@ -25,7 +25,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.nc.lexer import NUMBER, Words, split_words, without_leader
+from planner.nc.language.detect import without_leader
+from planner.nc.lexer import NUMBER, Words, split_words
 from planner.nc.program import FEED_MOVES, Program, extruder_alone
 
 SIGNIFICANT = 4  # digits of a feed
@@ -70,7 +71,11 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     per_minute = mode.in_force[row] == G94
     often = np.full(len(moving), np.nan) if inverse is None else np.asarray(inverse, dtype=np.float64)[moving]
     often[~per_minute | (mode.word[row] >= 0)] = np.nan
-    own = _has_feed_of_f(program.feed[moving], programmed * unit[row], per_minute) | ~np.isnan(often)
+    f_word_feed = (
+        programmed * unit[row]
+    )  # [mm per minute]; not that of a move under G93 and G95, and in a thread
+    off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
+    own = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
     moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
@@ -82,11 +87,6 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     fastest[np.isinf(fastest)] = np.nan
     new = _New(rows, fastest, programmed[first], often[first])
     return _spliced(source, _edits(words, f_word, unit, mode, new))
-
-
-def _has_feed_of_f(feed: FloatArray, f_word: FloatArray, per_minute: Array) -> Array:
-    """(n,) whether the feed of a move [mm/s] is that of its F word [mm per minute]: not under G93 and G95, and not in a thread."""
-    return per_minute & (np.abs(feed * SECONDS_PER_MINUTE - f_word) <= SAME_FEED * f_word)
 
 
 class _FeedModes(NamedTuple):

@@ -130,9 +130,11 @@ class _Run:
     def all_notes(self) -> Notes:
         notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]
         assumed = []
-        at_will = next((k for k in range(len(self.drawing.kind)) if self._is_unlimited(k)), None)
-        if at_will is not None:
-            line = self._place(self.drawing.at[at_will])[0]
+        drawing = self.drawing
+        blocks = zip(drawing.kind, drawing.feed, drawing.at, strict=True)
+        at_will = (at for kind, feed, at in blocks if kind in (Kind.LINE, Kind.ARC) and feed == math.inf)
+        if (at := next(at_will, None)) is not None:
+            line = self._place(at)[0]
             assumed.append(
                 f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows"
             )
@@ -152,9 +154,6 @@ class _Run:
             assumed.append(f"{count:,} {what}: left out, as plotters do; first {word} line {line}")
         return Notes(tuple(assumed), (*notes, *self.notes))
 
-    def _is_unlimited(self, block: int) -> bool:
-        return self.drawing.kind[block] in (Kind.LINE, Kind.ARC) and self.drawing.feed[block] == math.inf
-
     def _place(self, at: int) -> tuple[int, int]:
         """Line and column of a byte, from 1."""
         line = bisect_left(self._line_ends, at)
@@ -171,7 +170,8 @@ class _Run:
     def _execute(self, it: Instruction) -> None:
         name, numbers = it.name, it.numbers
         form = FORMS.get(name)
-        if (form is None or (name == "RT" and not form.fits(len(numbers)))) and self._is_unknown(name):
+        known = self.strict or name in IGNORED or name in REFUSED or name == "SM"
+        if (form is None or (name == "RT" and not form.fits(len(numbers)))) and not known:
             self.unknown.append(it.at)  # RT is an arc of HP's plotters, and something else of other makers
             return
         if form is None:
@@ -212,9 +212,6 @@ class _Run:
         elif name == "IN":
             self._move_pen(False, it.at)
             self._initialise()
-
-    def _is_unknown(self, name: str) -> bool:
-        return not self.strict and name not in IGNORED and name not in REFUSED and name != "SM"
 
     def _plot(self, it: Instruction) -> None:
         if it.name in ("PA", "PR"):

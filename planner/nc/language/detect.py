@@ -7,6 +7,11 @@ M99, and sums without brackets behind an equals sign. Parameters and brackets al
 
 Conversational Heidenhain programs and Siemens programs with their commands and assignments are read by `planner.nc.language`, plotter
 files (HPGL) by `planner.nc.hpgl`. The marks below occur in no RS274NGC program outside comments.
+
+Text before the first % of a program: names of parts, lists of tools, what a serial line needed. Controls skip it.
+
+It is skipped here too where it cannot be a program: some line of it is no words, and no line that is words has a code or a coordinate.
+Parameters and expressions (# [ < =) are no such text.
 """
 
 from __future__ import annotations
@@ -18,12 +23,14 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
-from planner.nc.lexer import FAULT, Words
+from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, SIEMENS, Reading
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one that fits nowhere is tried
 # in 2^n ways, such as n comments in a file of no language.
-_LOOKED_AT = 20_000  # bytes at the start of a file that tell its language
+_LOOKED_AT = (
+    20_000  # bytes at the start of a file that tell its language, and in which the first % is looked for
+)
 _CONVERSATIONAL = re.compile(
     rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
 )
@@ -138,6 +145,32 @@ _RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
 _OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
 _CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
 _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
+
+
+_SHOWN = 30  # characters of the text in the note
+_FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
+_LANGUAGE = re.compile(rb"[#\[<=]")
+_DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
+
+
+def without_leader(data: bytes) -> tuple[bytes, str]:
+    """The program with blanks for the text before its first %, and the beginning of that text; ("" where there is none).
+
+    Offsets and lines stay as they are.
+    """
+    match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
+    text = data[: match.start()] if match else b""
+    if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
+        return data, ""
+    shown = " ".join(text.decode("utf-8", "replace").split())[:_SHOWN]
+    return re.sub(rb"[^\r\n]", b" ", text) + data[len(text) :], shown
+
+
+def _is_text(text: bytes) -> bool:
+    words = split_words(text, block_delete=False)
+    odd = np.add.reduceat(words.letter == FAULT, words.first[:-1]) if len(words.letter) else np.zeros(0)
+    does = np.add.reduceat(np.isin(words.letter, _DOES), words.first[:-1]) if len(words.letter) else odd
+    return bool((odd > 0).any() and not ((odd == 0) & (does > 0)).any())
 
 
 def may_compute(words: Words) -> list[int]:

@@ -25,16 +25,6 @@ def rounded(x: float) -> float:
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 
 
-def from_decimal_digits(x: float) -> float:
-    """BIN: 0x25 read as the decimal digits 25."""
-    return float(int(f"{int(x):x}"))
-
-
-def to_decimal_digits(x: float) -> float:
-    """BCD: 25 as 0x25."""
-    return float(int(str(int(x)), 16))
-
-
 FUNCTIONS: dict[str, Callable[..., object]] = {
     **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
     **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, modulo, rounded)},
@@ -46,8 +36,8 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "acos": lambda x: math.degrees(math.acos(x)),
     "atan": lambda x: math.degrees(math.atan(x)),
     "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
-    "binary": from_decimal_digits,
-    "decimal": to_decimal_digits,
+    "binary": lambda x: float(int(f"{int(x):x}")),  # 0x25 read as the decimal digits 25
+    "decimal": lambda x: float(int(str(int(x)), 16)),  # 25 as 0x25
 }
 # By name and number of operands. A dialect that means another thing by a name puts its own text in the place of this one.
 ARITHMETIC: dict[tuple[str, int], str] = {

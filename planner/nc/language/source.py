@@ -54,13 +54,9 @@ class Source:
     def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
         self.scale = integers.scale(words)
-        self.lines = self._statements()
-
-    def _statements(self) -> list[int]:
-        """Rows, ascending, that are statements of the language rather than words."""
-        words = self.words
         bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words))
-        return [row for row, text in bare_texts if computes(text) or _PROGRAM.match(text)]
+        # rows, ascending, that are statements of the language rather than words
+        self.lines = [row for row, text in bare_texts if computes(text) or _PROGRAM.match(text)]
 
     def _message_lines(self) -> list[tuple[int, SourceLine]]:
         """Lines with a message in a comment, each with the row that it comes before."""

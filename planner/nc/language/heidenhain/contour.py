@@ -21,7 +21,7 @@ from planner.nc.language.heidenhain.text import (
     looked_up,
     value,
 )
-from planner.nc.language.tree import ZERO, Expression, MadeRows, Number, Statement, assign, made
+from planner.nc.language.tree import ZERO, Expression, MadeRows, Number, Statement, assign
 
 _KIND = re.compile(r"\s*(P?)(LT|LN|CT|LCT)\b", re.IGNORECASE)
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
@@ -34,13 +34,6 @@ TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
 def compensates(text: str) -> bool:
     """True if a block may switch compensation on or off."""
     return bool(_COMPENSATES.search(text))
-
-
-def side_rows(block: ConversationalBlock, given: Items) -> list[Statement]:
-    """The statements of RL, RR or R0 before the move of a block."""
-    if given.side is None:
-        return []
-    return [made(block.place, "compensate", side=given.side)]
 
 
 def approach_rows(

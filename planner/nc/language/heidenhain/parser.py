@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows, side_rows
+from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.heidenhain.text import (
@@ -146,6 +146,8 @@ class HeidenhainParser(Definitions):
         match = _FUNCTION.match(block.text)
         name = " ".join(match.group().upper().split()) if match else ""
         read = _READ.get(name)
+        if name in ("RND", "CHF"):
+            raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
         if match is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
             raise block.fault(
@@ -165,9 +167,6 @@ class HeidenhainParser(Definitions):
         units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
         called = tree.Call(block.place, name, None, block.text[column:].strip())
         return [called, units, looked_up(block)]
-
-    def _nothing(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        return []
 
     # --- moves ------------------------------------------------------------------------------------------------------------------
 
@@ -207,9 +206,6 @@ class HeidenhainParser(Definitions):
             tree.made(block.place, "corner", kind=CORNERS.index("RND" if rounded else "CHR"), size=number)
         ]
 
-    def _lonely_corner(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
-
     def _arc(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         name = block.text[:column].upper()
         given = items(block, column)
@@ -235,15 +231,14 @@ class HeidenhainParser(Definitions):
             raise block.fault("there is no pole: write CC before")
 
     def _side(self, block: ConversationalBlock, given: Items) -> list[tree.Statement]:
-        return side_rows(block, given) if self.compensates else []
+        if given.side is None or not self.compensates:
+            return []
+        return [tree.made(block.place, "compensate", side=given.side)]
 
     def _approach(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         rows, given = approach_rows(block, column, self.moves.automatic)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
-
-    def _datum(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        return datum_rows(block, column)
 
     def _pole(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
         given = items(block, column)
@@ -279,15 +274,14 @@ _WHY = {
 _READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[tree.Statement]]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
-    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), HeidenhainParser._nothing),
+    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), lambda parser, block, column: []),
     "TOOL DEF": HeidenhainParser._tool_data,
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
-    "TRANS DATUM": HeidenhainParser._datum,
+    "TRANS DATUM": lambda parser, block, column: datum_rows(block, column),
     "CC": HeidenhainParser._pole,
-    **dict.fromkeys(("RND", "CHF"), HeidenhainParser._lonely_corner),
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,
     "CALL PGM": HeidenhainParser._call_program,

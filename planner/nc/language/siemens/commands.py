@@ -209,7 +209,7 @@ class Commands(SiemensControl):
 
     def _message(self, reader: LineTokens) -> None:
         match = re.search(r'"([^"]*)"', reader.text)
-        reader.next = len(reader.tokens)
+        reader.leave()
         if match and match.group(1):
             self.body.append(tree.Message(reader.place, (match.group(1),)))
 
@@ -229,9 +229,6 @@ class Commands(SiemensControl):
             raise reader.fault(
                 "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
             )
-
-    def _idle(self, reader: LineTokens) -> None:
-        reader.next = len(reader.tokens)
 
     def _given(self, reader: LineTokens, letter: str, at: int) -> tree.Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
@@ -325,7 +322,7 @@ class Commands(SiemensControl):
                 taken.append((variable(name), handed_over(len(taken))))
                 if not reader.take(",") and reader.peek() != ")":
                     raise reader.fault(") is missing")
-        reader.next = len(reader.tokens)  # SAVE, DISPLOF and others
+        reader.leave()  # SAVE, DISPLOF and others
         if taken:
             self.body.append(tree.assign(reader.place, *taken))
 

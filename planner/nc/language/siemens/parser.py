@@ -26,7 +26,7 @@ from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
+from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _COMPENSATES = re.compile(rb"G4[12]\b")
@@ -159,25 +159,27 @@ def _without_comment(text: str) -> str:
     return re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", text.rstrip("\r\n\x1a"))
 
 
-_STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], None]] = {
+_STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     "DEF": SiemensParser._define,
     "IF": SiemensParser._if,
     "ELSE": SiemensParser._else,
     "ENDIF": SiemensParser._end_if,
-    "WHILE": SiemensParser._while,
-    "LOOP": SiemensParser._loop,
+    "WHILE": lambda parser, reader: parser._begin("WHILE", reader, reader.expression()),
+    "LOOP": lambda parser, reader: parser._begin("LOOP", reader, ONE),
     **dict.fromkeys(("ENDWHILE", "ENDLOOP"), SiemensParser._end_loop),
     "FOR": SiemensParser._for,
     "ENDFOR": SiemensParser._end_for,
     "REPEAT": SiemensParser._repeat,
     "REPEATB": SiemensParser._repeat_block,
     "UNTIL": SiemensParser._until,
-    **dict.fromkeys(("GOTO", "GOTOF", "GOTOB", "GOTOC"), SiemensParser._goto),
+    **dict.fromkeys(
+        ("GOTO", "GOTOF", "GOTOB", "GOTOC"), lambda parser, reader: parser._jump(reader, parser.body)
+    ),
     **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),
     "MCALL": SiemensParser._modal_call,
     **dict.fromkeys(cycles.PATTERNS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
-    **dict.fromkeys(("EXTERN", "WORKPIECE"), SiemensParser._idle),
+    **dict.fromkeys(("EXTERN", "WORKPIECE"), lambda parser, reader: reader.leave()),
     **dict.fromkeys(commands.TOOL_POINT, SiemensParser._tool_point),
     "PROC": SiemensParser._procedure,
     "CALL": SiemensParser._call_text,

@@ -77,6 +77,10 @@ class LineTokens(TokenReader):
             self.place._replace(at=self.start + (self.column() if at is None else at)), message
         )
 
+    def leave(self) -> None:
+        """Go past all that is left."""
+        self.next = len(self.tokens)
+
     def at(self) -> int:
         """Byte offset of the next token."""
         return self.start + self.column()
@@ -202,12 +206,6 @@ class SiemensControl:
         closed = self._close("IF", reader)
         self.body.append(closed.branched())
 
-    def _while(self, reader: LineTokens) -> None:
-        self._begin("WHILE", reader, reader.expression())
-
-    def _loop(self, reader: LineTokens) -> None:
-        self._begin("LOOP", reader, tree.ONE)
-
     def _end_loop(self, reader: LineTokens) -> None:
         kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
         closed = self._close(kind, reader)
@@ -290,9 +288,6 @@ class SiemensControl:
                 closed.body,
             )
         )
-
-    def _goto(self, reader: LineTokens) -> None:
-        self._jump(reader, self.body)
 
     def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
         label = reader.peek()

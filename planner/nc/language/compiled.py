@@ -70,9 +70,7 @@ def _stays(statement: tree.Statement, read: set[tree.Parameter]) -> bool:
     if not isinstance(statement, tree.Line):
         return True
     for word in statement.words:
-        if chr(word.letter) == "M" and not (
-            isinstance(word.value, tree.Number) and word.value.value not in _ENDS
-        ):
+        if word.letter == "M" and not (isinstance(word.value, tree.Number) and word.value.value not in _ENDS):
             return False
     targets = [target for target, _ in statement.assignments]
     computed = any(isinstance(t, tree.Numbered) and not isinstance(t.index, tree.Number) for t in targets)
@@ -166,7 +164,7 @@ class _Function:
         words, given = [], []
         for word in line.words:
             constant = word.value.value if isinstance(word.value, tree.Number) else None
-            words.append((word.letter, word.at, constant))
+            words.append((ord(word.letter), word.at, constant))
             if constant is None:
                 given.append(self.say.assigned(word.value))
         values = [self.say.assigned(value) for _, value in line.assignments]

@@ -213,7 +213,7 @@ class LineReader(ExpressionReader):
 
     # --- words --------------------------------------------------------------------------------------------------------------
 
-    def words_and_assignments(self, scale: float = 1.0) -> tuple[tuple[tree.Word, ...], tree.Assignments]:
+    def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
         """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
         words: list[tree.Word] = []
         assignments: list[tuple[tree.Parameter, tree.Expression]] = []
@@ -225,11 +225,11 @@ class LineReader(ExpressionReader):
                 assignments.append((target, self.expression() if self.spelling.long_values else self.value()))
             elif c.isalpha() and c.isascii():
                 self.at += 1
-                letter, value = ord(c.upper()), self.value()
+                letter, value = c.upper(), self.value()
                 if (
                     scale != 1.0
                     and isinstance(value, tree.Number)
-                    and letter in LENGTHS
+                    and ord(letter) in LENGTHS
                     and "." not in self.text[at : self.at]
                 ):
                     value = tree.Number(value.value * scale)

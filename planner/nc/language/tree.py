@@ -107,24 +107,33 @@ class PlainRows(NamedTuple):
 
 
 class Word(NamedTuple):
-    """A letter's code, its place in the source, and its value."""
+    """A letter, its place in the source, and its value."""
 
-    letter: int
+    letter: str
     at: int
     value: Expression
+
+    @property
+    def code(self) -> str:
+        """G and M codes by name; empty for other words and computed codes."""
+        named = self.letter in "GM" and isinstance(self.value, Number)
+        return f"{self.letter}{self.value.value:g}" if named else ""  # type: ignore[union-attr]
+
+
+Words = tuple[Word, ...]
 
 
 class Line(NamedTuple):
     """A row of words and assignments; all values are computed before any is assigned."""
 
     place: SourcePlace
-    words: tuple[Word, ...]
+    words: Words
     assignments: Assignments = ()
 
 
 def word(letter: str, at: int, value: Expression | float) -> Word:
     """A word of a row."""
-    return Word(ord(letter), at, value if isinstance(value, Value) else Number(value))
+    return Word(letter, at, value if isinstance(value, Value) else Number(value))
 
 
 def row(place: SourcePlace, *words: tuple[str, Expression | float], assigned: Assignments = ()) -> Line:

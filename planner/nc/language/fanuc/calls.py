@@ -92,7 +92,7 @@ _TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
 _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
-def subprogram(words: tuple[tree.Word, ...], line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:
+def subprogram(words: tree.Words, line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:
     """M98. known : the numbers of the file's programs. Raises ProgramFault."""
     rest, given = _split(words, "M98", "PL")
     if "P" not in given:
@@ -110,7 +110,7 @@ def subprogram(words: tuple[tree.Word, ...], line: SourceLine, known: frozenset[
 
 
 def of_block(
-    words: tuple[tree.Word, ...], line: SourceLine, program: tree.Procedure
+    words: tree.Words, line: SourceLine, program: tree.Procedure
 ) -> tuple[int, list[tree.Statement]]:
     """M97: the block that is called, and the statements. Raises ProgramFault."""
     rest, given = _split(words, "M97", "PL")
@@ -123,7 +123,7 @@ def of_block(
     return number, [*_row(rest, line), call]
 
 
-def returned(words: tuple[tree.Word, ...], line: SourceLine, *, restarts: bool) -> list[tree.Statement]:
+def returned(words: tree.Words, line: SourceLine, *, restarts: bool) -> list[tree.Statement]:
     """M99. restarts : it stands in the main program, which a control then starts again."""
     rest, given = _split(words, "M99", "P")
     said: list[tree.Statement] = [
@@ -132,15 +132,15 @@ def returned(words: tuple[tree.Word, ...], line: SourceLine, *, restarts: bool) 
     return [*_row(rest, line), *said, tree.Return(line.place, None, given.get("P"))]
 
 
-def macro(words: tuple[tree.Word, ...], code: str, line: SourceLine) -> tree.Call:
+def macro(words: tree.Words, code: str, line: SourceLine) -> tree.Call:
     """G65, or the call that G66 makes after every move. Raises ProgramFault."""
     arguments: dict[int, tree.Expression] = {}
     seen = dict.fromkeys(_TRIPLES, 0)
     program: str | tree.Expression = ""
     times: tree.Expression = tree.Number(1.0)
     for word in words:
-        letter = chr(word.letter)
-        if code_of(word) == code or letter == "N":
+        letter = word.letter
+        if word.code == code or letter == "N":
             continue
         if letter == "P":
             program = f"{word.value.value:.0f}" if isinstance(word.value, tree.Number) else word.value
@@ -166,28 +166,19 @@ def fanuc_files(name: str) -> frozenset[str]:
     return frozenset(stem + ending for stem in stems for ending in ("", ".nc", ".ngc", ".cnc", ".tap"))
 
 
-def code_of(word: tree.Word) -> str:
-    """G and M codes by name; empty for other words and computed codes."""
-    if chr(word.letter) not in "GM" or not isinstance(word.value, tree.Number):
-        return ""
-    return f"{chr(word.letter)}{word.value.value:g}"
-
-
 def block_name(number: int, program: tree.Procedure) -> str:
     """The name of what M97 calls: the program from its block of that number on."""
     return f"N{number} of O{program.name}" if program.name else f"N{number}"
 
 
-def _split(
-    words: tuple[tree.Word, ...], code: str, own: str
-) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
+def _split(words: tree.Words, code: str, own: str) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
     """The words that a call does not use, and those that it does."""
     rest, given = [], {}
     for word in words:
-        letter = chr(word.letter)
+        letter = word.letter
         if letter in own and letter not in given:
             given[letter] = word.value
-        elif code_of(word) != code:
+        elif word.code != code:
             rest.append(word)
     return rest, given
 

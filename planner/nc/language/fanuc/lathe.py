@@ -18,7 +18,6 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.nc.integers import LENGTHS
-from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, of_shared, shared
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.tree import (
@@ -35,6 +34,7 @@ from planner.nc.language.tree import (
     SourcePlace,
     Statement,
     Word,
+    Words,
     made,
     row,
 )
@@ -103,9 +103,9 @@ class LatheParser(LatheWords):
 
     # --- cycles -------------------------------------------------------------------------------------------------------------
 
-    def _cycle(self, cycle: str, words: tuple[Word, ...], line: SourceLine) -> None:
+    def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
-        given = {chr(word.letter): word for word in words if chr(word.letter) in own}
+        given = {word.letter: word for word in words if word.letter in own}
         if self._is_first(cycle, given):
             lengths = "QR" if cycle == "G76" else "UWR"
             self.waiting[cycle] = {
@@ -113,7 +113,7 @@ class LatheParser(LatheWords):
                 for letter, word in given.items()
             }
             return
-        rest = tuple(word for word in words if chr(word.letter) not in own and code_of(word) != cycle)
+        rest = tuple(word for word in words if word.letter not in own and word.code != cycle)
         if rest:
             self._words(rest, (), line)
         if cycle == "G76":
@@ -199,7 +199,7 @@ class LatheParser(LatheWords):
 
     def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
         """A word of a cycle in the program's unit: in least increments where it is a number without a point."""
-        letter = chr(word.letter)
+        letter = word.letter
         in_increments = _INCREMENTS.get(cycle, "D")
         if (
             letter not in in_increments
@@ -209,7 +209,7 @@ class LatheParser(LatheWords):
             return word.value
         text = self.source.words.data[word.at - self.source.begin :]
         match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
-        if (match and match.group(1)) or (line.scale != 1.0 and word.letter in LENGTHS):
+        if (match and match.group(1)) or (line.scale != 1.0 and ord(word.letter) in LENGTHS):
             return word.value
         return word.value * _INCREMENT
 

@@ -22,11 +22,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from planner.nc.language.fanuc.calls import code_of
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tree import (
+    Assignments,
     Expression,
     Line,
     MadeRows,
@@ -34,9 +34,9 @@ from planner.nc.language.tree import (
     Named,
     Number,
     Numbered,
-    Parameter,
     SourcePlace,
     Word,
+    Words,
     assign,
     made,
     row,
@@ -88,17 +88,15 @@ class LatheWords(FanucParser):
         self.cut_given: set[str] = set()  # its words so far
         self.retract: dict[str, Expression] = {}  # R of the first blocks of G74 and G75
 
-    def _cycle(self, cycle: str, words: tuple[Word, ...], line: SourceLine) -> None:
+    def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         """A line with a cycle."""
         raise NotImplementedError
 
-    def _words(
-        self, words: tuple[Word, ...], assignments: tuple[tuple[Parameter, Expression], ...], line: SourceLine
-    ) -> None:
-        codes = {code_of(word) for word in words}
+    def _words(self, words: Words, assignments: Assignments, line: SourceLine) -> None:
+        codes = {word.code for word in words}
         for code in sorted(codes & set(_REFUSED)):
             raise line.fault(f"{_REFUSED[code]} not read; write the moves out")
-        given = {chr(word.letter): word.value for word in words if chr(word.letter) not in "GM"}
+        given = {word.letter: word.value for word in words if word.letter not in "GM"}
         self.feed = given.get("F", self.feed)
         if self._single(words, codes, line):
             return
@@ -110,20 +108,18 @@ class LatheWords(FanucParser):
             words = self._tool(words, given["T"], line)
         words = self._speeds(words, given, codes, line)
         if "G4" in codes and "P" not in given:
-            words = tuple(
-                word._replace(letter=ord("P")) if chr(word.letter) in "XU" else word for word in words
-            )
-            self.body.append(Line(line.place, tuple(word for word in words if chr(word.letter) != "H")))
+            words = tuple(word._replace(letter="P") if word.letter in "XU" else word for word in words)
+            self.body.append(Line(line.place, tuple(word for word in words if word.letter != "H")))
             return
         words = tuple(changed for word in words if (changed := self._changed(word, line)) is not None)
         super()._words(self._threads(words, codes), assignments, line)
 
     def _changed(self, word: Word, line: SourceLine) -> Word | None:
         """The word as LinuxCNC's lathes have it; None for one that says nothing."""
-        letter, code = chr(word.letter), code_of(word)
+        letter, code = word.letter, word.code
         if letter in "UW":
             axis, here = ("X", X_HERE) if letter == "U" else ("Z", Z_HERE)
-            return word._replace(letter=ord(axis), value=here + word.value)
+            return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
             if word.value != Number(0.0):
                 raise line.fault("H moves the axis C, which is not planned; X and Z are", word.at)
@@ -132,21 +128,21 @@ class LatheWords(FanucParser):
             return word._replace(value=Number(94.0 if code == "G98" else 95.0))
         return word
 
-    def _threads(self, words: tuple[Word, ...], codes: set[str]) -> tuple[Word, ...]:
+    def _threads(self, words: Words, codes: set[str]) -> Words:
         """G32 with the lead F as G33 with K, on each of its lines."""
         if "G32" in codes:
             self.threading = True
         elif codes & {"G0", "G1", "G2", "G3", "G00", "G01", "G02", "G03"}:
             self.threading = False
-        if not self.threading or not any(chr(word.letter) in "XZ" for word in words):
+        if not self.threading or not any(word.letter in "XZ" for word in words):
             return words
-        kept = [word._replace(value=Number(33.0)) if code_of(word) == "G32" else word for word in words]
-        kept = [word for word in kept if chr(word.letter) != "F"]
+        kept = [word._replace(value=Number(33.0)) if word.code == "G32" else word for word in words]
+        kept = [word for word in kept if word.letter != "F"]
         if self.feed is not None:
-            kept.append(Word(ord("K"), kept[-1].at, self.feed))
+            kept.append(Word("K", kept[-1].at, self.feed))
         return tuple(kept)
 
-    def _tool(self, words: tuple[Word, ...], number: Expression, line: SourceLine) -> tuple[Word, ...]:
+    def _tool(self, words: Words, number: Expression, line: SourceLine) -> Words:
         """T0203 as rows of its own; the other words are left."""
         if not isinstance(number, Number) or number.value < 0 or number.value != int(number.value):
             raise line.fault("T takes a number, such as T0203 (tool 2, offset 3)")
@@ -160,19 +156,15 @@ class LatheWords(FanucParser):
         self.tool = tool
         length = (("G", 43.0), ("H", float(offset))) if offset else (("G", 49.0),)
         self.body.append(row(line.place, *length))
-        return tuple(word for word in words if chr(word.letter) != "T" and code_of(word) != "M6")
+        return tuple(word for word in words if word.letter != "T" and word.code != "M6")
 
-    def _speeds(
-        self, words: tuple[Word, ...], given: dict[str, Expression], codes: set[str], line: SourceLine
-    ) -> tuple[Word, ...]:
+    def _speeds(self, words: Words, given: dict[str, Expression], codes: set[str], line: SourceLine) -> Words:
         """G50 S is kept and becomes D of G96."""
         if "G50" in codes or "G92" in codes:
             if "S" not in given or given.keys() & set("XZUW"):
                 raise line.fault("G50 that sets a position is not read; write a work system (G54)")
             self.speed_max = given["S"]
-            words = tuple(
-                word for word in words if chr(word.letter) != "S" and code_of(word) not in ("G50", "G92")
-            )
+            words = tuple(word for word in words if word.letter != "S" and word.code not in ("G50", "G92"))
             if self.surface is None:
                 return words
             return (*words, *self._surface(line))
@@ -180,7 +172,7 @@ class LatheWords(FanucParser):
             self.surface = None
         if "G96" in codes or (self.surface is not None and "S" in given):
             self.surface = given.get("S", self.surface)
-            words = tuple(word for word in words if chr(word.letter) != "S" and code_of(word) != "G96")
+            words = tuple(word for word in words if word.letter != "S" and word.code != "G96")
             return (*words, *self._surface(line))
         return words
 
@@ -188,9 +180,9 @@ class LatheWords(FanucParser):
         at, speeds = line.place.at, (("S", self.surface), ("D", self.speed_max))
         return [word("G", at, 96.0), *(word(c, at, speed) for c, speed in speeds if speed is not None)]
 
-    def _single(self, words: tuple[Word, ...], codes: set[str], line: SourceLine) -> bool:
+    def _single(self, words: Words, codes: set[str], line: SourceLine) -> bool:
         """Read a line with such a cycle, or one that repeats the cut in force. False if it is none. Raises ProgramFault."""
-        letters = {chr(word.letter) for word in words}
+        letters = {word.letter for word in words}
         pecks = next((code for code in PECKS if code in codes), "")
         if pecks:
             self.cut = ""
@@ -215,8 +207,8 @@ class LatheWords(FanucParser):
         self._cutting(words, line)
         return True
 
-    def _cutting(self, words: tuple[Word, ...], line: SourceLine) -> None:
-        given = {chr(word.letter): word.value for word in words if chr(word.letter) in _PLACE + "RIK"}
+    def _cutting(self, words: Words, line: SourceLine) -> None:
+        given = {word.letter: word.value for word in words if word.letter in _PLACE + "RIK"}
         self._rest(words, set(given), line)
         taper = "K" if self.cut == "G94" else "I"
         if taper in given:
@@ -238,8 +230,8 @@ class LatheWords(FanucParser):
         self.body.append(of_shared(line.place, self.cut, sorted(self.cut_given)))
         self.threading = False
 
-    def _pecking(self, cycle: str, words: tuple[Word, ...], line: SourceLine) -> None:
-        own = {chr(word.letter): word for word in words if chr(word.letter) in _PLACE + "PQRIKD"}
+    def _pecking(self, cycle: str, words: Words, line: SourceLine) -> None:
+        own = {word.letter: word for word in words if word.letter in _PLACE + "PQRIKD"}
         if set(own) == {"R"}:
             self.retract[cycle] = own["R"].value
             self._rest(words, {"R"}, line)
@@ -264,11 +256,9 @@ class LatheWords(FanucParser):
         self.body.append(made(line.place, cycle, **values))
         self.threading = False
 
-    def _rest(self, words: tuple[Word, ...], own: set[str], line: SourceLine) -> None:
+    def _rest(self, words: Words, own: set[str], line: SourceLine) -> None:
         """The line's other words, F S T M, which are executed before the cycle."""
-        rest = tuple(
-            word for word in words if chr(word.letter) not in own and code_of(word) not in (*CUTS, *PECKS)
-        )
+        rest = tuple(word for word in words if word.letter not in own and word.code not in (*CUTS, *PECKS))
         if rest:
             self._words(rest, (), line)
 

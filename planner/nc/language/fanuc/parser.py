@@ -200,30 +200,30 @@ class FanucParser(FanucControl):
 
     def _words(
         self,
-        words: tuple[tree.Word, ...],
-        assignments: tuple[tuple[tree.Parameter, tree.Expression], ...],
+        words: tree.Words,
+        assignments: tree.Assignments,
         line: SourceLine,
     ) -> None:
-        codes = [calls.code_of(word) for word in words]
+        codes = [word.code for word in words]
         called = next((code for code in _CALLS if code in codes), None)
         if called is not None:
             self._call(called, words, line)
             return
         if "G67" in codes:
             self.modal = None
-            words = tuple(word for word in words if calls.code_of(word) != "G67")
+            words = tuple(word for word in words if word.code != "G67")
         for target, _ in assignments:
             if target == tree.Numbered(tree.Number(_STOP)):
-                words = (*words, tree.Word(ord("M"), line.place.at, tree.Number(0.0)))
+                words = (*words, tree.Word("M", line.place.at, tree.Number(0.0)))
             if target == tree.Numbered(tree.Number(0.0)):
                 raise line.fault("#0 has no value and cannot be given one")
         assignments = tuple(pair for pair in assignments if pair[0] != tree.Numbered(tree.Number(_STOP)))
         if words or assignments:
             self.body.append(tree.Line(line.place, words, assignments))
-        if self.modal is not None and any(chr(word.letter) in "XYZ" for word in words):
+        if self.modal is not None and any(word.letter in "XYZ" for word in words):
             self.body.append(self.modal)
 
-    def _call(self, code: str, words: tuple[tree.Word, ...], line: SourceLine) -> None:
+    def _call(self, code: str, words: tree.Words, line: SourceLine) -> None:
         program = self.procedures[-1]
         if code == "M98":
             self.body += calls.subprogram(words, line, self.numbers)

@@ -196,7 +196,7 @@ class LinuxcncParser:
         elif line.row >= 0 and not self._code(reader, line):
             words, assignments = reader.words_and_assignments(line.scale)
             for word in words:
-                if word.letter == ord("N") and not isinstance(word.value, tree.Number):
+                if word.letter == "N" and not isinstance(word.value, tree.Number):
                     raise line.fault("a line number is written in digits", word.at)
             if words or assignments:
                 self.body.append(tree.Line(line.place, words, assignments))
@@ -223,7 +223,7 @@ class LinuxcncParser:
             self.body.append(tree.Modes(line.place, _MODES[code]))
         elif code == 98:
             words, _ = reader.words_and_assignments()
-            given = {chr(word.letter): word.value for word in words}
+            given = {word.letter: word.value for word in words}
             if "P" not in given or set(given) - {"P", "L"}:
                 raise line.fault("M98 takes P with the number of a subprogram, and L with its repetitions")
             name = _constant_name(given["P"])

@@ -85,7 +85,7 @@ class BlockWords(Commands):
                 assigned.append((target, reader.expression()))
             else:
                 for one in self._word(reader, name, at):
-                    letter, code = chr(one.letter), one.value
+                    letter, code = one.letter, one.value
                     if letter == "G" and isinstance(code, tree.Number):
                         if code.value in _SIDES:
                             before.insert(
@@ -100,9 +100,9 @@ class BlockWords(Commands):
                     moved |= letter in "XY"
                     words.append(one)
         if 4.0 in found:
-            seconds = [one._replace(letter=ord("P")) for one in words if one.letter == ord("F")]
-            words = [one for one in words if chr(one.letter) not in "FS"] + seconds
-            if not any(one.letter == ord("P") for one in words):
+            seconds = [one._replace(letter="P") for one in words if one.letter == "F"]
+            words = [one for one in words if one.letter not in "FS"] + seconds
+            if not any(one.letter == "P" for one in words):
                 raise reader.fault(
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
@@ -110,12 +110,12 @@ class BlockWords(Commands):
         ended = [
             one
             for one in words
-            if one.letter == ord("M") and isinstance(one.value, tree.Number) and one.value.value in returns
+            if one.letter == "M" and isinstance(one.value, tree.Number) and one.value.value in returns
         ]
         words = [one for one in words if one not in ended]
         words += [tree.word("M", one.at, 30.0) for one in ended if not self.source.file]
         self.body += before
-        if self.circular and any(chr(one.letter) in "XYZ" for one in words):
+        if self.circular and any(one.letter in "XYZ" for one in words):
             words = self._circle(reader, arc, words, through)
         if words or assigned:
             self.body.append(tree.Line(reader.place, tuple(words), tuple(assigned)))
@@ -136,13 +136,13 @@ class BlockWords(Commands):
             )
         given = dict(through)
         for one in words:
-            letter = chr(one.letter)
+            letter = one.letter
             if letter in "XYZ":
                 given[letter] = self._absolute(letter, one.value)
             elif letter == "F":
                 given["F"] = one.value
         self.body.append(tree.made(reader.place, _ARCS[arc], **given))
-        return [one for one in words if chr(one.letter) not in "XYZF"]
+        return [one for one in words if one.letter not in "XYZF"]
 
     def _absolute(self, axis: str, given: tree.Expression) -> tree.Expression:
         return given if self.absolute else position(axis) + given

@@ -79,7 +79,7 @@ def parameters(making: Making) -> dict[str, float]:
 def _pecked(making: Making, given: Mapping[str, float], out: float = 0.0, **pecks: Any) -> Iterator[Row]:
     """Cycles 1, 200, 203 and 205: by infeeds, out at a feed or, where it is 0, at rapid speed."""
     hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
-    usual = {
+    usual: dict[str, Any] = {
         "infeed": given["Q202"],
         "less": 0.0,
         "least": 0.0,

@@ -13,40 +13,31 @@ from planner.nc.language import tree
 from planner.nc.language.heidenhain import contour, cycles, patterns
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import (
-    ConversationalBlock,
-    Items,
-    items,
-    looked_up,
-    own,
-    parameter,
-    value,
-)
+from planner.nc.language.heidenhain.text import Block, Items, Rows, items, looked_up, own, parameter
 from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source
-from planner.nc.language.tree import ZERO, Line, Return, Statement, row, word
+from planner.nc.language.tree import ZERO, Line, Return, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
 
-_PECKING = re.compile(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*", re.IGNORECASE)
 _VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q\d+))"
 _LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR)(?=[-+.\dQ\s])"
-_TOOL_DEF = re.compile(rf"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?((?:\s*[LR]{_VALUE})*)\s*$", re.IGNORECASE)
-_TOOL_CALL = re.compile(
+_TOOL_DEF = rf"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?((?:\s*[LR]{_VALUE})*)\s*$"
+_TOOL_CALL = (
     r"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?"
-    rf"((?:\s*(?:DL|DR2|DR){_VALUE})*)\s*$",
-    re.IGNORECASE,
+    rf"((?:\s*(?:DL|DR2|DR){_VALUE})*)\s*$"
 )
 
 
-def _named(block: ConversationalBlock, names: str, start: int, end: int) -> dict[str, tree.Expression]:
+def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
     """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
     found: dict[str, tree.Expression] = {}
-    while block.text[start:end].strip():
-        name = re.compile(names, re.IGNORECASE).match(block.text, start)
+    block.column = start
+    while block.text[block.column : end].strip():
+        at, name = block.column, block.take(names)
         assert name is not None
-        if name.group(1).upper() in found:
-            raise block.fault(f"a second {name.group(1).upper()} in this block", start)
-        found[name.group(1).upper()], start = value(block, name.end())
+        if name[1].upper() in found:
+            raise block.fault(f"a second {name[1].upper()} in this block", at)
+        found[name[1].upper()] = block.value()
     return found
 
 
@@ -133,22 +124,22 @@ class Definitions(Flow):
         self.oversizes = False
         self.tool_names: dict[str, int] = {}
 
-    def _begin(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
+    def _begin(self, block: Block) -> Rows:
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        rows: list[tree.Statement] = [tree.row(block.place, *(("G", code) for code in codes))]
+        rows: Rows = [tree.row(block.place, *(("G", code) for code in codes))]
         return [*rows, looked_up(block)] if self.file else rows
 
-    def _end(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
+    def _end(self, block: Block) -> Rows:
         if self.file:
             return [tree.Return(block.place)]
         return [tree.row(block.place, ("M", 30.0))]
 
-    def _tool(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        match = _TOOL_CALL.match(block.text, column)
+    def _tool(self, block: Block) -> Rows:
+        match = block.take(_TOOL_CALL)
         if match is None:
-            raise block.fault('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR', column)
+            raise block.wrong('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR')
         tool = self._tool_number(match.group(1), match.group(2))
         axis, feed = match.group(3), match.group(5)
         if axis and axis.upper() != "Z":
@@ -158,7 +149,7 @@ class Definitions(Flow):
             raise block.fault("DR2, of a tool's corner radius, is not read; write 0", match.start(6))
         if more_of and tool is None:
             raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
-        rows: list[tree.Statement] = []
+        rows: Rows = []
         if tool is not None:
             number = tree.Number(float(tool))
             rows.append(tree.row(block.place, ("T", number), ("M", 6.0)))
@@ -168,11 +159,12 @@ class Definitions(Flow):
             if self.oversizes:
                 rows.append(tree.made(block.place, "oversize", DR=more_of.get("DR", tree.ZERO)))
         if match.group(4):
-            speed, _ = value(block, match.start(4))
-            rows.append(tree.row(block.place, ("S", speed)))
+            block.column = match.start(4)
+            rows.append(tree.row(block.place, ("S", block.value())))
         self.moves.automatic = None
         if feed and feed.upper() != "MAX":
-            self.moves.automatic, _ = value(block, match.start(5))
+            block.column = match.start(5)
+            self.moves.automatic = block.value()
             rows.append(tree.row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
         if tool is not None:
             rows.append(looked_up(block))
@@ -184,11 +176,11 @@ class Definitions(Flow):
             return int(number)
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
-    def _tool_data(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
+    def _tool_data(self, block: Block) -> Rows:
         """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool to have ready."""
-        match = _TOOL_DEF.match(block.text, column)
+        column, match = block.column, block.take(_TOOL_DEF)
         if match is None:
-            raise block.fault("TOOL DEF takes the number of a tool, its length L and its radius R", column)
+            raise block.wrong("TOOL DEF takes the number of a tool, its length L and its radius R")
         data = _named(block, _LENGTHS, *match.span(3))
         if not data:
             return []
@@ -198,71 +190,63 @@ class Definitions(Flow):
         words = (({"L": "Z", "R": "R"}[name], given) for name, given in data.items())
         return [tree.row(block.place, ("G", 10.0), ("L", tree.ONE), ("P", float(tool)), *words)]
 
-    def _define(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        match = re.match(r"\s*(\d+)(?:\.(\d+))?", block.text[column:])
+    def _define(self, block: Block) -> Rows:
+        match = block.take(r"\s*(\d+)(?:\.(\d+))?")
         if match is None:
-            raise block.fault("CYCL DEF needs the number of a cycle", column)
-        cycle, part, column = int(match.group(1)), match.group(2), column + match.end()
-        if part is not None:
-            return self._old_cycle(block, cycle, int(part), column)
+            raise block.wrong("CYCL DEF needs the number of a cycle")
+        cycle = int(match[1])
+        if match[2] is not None:
+            return self._old_cycle(block, cycle, int(match[2]))
         if cycle not in READ:
-            raise block.fault(_not_read(cycle), column)
+            raise block.wrong(_not_read(cycle))
         given: list[tuple[tree.Parameter, tree.Expression]] = []
-        for entry in re.finditer(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE):
-            number, _ = value(block, column + entry.end())
-            if int(entry.group(1)) in _REFUSED and number != tree.ZERO:
-                raise block.fault(_REFUSED[int(entry.group(1))], column + entry.start())
-            given.append((self._q(block, int(entry.group(1))), number))
+        for entry in list(re.compile(r"Q(\d+)\s*=\s*", re.IGNORECASE).finditer(block.text, block.column)):
+            q, block.column = int(entry[1]), entry.end()
+            number = block.value()
+            if q in _REFUSED and number != tree.ZERO:
+                raise block.fault(_REFUSED[q], entry.start())
+            given.append((self._q(block, q), number))
         if cycle in patterns.PATTERNS:
             self._call_cycle(block)
             return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
         return [tree.assign(block.place, *given, (own("cycle"), tree.Number(float(cycle))))]
 
-    def _old_cycle(
-        self, block: ConversationalBlock, cycle: int, part: int, column: int
-    ) -> list[tree.Statement]:
+    def _old_cycle(self, block: Block, cycle: int, part: int) -> Rows:
         if cycle in (9, 32, *contour.TITLES) and part == 0:
             return []
         if cycle in contour.TITLES:
-            return contour.transformed(block, cycle, column)
+            return contour.transformed(block, cycle)
         if cycle == 32:
-            match = re.match(r"\s*T\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
-            if match is None and part != 1:
-                return []  # 32.2: filter and rotary axes
-            if match is None:  # the machine's tolerance again
-                return [tree.row(block.place, ("G", 64.0))]
-            tolerance, _ = value(block, column + match.end())
-            return [tree.row(block.place, ("G", 64.0), ("P", tolerance))]
+            if block.take(r"\s*T\s*(?=[-+.\dQ])"):
+                return [tree.row(block.place, ("G", 64.0), ("P", block.value()))]
+            # 32.1 without T: the machine's tolerance again; 32.2: filter and rotary axes
+            return [tree.row(block.place, ("G", 64.0))] if part == 1 else []
         if cycle == 9:
-            match = re.match(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*", block.text[column:], re.IGNORECASE)
-            seconds, _ = value(block, column + (match.end() if match else 0))
-            return [tree.row(block.place, ("G", 4.0), ("P", seconds))]
+            block.take(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*")
+            return [tree.row(block.place, ("G", 4.0), ("P", block.value()))]
         if cycle == 1:
-            return self._pecking(block, part, column)
-        raise block.fault(_not_read(cycle), column)
+            return self._pecking(block, part)
+        raise block.wrong(_not_read(cycle))
 
-    def _pecking(self, block: ConversationalBlock, part: int, column: int) -> list[tree.Statement]:
+    def _pecking(self, block: Block, part: int) -> Rows:
         """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [tree.assign(block.place, (own("cycle"), tree.ONE))]
-        match = _PECKING.match(block.text, column)
+        column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
-        number, _ = value(block, match.end())
-        return [tree.assign(block.place, (parameter(_OLD_PECKING[part - 1]), number))]
+        return [tree.assign(block.place, (parameter(_OLD_PECKING[part - 1]), block.value()))]
 
-    def _call_cycle(self, block: ConversationalBlock) -> list[tree.Statement]:
+    def _call_cycle(self, block: Block) -> Rows:
         if not self.cycles & cycles.CYCLES.keys():
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
         return [tree.made(block.place, "cycle in force")]
 
-    def _codes(
-        self, block: ConversationalBlock, given: Items, *, straight: bool = False
-    ) -> tuple[list[Statement], list[Statement], bool]:
+    def _codes(self, block: Block, given: Items, *, straight: bool = False) -> tuple[Rows, Rows, bool]:
         """Statements of the M codes of a block before and after its move, and whether it goes in machine coordinates, as `straight`
         moves may."""
-        before: list[Statement] = []
-        after: list[Statement] = []
+        before: Rows = []
+        after: Rows = []
         machine = False
         for code, column in given.codes:
             at = block.byte(column)
@@ -291,10 +275,8 @@ class Definitions(Flow):
                 before.append(assumed_row(block.place, "machine code") if is_of_the_builder(code) else own)
         return before, after, machine
 
-    def _codes_alone(
-        self, block: ConversationalBlock, column: int
-    ) -> tuple[list[Statement], list[Statement]]:
-        given = items(block, column)
+    def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:
+        column, given = block.column, items(block)
         # M128 F: the largest feed of what the axes do to follow the tool, which the limits of the joints are for
         feed = given.feed is not None and not any(code in TOOL_POINT_ON for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
@@ -302,10 +284,11 @@ class Definitions(Flow):
         before, after, _ = self._codes(block, given)
         return before, after
 
-    def _code(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        before, after = self._codes_alone(block, 0)
+    def _code(self, block: Block) -> Rows:
+        block.column = 0
+        before, after = self._codes_alone(block)
         return [*before, *after]
 
-    def _stop(self, block: ConversationalBlock, column: int) -> list[Statement]:
-        before, after = self._codes_alone(block, column)
+    def _stop(self, block: Block) -> Rows:
+        before, after = self._codes_alone(block)
         return [*before, row(block.place, ("M", ZERO)), *after]

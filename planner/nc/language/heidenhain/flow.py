@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from planner.nc.language import tree
-from planner.nc.language.heidenhain.text import (
-    PARAMETERS,
-    ConversationalBlock,
-    Formula,
-    own,
-    parameter,
-    value,
-)
+from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, Rows, own, parameter
 
-_LABEL = re.compile(r'\s*(?:(\d+)|"([^"]*)")')
-_REPEAT = re.compile(r"\s*REP\s*(\d+)", re.IGNORECASE)
-_IF = re.compile(r"\s*IF\s", re.IGNORECASE)
-_THEN = re.compile(r"\s*GOTO\s+LBL\s*", re.IGNORECASE)
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
 # FN functions by their numbers: comparisons, and operations on two values and on one.
 _FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
@@ -39,96 +27,89 @@ class Flow:
     """
 
     def __init__(self) -> None:
-        self.blocks: Sequence[ConversationalBlock] = ()
+        self.blocks: Sequence[Block] = ()
         self.names: dict[str, int] = {}
         self.known: dict[int, int] = {}
         self.called: set[int] = set()
         self.repeats = 0
         self.file = 0
 
-    def _label(self, block: ConversationalBlock, column: int) -> tuple[int, int]:
-        match = _LABEL.match(block.text, column)
+    def _label(self, block: Block) -> int:
+        match = block.take(r'\s*(?:(\d+)|"([^"]*)")')
         if match is None:
-            raise block.fault('a label is a number or a name: LBL 5, LBL "holes"', column)
-        if match.group(1):
-            return int(match.group(1)), match.end()
-        return self.names.setdefault(match.group(2), NAMED + len(self.names)), match.end()
+            raise block.wrong('a label is a number or a name: LBL 5, LBL "holes"')
+        return int(match[1]) if match[1] else self.names.setdefault(match[2], NAMED + len(self.names))
 
-    def _label_here(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        label, _ = self._label(block, column)
+    def _label_here(self, block: Block) -> Rows:
+        name, label = block.rest.strip(), self._label(block)
         if label == 0:
             return []
         if self.blocks[self.known[label]] is not block:
-            raise block.fault(f"label {block.text[column:].strip()} is set twice")
+            raise block.fault(f"label {name} is set twice")
         return [tree.Label(block.place, label)]
 
-    def _call(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        label, column = self._label(block, column)
+    def _call(self, block: Block) -> Rows:
+        label = self._label(block)
         if label not in self.known:
             raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
-        repeat = _REPEAT.match(block.text, column)
+        repeat = block.take(r"\s*REP\s*(\d+)")
         if repeat is None:
             self.called.add(label)
             return [tree.Call(block.place, procedure_name(label, self.file), None, block.text)]
         counter = own(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
-        again: list[tree.Statement] = [
+        again: Rows = [
             tree.assign(block.place, (counter, counter + tree.ONE)),
             tree.Goto(block.place, tree.Number(float(label))),
         ]
-        more = tree.op("LT", counter, tree.Number(float(repeat.group(1))))
+        more = tree.op("LT", counter, tree.Number(float(repeat[1])))
         return [tree.If(block.place, ((more, again),), [tree.assign(block.place, (counter, tree.ZERO))])]
 
-    def _parameter(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        match = re.match(r"Q(\d+)\s*=\s*", block.text, re.IGNORECASE)
+    def _parameter(self, block: Block) -> Rows:
+        block.column = 0
+        match = block.take(r"Q(\d+)\s*=\s*")
         if match is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
-        formula = Formula(block, match.end())
-        return [tree.assign(block.place, (self._q(block, int(match.group(1))), formula.read()))]
+        formula = Formula(block)
+        return [tree.assign(block.place, (self._q(block, int(match[1])), formula.read()))]
 
-    def _q(self, block: ConversationalBlock, number: int) -> tree.Parameter:
+    def _q(self, block: Block, number: int) -> tree.Parameter:
         if number >= PARAMETERS:
             raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}")
         return parameter(number)
 
-    def _fn(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        match = re.match(r"\s*(\d+)\s*:\s*", block.text[column:])
-        number = int(match.group(1)) if match else -1
-        column += match.end() if match else 0
+    def _fn(self, block: Block) -> Rows:
+        match = block.take(r"\s*(\d+)\s*:\s*")
+        number = int(match[1]) if match else -1
         if number in _FN_IF:
-            return self._jump(block, column, number)
-        target_of = re.match(r"Q(\d+)\s*=\s*", block.text[column:], re.IGNORECASE)
-        if target_of is None or number not in {**_FN_ONE, **_FN_TWO}:
-            raise block.fault(f"FN {number if match else ''} is not read; read are FN 0 to 13", column)
-        q, column = self._q(block, int(target_of.group(1))), column + target_of.end()
+            return self._jump(block, number)
+        begin, target = block.column, block.take(r"Q(\d+)\s*=\s*")
+        if target is None or number not in {**_FN_ONE, **_FN_TWO}:
+            raise block.fault(f"FN {number if match else ''} is not read; read are FN 0 to 13", begin)
+        q = self._q(block, int(target[1]))
         if number in _FN_ONE:
-            word_of = re.match(r"(?:SQRT|SIN|COS)\s*", block.text[column:], re.IGNORECASE)
-            given, column = value(block, column + (word_of.end() if word_of else 0))
-            operation: tree.Expression = tree.op(_FN_ONE[number], given) if _FN_ONE[number] else given
+            block.take(r"(?:SQRT|SIN|COS)\s*")
+            given = block.value()
+            operation = tree.op(_FN_ONE[number], given) if _FN_ONE[number] else given
         else:
-            left, column = value(block, column)
-            sign = re.match(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])", block.text[column:], re.IGNORECASE)
-            if sign is None:
-                raise block.fault("+, -, *, DIV, LEN or ANG and a second value are expected", column)
-            right, column = value(block, column + sign.end())
-            operation = tree.op(_FN_TWO[number], left, right)
-        if block.text[column:].strip():
-            raise block.fault("nothing may follow here", column)
+            left = block.value()
+            if not block.take(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])"):
+                raise block.wrong("+, -, *, DIV, LEN or ANG and a second value are expected")
+            operation = tree.op(_FN_TWO[number], left, block.value())
+        block.end()
         return [tree.assign(block.place, (q, operation))]
 
-    def _jump(self, block: ConversationalBlock, column: int, number: int) -> list[tree.Statement]:
-        start = _IF.match(block.text, column)
-        left, column = value(block, start.end() if start else column)
-        compare = re.match(r"\s*(EQU|NE|GT|LT)\b", block.text[column:], re.IGNORECASE)
-        if compare is None or compare.group(1).upper() != _FN_IF[number]:
-            raise block.fault(f"FN {number} compares with {_FN_IF[number]}", column)
-        right, column = value(block, column + compare.end())
-        then = _THEN.match(block.text, column)
-        if then is None:
-            raise block.fault("GOTO LBL is expected here", column)
-        label, _ = self._label(block, then.end())
-        then_go: list[tree.Statement] = [tree.Goto(block.place, tree.Number(float(label)))]
-        return [tree.If(block.place, ((tree.op(_COMPARE[_FN_IF[number]], left, right), then_go),), [])]
+    def _jump(self, block: Block, number: int) -> Rows:
+        block.take(r"\s*IF\s")
+        left, begin = block.value(), block.column
+        compare = block.take(r"\s*(EQU|NE|GT|LT)\b")
+        if compare is None or compare[1].upper() != _FN_IF[number]:
+            raise block.fault(f"FN {number} compares with {_FN_IF[number]}", begin)
+        right = block.value()
+        if not block.take(r"\s*GOTO\s+LBL\s*"):
+            raise block.wrong("GOTO LBL is expected here")
+        go: Rows = [tree.Goto(block.place, tree.Number(float(self._label(block))))]
+        return [tree.If(block.place, ((tree.op(_COMPARE[_FN_IF[number]], left, right), go),), [])]
 
 
 def procedure_name(label: int, file: int = 0) -> str:

@@ -26,8 +26,9 @@ from planner.nc.language.heidenhain.text import (
     POLAR,
     POLE,
     POSITION,
-    ConversationalBlock,
+    Block,
     Items,
+    Rows,
     X,
     Y,
     absolute,
@@ -42,7 +43,6 @@ from planner.nc.language.tree import (
     MadeRows,
     Number,
     Parameter,
-    Statement,
     assign,
     op,
     row,
@@ -68,7 +68,7 @@ class Moves:
         self.tilted = False
         self.automatic: Expression | None = None  # F of the tool call
 
-    def feed_words(self, block: ConversationalBlock, given: Items) -> Words:
+    def feed_words(self, block: Block, given: Items) -> Words:
         """The F word of a block, if it has one. Raises ProgramFault for F AUTO without a feed in the tool call."""
         feed = given.feed
         if given.automatic:
@@ -81,9 +81,7 @@ class Moves:
         """A feed in mm or inch per minute."""
         return feed if self.feed_scale == 1.0 else feed * Number(self.feed_scale)
 
-    def straight(
-        self, block: ConversationalBlock, given: Items, ends: Ends, machine: bool = False
-    ) -> list[Statement]:
+    def straight(self, block: Block, given: Items, ends: Ends, machine: bool = False) -> Rows:
         """L and LP: a straight move to absolute coordinates."""
         feed = self.feed_words(block, given)
         assigned = _assigned(ends)
@@ -95,9 +93,7 @@ class Moves:
         codes.append(("G", ZERO if given.fast else ONE))
         return [row(block.place, *codes, *feed, *ends.items(), assigned=tuple(assigned))]
 
-    def by_plane(
-        self, block: ConversationalBlock, rows: Callable[[int], list[Statement] | None]
-    ) -> list[Statement]:
+    def by_plane(self, block: Block, rows: Callable[[int], Rows | None]) -> Rows:
         """The rows of a block by the normal of the pole's plane; None where it makes no sense in that plane. Raises ProgramFault where
         that is known."""
         found = rows(_WORKING)
@@ -109,11 +105,11 @@ class Moves:
         branches = tuple((op("EQ", PLANE, Number(float(n))), rows) for n, rows in enumerate(planes))
         return [If(block.place, branches, found or [MadeRows(block.place, "out of plane")])]
 
-    def circle(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
+    def circle(self, block: Block, given: Items, ends: Ends) -> Rows:
         """C: an arc about the pole, in its plane."""
         code = _arc_code(block, given)
 
-        def rows(normal: int) -> list[Statement] | None:
+        def rows(normal: int) -> Rows | None:
             if _AXES[normal] in ends:
                 return None
             return self._arc(block, given, ends, code, POLE, given.turn, normal=normal)
@@ -122,7 +118,7 @@ class Moves:
 
     def _arc(
         self,
-        block: ConversationalBlock,
+        block: Block,
         given: Items,
         ends: Ends,
         code: Expression,
@@ -130,7 +126,7 @@ class Moves:
         turn: int | Expression,
         turns: Expression | None = None,
         normal: int = _WORKING,
-    ) -> list[Statement]:
+    ) -> Rows:
         """An arc about centre, which is a place by axis."""
         if given.fast:
             raise block.fault(_FAST_ARC)
@@ -148,7 +144,7 @@ class Moves:
         assigned += [(DIRECTION[0], -(sign * out[1])), (DIRECTION[1], sign * out[0])]
         return [row(block.place, *words, assigned=tuple(assigned))]
 
-    def radius_arc(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
+    def radius_arc(self, block: Block, given: Items, ends: Ends) -> Rows:
         """CR: an arc of a given radius."""
         if given.radius is None or not given.turn:
             raise block.fault("CR needs R and its direction, DR+ or DR-")
@@ -162,14 +158,14 @@ class Moves:
         ]
         return [row(block.place, *words, assigned=(*_assigned(ends), *_NO_DIRECTION))]
 
-    def tangent_arc(self, block: ConversationalBlock, given: Items, ends: Ends) -> list[Statement]:
+    def tangent_arc(self, block: Block, given: Items, ends: Ends) -> Rows:
         """CT: the arc that goes on in the direction of the last move."""
         v = ends.get("X", X) - X, ends.get("Y", Y) - Y
         length = op("LEN", *DIRECTION)
         normal = -DIRECTION[1] / length, DIRECTION[0] / length
         radius, centre, turn = own("r"), (own("tx"), own("ty")), own("turn")
         left = op("GT", radius, ZERO)
-        known: list[Statement] = [
+        known: Rows = [
             assign(
                 block.place,
                 (radius, (v[0] * v[0] + v[1] * v[1]) / (TWO * (normal[0] * v[0] + normal[1] * v[1]))),
@@ -178,13 +174,13 @@ class Moves:
             assign(block.place, (turn, TWO * left - ONE)),
             *self._arc(block, given, ends, TWO + left, centre, turn),
         ]
-        looked: list[Statement] = [
+        looked: Rows = [
             MadeRows(block.place, "tangent arc", (*ends.items(), *self.feed_words(block, given))),
             assign(block.place, *_assigned(ends)),
         ]
         return [If(block.place, ((op("EQ", length, ZERO), looked),), known)]
 
-    def polar(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+    def polar(self, block: Block, given: Items) -> Rows:
         """The statement that finds the polar coordinates of LP and CTP."""
         change: Assigned = []
         for name, variable in zip(("PR", "PA"), POLAR, strict=True):
@@ -194,7 +190,7 @@ class Moves:
                 change.append((variable, variable + given.polar["I" + name]))
         return [assign(block.place, *change)] if change else []
 
-    def polar_ends(self, block: ConversationalBlock, given: Items, normal: int = _WORKING) -> Ends | None:
+    def polar_ends(self, block: Block, given: Items, normal: int = _WORKING) -> Ends | None:
         """The coordinates from the polar ones, and that along the normal; None where the block has a coordinate in the plane."""
         radius, angle = POLAR
         if set(given.axes) & {"X", "Y", "Z"} - {_AXES[normal]}:
@@ -207,25 +203,25 @@ class Moves:
         ends |= {axis: absolute(axis, end) for axis, end in given.axes.items() if axis == _AXES[normal]}
         return dict(sorted(ends.items()))
 
-    def polar_line(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+    def polar_line(self, block: Block, given: Items) -> Rows:
         """LP: a straight move to polar coordinates."""
 
-        def rows(normal: int) -> list[Statement] | None:
+        def rows(normal: int) -> Rows | None:
             ends = self.polar_ends(block, given, normal)
             return None if ends is None else self.straight(block, given, ends)
 
         return [*self.polar(block, given), *self.by_plane(block, rows)]
 
-    def polar_tangent(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+    def polar_tangent(self, block: Block, given: Items) -> Rows:
         """CTP: the arc to polar coordinates that goes on in the direction of the last move, in the working plane."""
 
-        def rows(normal: int) -> list[Statement] | None:
+        def rows(normal: int) -> Rows | None:
             ends = None if normal != _WORKING else self.polar_ends(block, given)
             return None if ends is None else self.tangent_arc(block, given, ends)
 
         return [*self.polar(block, given), *self.by_plane(block, rows)]
 
-    def polar_arc(self, block: ConversationalBlock, given: Items) -> list[Statement]:
+    def polar_arc(self, block: Block, given: Items) -> Rows:
         """CP: an arc or a helix about the pole to a polar angle, or by an angle of any number of turns."""
         code, by = _arc_code(block, given), given.polar.get("IPA")
         if isinstance(by, Number) and by.value * given.turn < 0.0:
@@ -235,7 +231,7 @@ class Moves:
         radius, angle = POLAR
         turns = None if by is None else op("FUP", op("ABS", by) / Number(360.0) - Number(1e-9))
 
-        def rows(normal: int) -> list[Statement] | None:
+        def rows(normal: int) -> Rows | None:
             first, second = (POSITION[_AXES[a]] - POLE[a] for a in IN_PLANE[normal])
             to = given.polar["PA"] if by is None else op("ATAN", second, first) + by
             before = assign(block.place, (radius, op("LEN", first, second)), (angle, to))
@@ -247,7 +243,7 @@ class Moves:
         return self.by_plane(block, rows)
 
 
-def _arc_code(block: ConversationalBlock, given: Items) -> Expression:
+def _arc_code(block: Block, given: Items) -> Expression:
     """G3 or G2. Raises ProgramFault without a direction."""
     if not given.turn:
         raise block.fault("an arc needs its direction: DR+ or DR-")

@@ -27,8 +27,9 @@ from planner.nc.language.heidenhain.text import (
     PLANE,
     POLAR,
     POLE,
-    ConversationalBlock,
+    Block,
     Items,
+    Rows,
     X,
     Y,
     Z,
@@ -38,7 +39,6 @@ from planner.nc.language.heidenhain.text import (
     looked_up,
     own,
     refuse_arc_axes,
-    value,
 )
 from planner.nc.language.source import Source
 
@@ -104,11 +104,12 @@ class HeidenhainParser(Definitions):
     def _find_labels(self) -> None:
         for k, block in enumerate(self.blocks):
             if not block.text.upper().startswith("LBL"):
-                if number := re.match(r"CYCLE? DEF\s+(\d+)", block.text, re.IGNORECASE):
-                    self.cycles.add(int(number.group(1)))
+                if number := block.take(r"CYCLE? DEF\s+(\d+)"):
+                    self.cycles.add(int(number[1]))
                 continue
             try:
-                label, _ = self._label(block, 3)
+                block.column = 3
+                label = self._label(block)
             except tree.ProgramFault:
                 continue
             if label:
@@ -123,9 +124,9 @@ class HeidenhainParser(Definitions):
 
     # --- blocks -----------------------------------------------------------------------------------------------------------------
 
-    def _body(self, first: int, last: int, called: bool = False) -> list[tree.Statement]:
+    def _body(self, first: int, last: int, called: bool = False) -> Rows:
         """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known already."""
-        body: list[tree.Statement] = []
+        body: Rows = []
         faults = len(self.faults)
         self.skip = False
         for k in range(first, last):
@@ -141,7 +142,7 @@ class HeidenhainParser(Definitions):
             body.append(tree.Return(self.blocks[last - 1].place))
         return body
 
-    def _block(self, k: int, last: int) -> list[tree.Statement]:
+    def _block(self, k: int, last: int) -> Rows:
         block = self.blocks[k]
         match = _FUNCTION.match(block.text)
         name = " ".join(match.group().upper().split()) if match else ""
@@ -153,34 +154,35 @@ class HeidenhainParser(Definitions):
             raise block.fault(
                 f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
             )
+        block.function, block.column = name, match.end()
         if name not in _MOVES:
-            return read(self, block, match.end())
+            return read(self, block)
         corner = self._corner(k + 1, last)
         self.skip = bool(corner)
-        return [*corner, *read(self, block, match.end())]
+        return [*corner, *read(self, block)]
 
-    def _call_program(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
+    def _call_program(self, block: Block) -> Rows:
         """CALL PGM name: a file of the program's folder; its units end with it."""
-        name = called_file(block.text[column:])
+        name = called_file(block.rest)
         if not name:
-            raise block.fault("CALL PGM is followed by the name of a program", column)
+            raise block.wrong("CALL PGM is followed by the name of a program")
         units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
-        called = tree.Call(block.place, name, None, block.text[column:].strip())
+        called = tree.Call(block.place, name, None, block.rest.strip())
         return [called, units, looked_up(block)]
 
     # --- moves ------------------------------------------------------------------------------------------------------------------
 
-    def _ends(self, block: ConversationalBlock, given: Items) -> dict[str, tree.Expression]:
+    def _ends(self, block: Block, given: Items) -> dict[str, tree.Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
         return {axis: absolute(axis, found) for axis, found in given.axes.items()}
 
-    def _straight(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        given, name = items(block, column, turning=self.source.at_tip), block.text[:column].upper()
+    def _straight(self, block: Block) -> Rows:
+        given, name = items(block, turning=self.source.at_tip), block.function
         before, after, machine = self._codes(block, given, straight=name == "L")
         if machine and any(relative for _, relative in given.axes.values()):
             raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
-        lines: list[tree.Statement] = [*before, *self._side(block, given)]
+        lines: Rows = [*before, *self._side(block, given)]
         if name == "LP":
             self._need_pole(block)
             lines += self.moves.polar_line(block, given)
@@ -188,27 +190,21 @@ class HeidenhainParser(Definitions):
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
         return [*lines, *([looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> list[tree.Statement]:
+    def _corner(self, k: int, last: int) -> Rows:
         """RND or CHF in block k, which the move before it ends with."""
-        match = re.match(r"(RND|CHF)\b", self.blocks[k].text, re.IGNORECASE) if k < last else None
-        if match is None:
+        block = self.blocks[k] if k < last else None
+        if block is None or not (match := re.match(r"(RND|CHF)\b", block.text, re.IGNORECASE)):
             return []
-        block, column = self.blocks[k], match.end()
-        rounded = match.group().upper() == "RND"
-        if rounded and (radius := re.match(r"\s*R(?=\s*[-+.\dQ])", block.text[column:], re.IGNORECASE)):
-            column += radius.end()
-        number, column = value(block, column)
-        if block.text[column:].strip():
-            raise block.fault(
-                "nothing may follow the number of RND and CHF; write the feed into the next block", column
-            )
-        return [
-            tree.made(block.place, "corner", kind=CORNERS.index("RND" if rounded else "CHR"), size=number)
-        ]
+        block.column, rounded = match.end(), match[1].upper() == "RND"
+        if rounded:
+            block.take(r"\s*R(?=\s*[-+.\dQ])")
+        number = block.value()
+        block.end("nothing may follow the number of RND and CHF; write the feed into the next block")
+        kind = CORNERS.index("RND" if rounded else "CHR")
+        return [tree.made(block.place, "corner", kind=kind, size=number)]
 
-    def _arc(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        name = block.text[:column].upper()
-        given = items(block, column)
+    def _arc(self, block: Block) -> Rows:
+        name, given = block.function, items(block)
         before, after, _ = self._codes(block, given)
         before += self._side(block, given)
         if name == "CTP":
@@ -226,22 +222,22 @@ class HeidenhainParser(Definitions):
             self._need_pole(block)
         return [*before, *rows, *after]
 
-    def _need_pole(self, block: ConversationalBlock) -> None:
+    def _need_pole(self, block: Block) -> None:
         if not self.poles:
             raise block.fault("there is no pole: write CC before")
 
-    def _side(self, block: ConversationalBlock, given: Items) -> list[tree.Statement]:
+    def _side(self, block: Block, given: Items) -> Rows:
         if given.side is None or not self.compensates:
             return []
         return [tree.made(block.place, "compensate", side=given.side)]
 
-    def _approach(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        rows, given = approach_rows(block, column, self.moves.automatic)
+    def _approach(self, block: Block) -> Rows:
+        rows, given = approach_rows(block, self.moves.automatic)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
 
-    def _pole(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        given = items(block, column)
+    def _pole(self, block: Block) -> Rows:
+        column, given = block.column, items(block)
         ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
         if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
             raise block.fault(
@@ -253,12 +249,11 @@ class HeidenhainParser(Definitions):
 
     # --- cycles -----------------------------------------------------------------------------------------------------------------
 
-    def _cycle_call(self, block: ConversationalBlock, column: int) -> list[tree.Statement]:
-        rest = re.match(r"\s*POS\b", block.text[column:], re.IGNORECASE)
-        if rest is None:
-            before, after = self._codes_alone(block, column)
+    def _cycle_call(self, block: Block) -> Rows:
+        if not block.take(r"\s*POS\b"):
+            before, after = self._codes_alone(block)
             return [*before, *self._call_cycle(block), *after]
-        given = items(block, column + rest.end())
+        given = items(block)
         before, after, _ = self._codes(block, given)
         ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
@@ -271,16 +266,16 @@ _WHY = {
     ),
     **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
 }
-_READ: dict[str, Callable[[HeidenhainParser, ConversationalBlock, int], list[tree.Statement]]] = {
+_READ: dict[str, Callable[[HeidenhainParser, Block], Rows]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
-    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), lambda parser, block, column: []),
+    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), lambda parser, block: []),
     "TOOL DEF": HeidenhainParser._tool_data,
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
-    "TRANS DATUM": lambda parser, block, column: datum_rows(block, column),
+    "TRANS DATUM": lambda parser, block: datum_rows(block),
     "CC": HeidenhainParser._pole,
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,

@@ -18,7 +18,7 @@ from planner.nc.language import tree
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
-from planner.nc.language.tree import Expression, Line, Number, Numbered, assign
+from planner.nc.language.tree import Expression
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
 LANGUAGE = tree.Language(
@@ -30,8 +30,6 @@ LANGUAGE = tree.Language(
     system_numbers=PositionVariables.numbers,
 )
 
-_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
-_Q = re.compile(r"([+-]?)\s*Q(\d+)(?!\d)", re.IGNORECASE)
 _FUNCTIONS = frozenset(
     ["SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP"]
 )
@@ -47,33 +45,71 @@ def parameter(number: int) -> tree.Numbered:
     return tree.Numbered(tree.Number(float(number + 1)))
 
 
-@dataclass(frozen=True)
-class ConversationalBlock:
-    """A block of the program: its place, and its text without number and comment, parts of continued lines joined by blanks.
+@dataclass
+class Block:
+    """A block of the program, read from left to right: its place, and its text without number and comment, parts of continued lines
+    joined by blanks.
 
-    at : byte offset of the first character of each part, and where the part begins in `text`
+    at       : byte offset of the first character of each part, and where the part begins in `text`
+    function : the word that it begins with
+    column   : of the text that comes next
     """
 
     place: tree.SourcePlace
     text: str
     at: tuple[tuple[int, int], ...]
-
-    def fault(self, message: str, column: int = 0) -> tree.ProgramFault:
-        """A fault of the character at `column` of the text."""
-        start, begin = [pair for pair in self.at if pair[1] <= column][-1]
-        return tree.ProgramFault(self.place._replace(at=start + column - begin), message)
+    function: str = ""
+    column: int = 0
 
     def byte(self, column: int) -> int:
         """Byte offset of a character of the text."""
         start, begin = [pair for pair in self.at if pair[1] <= column][-1]
         return start + column - begin
 
+    def fault(self, message: str, column: int = 0) -> tree.ProgramFault:
+        """A fault of the character at `column` of the text."""
+        return tree.ProgramFault(self.place._replace(at=self.byte(column)), message)
 
+    def wrong(self, message: str) -> tree.ProgramFault:
+        """A fault of what comes next."""
+        return self.fault(message, self.column)
+
+    @property
+    def rest(self) -> str:
+        """The text that comes."""
+        return self.text[self.column :]
+
+    def take(self, pattern: str) -> re.Match[str] | None:
+        """Go past what fits a pattern, in small letters too, if it comes next."""
+        match = re.compile(pattern, re.IGNORECASE).match(self.text, self.column)
+        self.column = match.end() if match else self.column
+        return match
+
+    def end(self, message: str = "nothing may follow here") -> None:
+        """Raises ProgramFault if more comes."""
+        if self.rest.strip():
+            raise self.wrong(message)
+
+    def value(self) -> tree.Expression:
+        """The number or parameter that comes next. Raises ProgramFault."""
+        self.take(" *")
+        if match := self.take(r"([+-]?)\s*Q(\d+)(?!\d)"):
+            number = int(match[2])
+            if number >= PARAMETERS:
+                raise self.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", match.start())
+            return -parameter(number) if match[1] == "-" else parameter(number)
+        match = self.take(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
+        if match is None:
+            raise self.wrong("a number or a Q parameter is expected here, such as +12.5 or Q3")
+        return tree.Number(float(match[0]))
+
+
+Rows = list[tree.Statement]
 _CONTINUED = re.compile(r"\s*Q\d+\s*=", re.IGNORECASE)
 _NUMBERED = re.compile(r"\s*(\d+)\s+(?=\S)")
 
 
-def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
+def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
     """The blocks of a program.
 
     file, begin : its number among the files, and where its bytes begin in the words' data
@@ -100,32 +136,15 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[ConversationalBlock]:
             )
         elif content:
             if waiting is not None:
-                yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
+                yield Block(waiting[0], waiting[1], tuple(waiting[2]))
             waiting = (tree.SourcePlace(file, number, start + first), content, [(start + first, 0)])
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
-        yield ConversationalBlock(waiting[0], waiting[1], tuple(waiting[2]))
-
-
-def value(block: ConversationalBlock, column: int) -> tuple[tree.Expression, int]:
-    """The number or parameter at a column of the block's text, and the column after it. Raises ProgramFault."""
-    while block.text[column : column + 1] == " ":
-        column += 1
-    match = _Q.match(block.text, column)
-    if match:
-        number = int(match.group(2))
-        if number >= PARAMETERS:
-            raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", column)
-        q = parameter(number)
-        return (-q if match.group(1) == "-" else q), match.end()
-    match = _NUMBER.match(block.text, column)
-    if match is None:
-        raise block.fault("a number or a Q parameter is expected here, such as +12.5 or Q3", column)
-    return tree.Number(float(match.group())), match.end()
+        yield Block(waiting[0], waiting[1], tuple(waiting[2]))
 
 
 class Formula(TokenReader):
-    """Reads a formula from a column of a block's text to its end."""
+    """Reads a formula, the rest of a block."""
 
     pattern = re.compile(
         r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)|(?P<name>Q[LRS]?\d*|[A-Z]+)|(?P<sign>.))", re.IGNORECASE
@@ -136,9 +155,9 @@ class Formula(TokenReader):
     ends = "the formula ends too early"
     no_value = "is no value, Q parameter or function of a formula"
 
-    def __init__(self, block: ConversationalBlock, column: int):
+    def __init__(self, block: Block):
         self.block = block
-        super().__init__(block.text, column)
+        super().__init__(block.text, block.column)
 
     def read(self) -> tree.Expression:
         """The formula. Raises ProgramFault."""
@@ -170,11 +189,10 @@ class Formula(TokenReader):
         return tree.op(text, self.value()) if text in _FUNCTIONS else None
 
 
-_ITEM = re.compile(
-    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
+_ITEM = (
+    r"(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
     r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
-    r"(?P<ahead>LA)(?=\s*\d))",
-    re.IGNORECASE,
+    r"(?P<ahead>LA)(?=\s*\d))"
 )
 _ROTARY = ("A", "B", "C")
 X, Y, Z = own("x"), own("y"), own("z")
@@ -209,44 +227,40 @@ class Items:
     side: int | None = None
 
 
-def items(block: ConversationalBlock, column: int, turning: bool = False) -> Items:
+def items(block: Block, turning: bool = False) -> Items:
     """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises ProgramFault for what a path
     function does not take here."""
-    found, text = Items(), block.text
-    while text[column:].strip():
-        item = _ITEM.match(text, column)
+    found = Items()
+    while block.rest.strip():
+        block.take(r"\s*")
+        at, item = block.column, block.take(_ITEM)
         if item is None:
-            raise block.fault(
-                f"{text[column:].split()[0]} is not read here",
-                column + len(text[column:]) - len(text[column:].lstrip()),
-            )
-        at, column = item.start() + len(item.group()) - len(item.group().lstrip()), item.end()
+            raise block.wrong(f"{block.rest.split()[0]} is not read here")
         if item["axis"]:
             name = item["axis"].upper()
             if name[-1] not in "XYZ" and not (turning and name in _ROTARY):
                 raise block.fault(f"axis {name[-1]} is not planned; X, Y and Z are", at)
-            given, column = value(block, column)
+            given = block.value()
             if name[-1] in found.axes:
                 raise block.fault(f"a second {name[-1]} in this block", at)
             found.axes[name[-1]] = (given, name[0] == "I")
         elif item["polar"]:
-            found.polar[item["polar"].upper()], column = value(block, column)
+            found.polar[item["polar"].upper()] = block.value()
         elif item["turn"]:
             found.turn = 1 if item["turn"] == "+" else -1
         elif item["comp"]:
             found.side = {"R0": 0, "RL": 1, "RR": -1}[item["comp"].upper()]
         elif item["radius"]:
-            found.radius, column = value(block, column)
+            found.radius = block.value()
         elif item["fast"]:
             found.fast, found.automatic = item["fast"].upper() == "MAX", item["fast"].upper() == "AUTO"
         elif item["ahead"]:  # of M120, blocks that the control looks ahead
-            _, column = value(block, column)
+            block.value()
         elif item["unit"]:
-            raise block.fault(
-                f"{item['unit'].upper()}, a feed per tooth, turn or time, is not read; write F in mm/min", at
-            )
+            what = "a feed per tooth, turn or time, is not read; write F in mm/min"
+            raise block.fault(f"{item['unit'].upper()}, {what}", at)
         elif item["feed"]:
-            found.feed, column = value(block, column)
+            found.feed = block.value()
         else:
             found.codes.append((int(item["code"]), at))
     return found
@@ -257,13 +271,13 @@ def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
     return POSITION[axis] + given[0] if given[1] else given[0]
 
 
-def looked_up(block: ConversationalBlock) -> Line:
+def looked_up(block: Block) -> tree.Line:
     """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
-    where = [Numbered(Number(float(FIRST_POSITION + k))) for k in range(3)]
-    return assign(block.place, *zip((X, Y, Z), where, strict=True))
+    where = [tree.Numbered(tree.Number(float(FIRST_POSITION + k))) for k in range(3)]
+    return tree.assign(block.place, *zip((X, Y, Z), where, strict=True))
 
 
-def refuse_arc_axes(block: ConversationalBlock, given: Items) -> None:
+def refuse_arc_axes(block: Block, given: Items) -> None:
     """Arcs of CR and CT lie in the working plane, and so do those of C where all poles do. Raises ProgramFault."""
     if "Z" in given.axes:
         raise block.fault("an arc with Z; a helix is written as CP with IPA")

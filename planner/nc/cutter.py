@@ -193,14 +193,13 @@ class Cutter:
     def _outer_corner(self, corner: complex, end: complex, kind: Kind, line: int) -> None:
         """To the offset start of the next move: about the corner, or straight before a rapid."""
         state = self._state
-        assert state.actual is not None
-        place = self._at(end, state.actual)
+        place = self._at(end, state.place)
         self._table.make_room(2)
         if kind == Kind.RAPID:
             state.actual = place
             self._table.add(Kind.RAPID, line, state)
             return
-        spokes = (end - corner) / (self._plane(state.actual) - corner)
+        spokes = (end - corner) / (self._plane(state.place) - corner)
         sweep = -self._sign * (-self._sign * cmath.phase(spokes) % (2.0 * math.pi))
         state.actual = place
         self._table.add_arc(Arc(self._at(corner, place), sweep), self.normal, line, state)
@@ -217,8 +216,7 @@ class Cutter:
 
     def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, table = self._state, self._table
-        assert state.actual is not None
-        begin, before = self._plane(state.actual), state.actual
+        begin, before = self._plane(state.place), state.place
         state.position[:] = target
         state.actual = self._at(side.end, target)
         table.make_room(2)
@@ -232,9 +230,8 @@ class Cutter:
 
     def _left_out(self, side: OffsetMove, allowed_back: float) -> float:
         """Angle that the corner at the start of an arc takes off its sweep [rad]."""
-        assert self._state.actual is not None
         start = side.centre + side.radius * side.first / (1j * side.turning)
-        left_out = _turn(start, self._plane(self._state.actual), side)
+        left_out = _turn(start, self._plane(self._state.place), side)
         if left_out * side.turning < -allowed_back:
             raise CutterFault(_GOUGE)
         return left_out
@@ -263,8 +260,7 @@ class Cutter:
                 "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"
             )
         state = self._state
-        assert state.actual is not None
-        place = self._plane(state.actual)
+        place = self._plane(state.place)
         state.position[:] = target
         state.actual = self._at(place, target)
         self._table.make_room(1)
@@ -275,10 +271,9 @@ class Cutter:
     def _move_end(self, row: int, point: complex) -> None:
         """All blocks from the open move on end at another place in the plane."""
         state, ends = self._state, self._table.block.end
-        assert state.actual is not None
         for axis, value in zip(IN_PLANE[self.normal], (point.real, point.imag), strict=True):
             ends[row : self._table.blocks, axis] = value
-            state.actual[axis] = value
+            state.place[axis] = value
 
     def _plane(self, point: FloatArray) -> complex:
         return in_plane(point, self.normal)

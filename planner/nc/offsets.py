@@ -176,9 +176,8 @@ def system_of(block: Block) -> int:
         return code
     number = integer(block, "P", 1) if "P" in block.value else 0
     if not 1 <= number <= FURTHER_MAX:
-        raise WordFault(
-            block.at.get("P", block.at["work offset"]), f"G54.1 needs its work system as P1 to P{FURTHER_MAX}"
-        )
+        at = "P" if "P" in block.at else "work offset"
+        raise block.fault(f"G54.1 needs its work system as P1 to P{FURTHER_MAX}", at)
     return FURTHER_SYSTEMS + number
 
 
@@ -235,11 +234,16 @@ def set_data(state: State, block: Block, findings: Findings) -> None:
     elif kind in (1, 10, 11):
         _set_tool(state, block, kind, findings)
     else:
-        word = block.at["L"] if kind >= 0 else block.at["one-shot"]
-        raise WordFault(
-            word,
-            "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them",
+        needed = (
+            "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them"
         )
+        raise block.fault(needed, "L" if kind >= 0 else "one-shot")
+
+
+def _refuse_words(block: Block, kind: int, letters: str) -> None:
+    for letter in letters:
+        if letter in block.value:
+            raise block.fault(f"G10 L{kind} does not use {letter}; remove it", letter)
 
 
 def _set_system(state: State, block: Block, kind: int) -> None:
@@ -248,13 +252,11 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         return
     number = integer(block, "P", 0) if "P" in block.value else -1
     if not 0 <= number <= len(SYSTEMS):
-        word = block.at["P"] if number >= 0 else block.at["one-shot"]
-        raise WordFault(word, f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P9")
+        needed = f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P9"
+        raise block.fault(needed, "P" if number >= 0 else "one-shot")
     code = SYSTEMS[number - 1] if number else state.system
     system = state.work_system(code)
-    for letter in "IJQ" if kind == 2 else "IJQR":
-        if letter in block.value:
-            raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
+    _refuse_words(block, kind, "IJQ" if kind == 2 else "IJQR")
     if kind == 2:
         system = System(_given(state, block, system.origin), block.value.get("R", system.rotation))
     else:
@@ -268,12 +270,10 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     """G10 L2 P1 to P6, and G10 L20 P1 to P300 for G54.1."""
     number, most = integer(block, "P", 0) if "P" in block.value else -1, FURTHER_MAX if kind == 20 else 6
     if not 1 <= number <= most:
-        word = block.at["P"] if number >= 0 else block.at["one-shot"]
         external = "; P0, the external offset, is not read" if number == 0 else ""
-        raise WordFault(word, f"G10 L{kind} of Fanuc needs its work system as P1 to P{most}{external}")
-    for letter in "IJQR":
-        if letter in block.value:
-            raise WordFault(block.at[letter], f"G10 L{kind} does not use {letter}; remove it")
+        needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{most}{external}"
+        raise block.fault(needed, "P" if number >= 0 else "one-shot")
+    _refuse_words(block, kind, "IJQR")
     if not state.absolute:
         raise block.fault(f"G10 L{kind} of Fanuc adds after G91; write G90 before it", "one-shot")
     code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]

@@ -16,6 +16,7 @@ from planner.nc.turning import (
     Leg,
     Roughing,
     TurningStep,
+    exchanged,
     pattern_repeat,
     stock_removal,
 )
@@ -143,11 +144,8 @@ def test_no_pass_cuts_into_the_moved_profile() -> None:
 def test_g72_is_g71_with_x_and_z_exchanged() -> None:
     given = Roughing(2.0, 0.4, ALLOWANCE)
     other = Roughing(2.0, 0.4, complex(0.25, 0.1))
-    exchanged = [
-        TurningStep(step.leg.exchanged(), step.fast)
-        for step in stock_removal(SHAFT.exchanged(), other, facing=True)
-    ]
-    assert exchanged == list(stock_removal(SHAFT, given, facing=False))
+    turned = [exchanged(step) for step in stock_removal(exchanged(SHAFT), other, facing=True)]
+    assert turned == list(stock_removal(SHAFT, given, facing=False))
 
 
 def test_what_the_passes_leave_more_is_taken_by_the_last() -> None:

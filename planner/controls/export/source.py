@@ -16,7 +16,7 @@ from planner.controls.export.controls import Control, is_command, is_setting, ta
 from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word, rows_of, sets_tools
 from planner.machine import Machine
 from planner.nc import codes
-from planner.nc.lexer import without_leader
+from planner.nc.language.detect import without_leader
 from planner.nc.points import are_points
 from planner.nc.program import FEED_MOVES, Program, plain
 from planner.nc.reader import parse_program

@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -186,32 +186,21 @@ class _Run:
             raise _NotDrawn(REFUSED.get(name, f"there is no such instruction; allowed are {ALLOWED}"))
         if not form.fits(len(numbers)):
             raise _NotDrawn(f"{len(numbers)} numbers found; write {form}")
-        if name in ("PU", "PD", "PA", "PR"):
-            self._plot(it)
-        elif name in ("AA", "AR"):
-            self._arc(it)
-        elif name in ("AT", "RT"):
-            self._arc_through(it)
-        elif name == "CI":
-            self._circle(numbers[0], it.at)
-        elif name in ("EA", "ER"):
-            self._rectangle(it)
-        elif name == "SP":
-            self._select_pen(it)
-        elif name == "VS":
-            self._select_speed(numbers)
-        elif name == "IP":
-            self.scaling = self.scaling.with_points(numbers)
-        elif name == "SC":
-            self.scaling = self.scaling.with_range(numbers)
-        elif name in PAGE_ENDS:
-            self.ignored.setdefault(name, []).append(it.at)
-            self.page_end = self.page_end or (it if self.drawn else None)
-        elif name == "DF":
-            self.scaling, self.absolute = self.scaling.with_range([]), True
-        elif name == "IN":
-            self._move_pen(False, it.at)
-            self._initialise()
+        _EXECUTE[name](self, it)
+
+    def _end_page(self, it: Instruction) -> None:
+        self.ignored.setdefault(it.name, []).append(it.at)
+        self.page_end = self.page_end or (it if self.drawn else None)
+
+    def _scale(self, it: Instruction) -> None:
+        """IP, SC, and DF, which takes the scale back."""
+        change = self.scaling.with_points if it.name == "IP" else self.scaling.with_range
+        self.scaling = change(it.numbers)
+        self.absolute |= it.name == "DF"
+
+    def _begin_anew(self, it: Instruction) -> None:
+        self._move_pen(False, it.at)
+        self._initialise()
 
     def _plot(self, it: Instruction) -> None:
         if it.name in ("PA", "PR"):
@@ -247,7 +236,8 @@ class _Run:
         else:
             self._turn(*found, end, it.at)
 
-    def _circle(self, radius: float, at: int) -> None:
+    def _circle(self, it: Instruction) -> None:
+        radius, at = it.numbers[0], it.at
         if radius == 0:
             raise _NotDrawn("a circle of radius 0; write its radius, such as CI400")
         handedness = self.scaling.handedness()
@@ -283,7 +273,8 @@ class _Run:
         self.drawing.add_stop(self.position, 0.0, it.at)
         self._move_pen(was_down, it.at)
 
-    def _select_speed(self, numbers: list[float]) -> None:
+    def _select_speed(self, it: Instruction) -> None:
+        numbers = it.numbers
         speed = numbers[0] * MM_PER_CM if numbers else math.inf
         if not speed > 0:
             raise _NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
@@ -335,6 +326,20 @@ class _Run:
 
     def _feed(self) -> float:
         return self.speed_of_pen.get(self.pen, self.speed)
+
+
+_EXECUTE: dict[str, Callable[[_Run, Instruction], None]] = {
+    **dict.fromkeys(("PU", "PD", "PA", "PR"), _Run._plot),
+    **dict.fromkeys(("AA", "AR"), _Run._arc),
+    **dict.fromkeys(("AT", "RT"), _Run._arc_through),
+    "CI": _Run._circle,
+    **dict.fromkeys(("EA", "ER"), _Run._rectangle),
+    "SP": _Run._select_pen,
+    "VS": _Run._select_speed,
+    **dict.fromkeys(("IP", "SC", "DF"), _Run._scale),
+    **dict.fromkeys(PAGE_ENDS, _Run._end_page),
+    "IN": _Run._begin_anew,
+}
 
 
 def _pairs(numbers: list[float]) -> Iterator[tuple[float, float]]:

@@ -64,8 +64,7 @@ class OffsetMoves:
             self._state, self._table, radius=self.radius, left=self.side > 0, normal=self.normal
         )
         self._cutter.begin_beside(tangent)
-        assert self._state.actual is not None
-        self._start = self._state.actual.copy()
+        self._start = self._state.place.copy()
         return self._start
 
     def pass_row(self, row: TravelRow) -> list[TravelRow]:
@@ -124,8 +123,7 @@ class OffsetMoves:
     @property
     def place(self) -> FloatArray:
         """(3,) where the tool is."""
-        assert self._state.actual is not None
-        return self._state.actual.copy()
+        return self._state.place.copy()
 
     def _add(self, move: Move) -> None:
         assert self._cutter is not None

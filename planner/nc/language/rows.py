@@ -15,6 +15,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.nc.lexer import Words
 
+RowWord = tuple[int, int, float | None]  # letter code, place, value
+
 
 @dataclass
 class _Tables:
@@ -45,17 +47,12 @@ class AppendedRows:
         self.frames: list[tuple[int, int]] = [(0, 0)]
         self.data = b""
         self.files: list[tuple[int, str]] = []
-        self._letter: list[Array] = []
-        self._value: list[FloatArray] = []
-        self._at: list[Array] = []
-        self._computed: list[Array] = []
-        self._line: list[Array] = []
-        self._count: list[Array] = []  # words of each row
+        self._parts: list[
+            tuple[Array, ...]
+        ] = []  # letters, values, places, computed or not; lines, and how many words they have
         self._rows = 0
         self._entries: list[tuple[int, int]] = []
-        self._new: list[
-            tuple[int, Sequence[tuple[int, int, float | None]]]
-        ] = []  # rows that are not in arrays yet
+        self._new: list[tuple[int, Sequence[RowWord]]] = []  # rows that are not in arrays yet: line, words
         self._tables: _Tables | None = None
 
     def add_file(self, words: Words, name: str) -> tuple[int, int]:
@@ -68,7 +65,7 @@ class AppendedRows:
         self._append(words.letter, words.value, words.at + begin, words.line, np.diff(words.first))
         return self._rows - len(words.line), begin
 
-    def add_row(self, line: int, words: Sequence[tuple[int, int, float | None]]) -> int:
+    def add_row(self, line: int, words: Sequence[RowWord]) -> int:
         """Make an entry of one row of (letter code, place, value), with None where the value is computed; returns its number."""
         self._new.append((line, words))
         row = self._rows + len(self._new) - 1
@@ -126,12 +123,7 @@ class AppendedRows:
         )
 
     def _append(self, letter: Array, value: FloatArray, at: Array, line: Array, count: Array) -> None:
-        self._letter.append(letter)
-        self._value.append(np.nan_to_num(value))
-        self._at.append(at.astype(np.int64))
-        self._computed.append(np.isnan(value))
-        self._line.append(line)
-        self._count.append(count)
+        self._parts.append((letter, np.nan_to_num(value), at.astype(np.int64), np.isnan(value), line, count))
         self._rows += len(line)
         self._tables = None
 
@@ -153,11 +145,8 @@ class AppendedRows:
         self._settle()
         if self._tables is None:
             begin, end = np.array(self._entries, dtype=np.int64).reshape(-1, 2).T
-            count = np.concatenate(self._count)
-            columns = (self._letter, self._value, self._at, self._computed, self._line)
-            letter, value, at, computed, line = (np.concatenate(column) for column in columns)
-            first = np.concatenate([[0], np.cumsum(count)])
-            self._tables = _Tables(letter, value, at, computed, line, first, begin, end)
+            *columns, count = (np.concatenate(column) for column in zip(*self._parts, strict=True))
+            self._tables = _Tables(*columns, np.concatenate([[0], np.cumsum(count)]), begin, end)
         return self._tables
 
 

@@ -73,24 +73,16 @@ class BlockWords(Commands):
                 _skip(reader)
             elif name in commands.IDLE or (name in commands.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
                 _skip(reader)
-            elif reader.peek() == "=" and (name in self.names or re.fullmatch(r"R\d+", name)):
-                reader.next += 1
-                target = reader.parameter(token)
-                assert target is not None
-                assigned.append((target, reader.expression()))
-            elif name == "R" and reader.peek() == "[":
-                target = reader.parameter(token)
+            elif reader.peek() == ("[" if name == "R" else "=") and (target := reader.parameter(token)):
                 reader.expect("=")
-                assert target is not None
                 assigned.append((target, reader.expression()))
             else:
                 for one in self._word(reader, name, at):
                     letter, code = one.letter, one.value
                     if letter == "G" and isinstance(code, tree.Number):
                         if code.value in _SIDES:
-                            before.insert(
-                                0, tree.made(reader.place, "compensate", side=_SIDES[int(code.value)])
-                            )
+                            side = _SIDES[int(code.value)]
+                            before.insert(0, tree.made(reader.place, "compensate", side=side))
                             continue
                         self.circular &= code.value not in (0.0, 1.0, 2.0, 3.0)
                         found.add(code.value)
@@ -106,12 +98,8 @@ class BlockWords(Commands):
                 raise reader.fault(
                     "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
                 )
-        returns = (17.0, *(commands.RETURNS if self.source.file else ()))
-        ended = [
-            one
-            for one in words
-            if one.letter == "M" and isinstance(one.value, tree.Number) and one.value.value in returns
-        ]
+        returns = commands.RETURNS if self.source.file else (17,)
+        ended = [one for one in words if one.code in {f"M{number}" for number in returns}]
         words = [one for one in words if one not in ended]
         words += [tree.word("M", one.at, 30.0) for one in ended if not self.source.file]
         self.body += before

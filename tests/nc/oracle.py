@@ -26,7 +26,7 @@ from planner.base.arrays import Array
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
-CANON = ROOT / "benchmarks" / "linuxcnc_canon.py"
+CANON = ROOT / "benchmarks" / "controls" / "linuxcnc_canon.py"
 ANSWERS = HERE / "linuxcnc_answers.json.gz"
 PYTHON = "/usr/bin/python3"
 SECONDS_MAX = 300  # of one run of the oracle

@@ -145,8 +145,10 @@ class AppendedRows:
         self._settle()
         if self._tables is None:
             begin, end = np.array(self._entries, dtype=np.int64).reshape(-1, 2).T
-            *columns, count = (np.concatenate(column) for column in zip(*self._parts, strict=True))
-            self._tables = _Tables(*columns, np.concatenate([[0], np.cumsum(count)]), begin, end)
+            parts = zip(*self._parts, strict=True)
+            letter, value, at, computed, line, count = (np.concatenate(column) for column in parts)
+            first = np.concatenate([[0], np.cumsum(count)])
+            self._tables = _Tables(letter, value, at, computed, line, first, begin, end)
         return self._tables
 
 

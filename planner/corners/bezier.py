@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.corners.blend import Shape
+from planner.corners.blend import ScaledShape, Shape
 
 # Up to here retreat times advance is largest at the middle of the corner, which the error bound needs (tested).
 SIGMA2_MAX = 1.5
@@ -30,7 +30,7 @@ PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 
 
 @dataclass(frozen=True, kw_only=True)
-class BezierCorner:
+class BezierCorner(ScaledShape):
     """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given.
 
     Raises InputError for shape numbers outside the ranges in which the error bound of corners/blend.py holds, and, of sigma2, the G3
@@ -42,8 +42,7 @@ class BezierCorner:
 
     name = "bezier"
     shape = Shape.BEZIER
-    # m / d: retreat and advance at the middle, 1/8 for every pair of weights (the joint is a control point)
-    MIDDLE = 0.125
+    share = 0.125  # for every pair of weights: the joint is a control point
 
     def __post_init__(self) -> None:
         if not 0.75 < self.sigma2 <= SIGMA2_MAX:
@@ -63,28 +62,12 @@ class BezierCorner:
         sigma1 = 4.0 - 3.0 / self.sigma2 if self.sigma1 is None else self.sigma1
         return (sigma1**2 * self.sigma2) ** (-1 / 3), (sigma1 * self.sigma2**2) ** (-1 / 3)
 
-    def at(self, change: FloatArray) -> BezierCorner:
-        """The same shape at all n corners, whatever the `change` (n, A) of direction there."""
-        return self
-
-    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) tangent lengths d [mm] for middle values m (n,) [mm], at any feed (n,)."""
-        return middle / self.MIDDLE
-
-    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
-        return reach * self.MIDDLE
-
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
         """(n, 4) parameters for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         w1, w2 = self.weights
         rows = np.zeros((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = reach, w1, w2
         return rows
-
-    def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """The parameter w where the two curves of the pair meet, whatever the `params` (4,)."""
-        return (0.5,)
 
 
 def kappa_max(d: FloatArray, theta: FloatArray, sigma2: float) -> FloatArray:

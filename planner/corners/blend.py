@@ -29,7 +29,9 @@ short enough that theta plus what the legs bend by stays below `BEND_MAX`.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 
@@ -47,6 +49,31 @@ class Shape(IntEnum):
     BEZIER = 0  # (d, w1, w2, -): tangent length [mm] and the inner weights of the rational cubic
     FIR = 1  # (V, T1, T2, Tk): feed [mm/s], filter lengths and overlap time [s]
     OWN = 2  # (d, -, -, -): tangent length [mm]; the polynomial is in the record (corners/own.py)
+
+
+class ScaledShape:
+    """A shape that is the same at all corners but for its size: a base of corner shapes."""
+
+    @property
+    @abstractmethod
+    def share(self) -> float:
+        """m / d: retreat and advance at the middle, over the tangent length [-]."""
+
+    def at(self, change: FloatArray) -> Self:
+        """The same shape at all n corners, whatever the `change` (n, A) of direction there."""
+        return self
+
+    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm], at any feed (n,)."""
+        return middle / self.share
+
+    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
+        return reach * self.share
+
+    def breaks(self, params: FloatArray) -> tuple[float, ...]:
+        """The middle, where the matched side changes or two curves of a pair meet, whatever the `params` (4,)."""
+        return (0.5,)
 
 
 SHAPE_BEZIER, SHAPE_OWN = int(Shape.BEZIER), int(Shape.OWN)  # numba reads plain integers

@@ -20,7 +20,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.corners.blend import OWN_TERMS, Shape
+from planner.corners.blend import OWN_TERMS, ScaledShape, Shape
 
 LOWEST = 3  # power of z
 PLACES = 1001  # at which f is looked at
@@ -28,7 +28,7 @@ POLYNOMIAL = 1e-9  # f may differ from its polynomial by so much [-]
 ROUNDING = 1e-12  # of the values of f [-]
 
 
-class PolynomialCorner(ABC):
+class PolynomialCorner(ScaledShape, ABC):
     """A shape of corners with the retreat and advance of the module's text; `name` is what plans call it."""
 
     name: str = ""
@@ -66,28 +66,12 @@ class PolynomialCorner(ABC):
         raise InputError(f"corner '{self.name or type(self).__name__}': retreat(w): {why}")
 
     @cached_property
-    def _at_middle(self) -> float:
+    def share(self) -> float:
         """f(1/2)."""
         return float(self.coefficients @ 0.5 ** np.arange(LOWEST, LOWEST + OWN_TERMS))
-
-    def at(self, change: FloatArray) -> PolynomialCorner:
-        """The same shape at all n corners, whatever the `change` (n, A) of direction there."""
-        return self
-
-    def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) tangent lengths d [mm] for middle values m (n,) [mm], at any feed (n,)."""
-        return middle / self._at_middle
-
-    def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
-        return reach * self._at_middle
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
         """(n, 4) parameters for tangent lengths d = `reach` (n,) [mm], at any feed (n,)."""
         rows = np.zeros((len(reach), 4))
         rows[:, 0] = reach
         return rows
-
-    def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """The middle, where the matched side changes, whatever the `params` (4,)."""
-        return (0.5,)

@@ -195,13 +195,8 @@ def _axes_in_use(program: Program, machine: Machine) -> Array:
 
 def _of_axes(arcs: Arcs, axis: Array) -> Arcs:
     """The arcs in the coordinates of some axes; they do not move along the others."""
-    return dataclasses.replace(
-        arcs,
-        center=arcs.center[:, axis],
-        e1=arcs.e1[:, axis],
-        e2=arcs.e2[:, axis],
-        drift=arcs.drift[:, axis],
-    )
+    names = ("center", "e1", "e2", "drift")
+    return dataclasses.replace(arcs, **{name: getattr(arcs, name)[:, axis] for name in names})
 
 
 def _check_coordinates(program: Program) -> None:

@@ -41,7 +41,6 @@ CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
 # The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
 CHORD_SAFETY = 0.9
-NEWTON_STEPS = 30
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -160,25 +159,6 @@ class Nurbs:
     def length(self) -> float:
         """Length of the whole curve [mm]."""
         return float(self._lengths[1][-1])
-
-    def arc_length(self, u: FloatArray) -> FloatArray:
-        """(n,) arc length from the start to the parameters u (n,) [mm]."""
-        knots, length = self._lengths
-        n = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
-        return length[n] + self.length_between(knots[n], u)
-
-    def parameter(self, s: FloatArray) -> FloatArray:
-        """(n,) parameters at the arc lengths s (n,) [mm], by Newton's method within the step that holds each."""
-        knots, length = self._lengths
-        n = np.clip(np.searchsorted(length, s, side="right") - 1, 0, len(knots) - 2)
-        low, high = knots[n], knots[n + 1]
-        u = low + (high - low) * (s - length[n]) / (length[n + 1] - length[n])
-        for _ in range(NEWTON_STEPS):
-            miss = length[n] + self.length_between(low, u) - s
-            if (np.abs(miss) <= 1e-13 * self.length).all():
-                break
-            u = np.clip(u - miss / np.linalg.norm(self.at(u)[:, 1], axis=1), low, high)
-        return u
 
     @cached_property
     def kinks(self) -> FloatArray:

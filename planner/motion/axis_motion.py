@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -31,18 +30,6 @@ QUADRATURE_ROUNDING = 1e-9
 SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
-
-
-class _Pieces(NamedTuple):
-    """The fields of `AxisMotion` that the kernel samples, and the arc lengths s (L+1,) at the starts of its pieces and at the end."""
-
-    t: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    s: FloatArray
-    end: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,15 +82,8 @@ class AxisMotion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
-        pieces = _Pieces(
-            t=self.t,
-            position=self.position,
-            velocity=self.velocity,
-            acceleration=self.acceleration,
-            jerk=self.jerk,
-            s=self.s,
-            end=float(self.end),
-        )
+        rates = self.velocity, self.acceleration, self.jerk
+        pieces = self.t, self.position, *rates, self.s, float(self.end)
         columns, s, feed, piece = _sample(pieces, times)
         return Trajectory(
             axes=self.axes,
@@ -198,7 +178,10 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 @njit(cache=True, error_model="numpy")
 def _sample(pieces, times):
-    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,)."""
+    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,).
+
+    pieces : t (L,), position, velocity, acceleration and jerk (L, A) and end of `AxisMotion`, before the end s (L+1,)
+    """
     t, position, velocity, acceleration, jerk, s, end = pieces
     samples, axes = len(times), position.shape[1]
     columns = np.empty((4, samples, axes))

@@ -25,8 +25,6 @@ points between them that stay, and then in one window around each gap, as in rel
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +33,6 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
 from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.combined_places import Places, gain_of_step, objective_of_window, places_of_run
@@ -43,7 +40,6 @@ from planner.smoothing.combined_rows import rows_of_window
 from planner.smoothing.combined_solver import CombinedProblem, improve_window
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import SplineMotion
-from planner.smoothing.relax import shares
 from planner.smoothing.runs import SplineRuns
 from planner.smoothing.sites import (
     Sites,
@@ -54,7 +50,7 @@ from planner.smoothing.sites import (
     run_sites,
     with_radius,
 )
-from planner.smoothing.windows import TIGHTENED, next_window
+from planner.smoothing.windows import TIGHTENED, in_ranges, in_shares, next_window
 
 WINDOW = SIZES.improved_window
 OVERLAP = SIZES.improved_overlap
@@ -129,16 +125,6 @@ def _moving(control, sites):
         for j in range(len(sites.span)):
             found[k] |= sites.target[j, k] != still
     return np.flatnonzero(found)
-
-
-@njit(cache=True, error_model="numpy")
-def _columns(values, axes):
-    """The columns `axes` of values (n, all axes)."""
-    out = np.empty((len(values), len(axes)))
-    for i in range(len(values)):
-        for k in range(len(axes)):
-            out[i, k] = values[i, axes[k]]
-    return out
 
 
 @njit(cache=True, error_model="numpy")
@@ -229,12 +215,12 @@ def _begin(q, corridor, splines, runs, used, motion, limits, aim):
     first, last = motion.interval[q], motion.interval[q + 1]
     sites = run_sites(splines, q)
     moving = _moving(whole, sites)
-    own = _columns(whole, moving)
+    own = whole[:, moving]
     sites = Sites(
-        sites.span, sites.place, sites.weights, _columns(sites.target, moving), _columns(sites.along, moving),
+        sites.span, sites.place, sites.weights, sites.target[:, moving], sites.along[:, moving],
         sites.slide, used[splines.site_first[q] : splines.site_first[q + 1]],
     )  # fmt: skip
-    places = places_of_run(knots, own, motion, limits.along, _columns(limits.axes, moving), first, last)
+    places = places_of_run(knots, own, motion, limits.along, limits.axes[:, moving], first, last)
     free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
     pulled = limits.pulled[moving]
     run = CombinedRun(
@@ -249,11 +235,8 @@ def _finish(q, run, radius, y, total, splines, found):
     control, used, gain, iterations = found
     iterations[q] = total + _tighten(run, radius, y)
     moved, begin, site = _moved(run, y), control_first(splines, q), splines.site_first[q]
-    for i in range(len(moved)):
-        for k in range(moved.shape[1]):
-            control[begin + i, k] = moved[i, k]
-    for j in range(len(radius)):
-        used[site + j] = radius[j]
+    control[begin : begin + len(moved)] = moved
+    used[site : site + len(radius)] = radius
     gain[q] = gain_of_step(run.places, y)
 
 
@@ -271,18 +254,12 @@ def _improve_long(
 ) -> None:
     """Write run q, improved in ranges (module text), into the columns of `Improved`."""
     run, radius, y = begun
-    count = len(y) // RANGE
-    cuts = [len(y) * k // count for k in range(count + 1)]
-    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
-    ranges[-1] = (cuts[-2], cuts[-1])
-    gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
     iterations: list[int] = []
 
-    def work(begin: int, until: int) -> Callable[[], None]:
-        return lambda: iterations.append(improve_range(run, radius, begin, until, y))
+    def work(begin: int, beyond: int) -> None:
+        iterations.append(improve_range(run, radius, begin, beyond, y))
 
-    for batch in (ranges, gaps):
-        side_by_side([work(*own) for own in batch], lambda: None, lambda: None)
+    in_ranges(0, len(y), RANGE, WINDOW, work)
     _finish(q, run, radius, y, sum(iterations), splines, found)
 
 
@@ -308,12 +285,8 @@ def improve(
         _improve_long(q, begun, splines, found)
     asked, size = asked[size < 2 * RANGE], size[size < 2 * RANGE]
 
-    def work(own: Array) -> Callable[[], None]:
-        return lambda: _improve(corridor, splines, runs, used, motion, limits, aim, own, found)
+    def work(own: Array) -> None:
+        _improve(corridor, splines, runs, used, motion, limits, aim, own, found)
 
-    tasks = [work(asked[own]) for own in shares(size, threads() if size.sum() >= SPANS_SHARED else 1)]
-    if len(tasks) > 1:
-        side_by_side(tasks, lambda: None, lambda: None)
-    elif tasks:
-        tasks[0]()
+    in_shares(asked, size, SPANS_SHARED, work)
     return found

@@ -31,7 +31,7 @@ from planner.base.search import first_not_before
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
-from planner.smoothing.corridor import Corridor, run_corridor
+from planner.smoothing.corridor import Corridor, part_of, run_corridor
 from planner.smoothing.sites import Sites, Splines, sites_of_run, used_share
 
 # Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56 of the tolerance.
@@ -200,16 +200,7 @@ def _laid(corridor, inner, h, longest):
 def needed_distances(whole, longest, first, last):
     """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline between them by itself
     uses no more than `ROOM`."""
-    begin, end = first, last + 1
-    corridor = Corridor(
-        whole.first[:0],
-        whole.place[begin:end],
-        whole.point[begin:end],
-        whole.turn[begin:end],
-        whole.along[begin:end],
-        whole.tol[begin:end],
-        whole.tol_chord[begin:end],
-    )
+    corridor = part_of(whole, first, last + 1)
     inner = corridor.place[1:-1]
     h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
     for _ in range(DENSER_MAX):
@@ -264,24 +255,11 @@ def _lay(corridor, longest, distance):
     for q in range(runs):
         cut, points, own, out = parts[q]
         s, j = span_first[q], site_first[q]
-        for i in range(len(out)):
-            outside[s + i] = out[i]
-            fits[q] &= not out[i]
-        for i in range(len(cut)):
-            breaks[s + q + i] = cut[i]
-        for i in range(len(points)):
-            for k in range(axes):
-                control[s + DEGREE * q + i, k] = points[i, k]
-        for i in range(len(own.span)):
-            span[j + i], place[j + i], slide[j + i], radius[j + i] = (
-                own.span[i],
-                own.place[i],
-                own.slide[i],
-                own.radius[i],
-            )
-            for d in range(ORDER):
-                weights[j + i, d] = own.weights[i, d]
-            for k in range(axes):
-                target[j + i, k], along[j + i, k] = own.target[i, k], own.along[i, k]
+        outside[s : s + len(out)], fits[q] = out, not out.any()
+        breaks[s + q : s + q + len(cut)] = cut
+        control[s + DEGREE * q : s + DEGREE * q + len(points)] = points
+        end = j + len(own.span)
+        span[j:end], place[j:end], slide[j:end], radius[j:end] = own.span, own.place, own.slide, own.radius
+        weights[j:end], target[j:end], along[j:end] = own.weights, own.target, own.along
     sites = Sites(span, place, weights, target, along, slide, radius)
     return span_first, breaks, control, site_first, sites, outside, fits

@@ -13,8 +13,6 @@ ranges depend on the run alone: the result is the same on any number of threads.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +20,6 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
@@ -39,7 +36,15 @@ from planner.smoothing.sites import (
     run_sites,
     with_radius,
 )
-from planner.smoothing.windows import AGAIN, WINDOW, next_window, tighten_window, window_of
+from planner.smoothing.windows import (
+    AGAIN,
+    WINDOW,
+    in_ranges,
+    in_shares,
+    next_window,
+    tighten_window,
+    window_of,
+)
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
@@ -123,21 +128,6 @@ def _relaxed_window(window, run, control, radius, goal, gap):
     return moved, found.multiplier
 
 
-@njit(cache=True, error_model="numpy")
-def _put(values, first, into):
-    """into[first : first + len(values)] = values"""
-    for i in range(len(values)):
-        into[first + i] = values[i]
-
-
-@njit(cache=True, error_model="numpy")
-def _put_points(values, first, into):
-    """The same of points (n, A)."""
-    for i in range(len(values)):
-        for k in range(values.shape[1]):
-            into[first + i, k] = values[i, k]
-
-
 @njit(cache=True, error_model="numpy", nogil=True)
 def relax_range(run, goal, gap, begin, end, control, multiplier):
     """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the multipliers (J,) of their
@@ -147,8 +137,7 @@ def relax_range(run, goal, gap, begin, end, control, multiplier):
         lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier)
         window = window_of(run, lo, hi)
         moved, prices = _relaxed_window(window, run, control, run.sites.radius, goal, gap)
-        _put_points(moved, lo, control)
-        _put(prices, window.site, multiplier)
+        control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
         done = hi
 
 
@@ -176,11 +165,9 @@ def _relax_run(run, start, prices, goal, gap, only_outside):
             if attempt > 0:
                 sites = with_radius(run.sites, radius)
                 closer, smaller = tighten_window(window, sites, control, run.middle, ratio_site)
-                _put_points(closer, lo, control)
-                _put(smaller, window.site, radius)
+                control[lo:hi], radius[window.site : window.site_end] = closer, smaller
             moved, prices = _relaxed_window(window, run, control, radius, goal, gap)
-            _put_points(moved, lo, control)
-            _put(prices, window.site, multiplier)
+            control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
             done = hi
         certificate = certify(run.corridor, run.knots, run.sites.place, control)
         ratio_site, left = certificate.site, certificate.left
@@ -228,10 +215,10 @@ def _finish(q, run, start, prices, splines, goal, only_outside, found):
         run, start, prices, goal, goal.gap[q], only_outside
     )
     if certified[q]:
-        _put_points(moved, control_first(splines, q), control)
-        _put(smaller, splines.site_first[q], radius)
-    _put(kept, splines.span_first[q], left)
-    _put(prices, splines.site_first[q], multiplier)
+        control[control_first(splines, q) : control_first(splines, q + 1)] = moved
+        radius[splines.site_first[q] : splines.site_first[q + 1]] = smaller
+    left[splines.span_first[q] : splines.span_first[q + 1]] = kept
+    multiplier[splines.site_first[q] : splines.site_first[q + 1]] = prices
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -254,30 +241,12 @@ def _relax_long(
     """Write run q, relaxed in ranges (module text), into the columns of `Relaxed`."""
     run, control = _begin(q, corridor, splines, runs, used, goal, True)
     prices, gap = np.zeros(len(run.sites.span)), float(goal.gap[q])
-    first, end = int(run.fixed_first), len(control) - int(run.fixed_last)
-    count = (end - first) // RANGE
-    cuts = [first + (end - first) * k // count for k in range(count + 1)]
-    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
-    ranges[-1] = (cuts[-2], end)
-    gaps = [(b - WINDOW // 2, b + WINDOW // 2) for b in cuts[1:-1]]
 
-    def work(begin: int, until: int) -> Callable[[], None]:
-        return lambda: relax_range(run, goal, gap, begin, until, control, prices)
+    def work(begin: int, beyond: int) -> None:
+        relax_range(run, goal, gap, begin, beyond, control, prices)
 
-    for batch in (ranges, gaps):
-        side_by_side([work(*own) for own in batch], lambda: None, lambda: None)
+    in_ranges(int(run.fixed_first), len(control) - int(run.fixed_last), RANGE, WINDOW, work)
     _finish(q, run, control, prices, splines, goal, True, found)
-
-
-def shares(size: Array, count: int) -> list[Array]:
-    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list that has least."""
-    lists: list[list[int]] = [[] for _ in range(count)]
-    total = [0] * count
-    for q in np.argsort(-size, kind="stable").tolist():
-        least = total.index(min(total))
-        lists[least].append(q)
-        total[least] += int(size[q])
-    return [np.array(sorted(own), dtype=np.int64) for own in lists if own]
 
 
 def relax(
@@ -308,14 +277,9 @@ def relax(
         for q in fitting[size >= 2 * RANGE].tolist():
             _relax_long(q, corridor, splines, runs, used, goal, found)
         fitting, size = fitting[size < 2 * RANGE], size[size < 2 * RANGE]
-    lists = shares(size, threads() if size.sum() >= SPANS_SHARED else 1)
 
-    def work(own: Array) -> Callable[[], None]:
-        return lambda: _relax(corridor, splines, runs, used, goal, only_outside, own, found)
+    def work(own: Array) -> None:
+        _relax(corridor, splines, runs, used, goal, only_outside, own, found)
 
-    tasks = [work(fitting[own]) for own in lists]
-    if len(tasks) > 1:
-        side_by_side(tasks, lambda: None, lambda: None)
-    elif tasks:
-        tasks[0]()
+    in_shares(fitting, size, SPANS_SHARED, work)
     return found

@@ -1,14 +1,20 @@
-"""Windows of a long spline: which of its control points are relaxed at a time, and how those around a site are tightened (relax.py)."""
+"""Windows and ranges of a long spline: which of its control points are relaxed at a time, and how those around a site are tightened
+(relax.py)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from planner.base.arrays import Array
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
 from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER
 from planner.smoothing.sites import site_distance
 
@@ -81,3 +87,36 @@ def tighten_window(window, sites, control, middle, ratio_site):
         elif ratio_site[j] > 1.0:
             radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
     return near[lo - begin : hi - begin], radius
+
+
+def in_ranges(begin: int, end: int, size: int, window: int, work: Callable[[int, int], None]) -> None:
+    """Work on the control points begin .. end - 1 of a long run in ranges of about `size`, side by side, with `DEGREE` control points
+    between them that stay; then in one window around each of these gaps."""
+    count = (end - begin) // size
+    cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
+    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
+    ranges[-1] = (cuts[-2], end)
+    gaps = [(b - window // 2, b + window // 2) for b in cuts[1:-1]]
+    for batch in (ranges, gaps):
+        side_by_side([partial(work, *own) for own in batch], lambda: None, lambda: None)
+
+
+def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None]) -> None:
+    """Work on runs (k,) of these sizes (k,) side by side, where there are `least` spans in all."""
+    shares = _shares(size, threads() if size.sum() >= least else 1)
+    tasks = [partial(work, runs[own]) for own in shares]
+    if len(tasks) > 1:
+        side_by_side(tasks, lambda: None, lambda: None)
+    elif tasks:
+        tasks[0]()
+
+
+def _shares(size: Array, count: int) -> list[Array]:
+    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list that has least."""
+    lists: list[list[int]] = [[] for _ in range(count)]
+    total = [0] * count
+    for q in np.argsort(-size, kind="stable").tolist():
+        least = total.index(min(total))
+        lists[least].append(q)
+        total[least] += int(size[q])
+    return [np.array(sorted(own), dtype=np.int64) for own in lists if own]

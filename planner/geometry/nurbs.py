@@ -1,17 +1,7 @@
-"""NURBS curves: points and derivatives to the third order, arc length, and chords for an NC program.
+"""NURBS curves: points, and an NC program of the curve itself or of its chords.
 
 A curve of degree p with control points P_i, weights w_i and knots u_i is r(u) = sum N_i w_i P_i / sum N_i w_i, on the domain
-[u_p, u_n]. Numerator and denominator are polynomials between two knots (scipy's B-splines), the quotient's derivatives follow from
-r w = n:
-
-    r' = (n' - w' r)/w,    r'' = (n'' - 2 w' r' - w'' r)/w,    r''' = (n''' - 3 w' r'' - 3 w'' r' - w''' r)/w,
-
-and those by the arc length s, with sigma = |r'| = ds/du, from
-
-    sigma' = r'.r''/sigma,   sigma'' = (r''.r'' + r'.r''' - sigma'^2)/sigma,
-    r_s = r'/sigma,   r_ss = (r'' - r_s sigma')/sigma^2,   r_sss = (r''' - 3 r_ss sigma sigma' - r_s sigma'')/sigma^3.
-
-At a knot derivatives may differ on both sides, and at one of full multiplicity the tangent too: a kink.
+[u_p, u_n].
 """
 
 from __future__ import annotations
@@ -19,24 +9,17 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
-from math import factorial
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
-from planner.geometry.build import COLLINEAR_ANGLE, turning_angle
 from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
 from planner.nc.program import Kind, PathControl, Program, SplineTable
 
-# Gauss points of an arc length, and steps of a knot span that they are applied to: good to 1e-9 of the butterfly's length (tested).
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-GAUSS_NODES, GAUSS_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
-LENGTH_STEPS = 64
-# Chords: how many a span has to begin with, halvings at most, places at which the deviation of a chord is measured [fraction of the
-# chord].
+# Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured [fraction of the chord].
 CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
 # The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
@@ -97,76 +80,17 @@ class Nurbs:
         return np.unique(self.knots[self.degree : len(self.points) + 1])
 
     @cached_property
-    def _polynomials(self) -> FloatArray:
-        """(p+1, m, A+1) coefficients of numerator and denominator on each span, highest power first."""
+    def _homogeneous(self) -> Any:
+        """The spline of numerator and denominator."""
         from scipy.interpolate import BSpline  # 0.3 s, and few programs have a NURBS
 
-        homogeneous = np.column_stack([self.points * self.weights[:, None], self.weights])
-        spline = BSpline(self.knots, homogeneous, self.degree)
-        powers = range(self.degree, -1, -1)
-        return np.array([spline(self.breaks[:-1], nu=power) / factorial(power) for power in powers])
+        return BSpline(self.knots, homogeneous(self.points, self.weights), self.degree)
 
-    def at(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """Point and derivatives by u at the parameters u (n,).
-
-        before : take the values just before a knot instead of just behind it
-
-        Returns (n, 4, A): point [mm] and first to third derivative.
-        """
-        u = np.asarray(u, float)
-        side: Any = "left" if before else "right"
-        span = np.clip(np.searchsorted(self.breaks, u, side=side) - 1, 0, len(self.breaks) - 2)
-        x, c = (u - self.breaks[span])[:, None], self._polynomials[:, span]
-        value = np.zeros((4, *c.shape[1:]))
-        for order in range(4):
-            for k in range(self.degree - order + 1):
-                power = self.degree - k
-                factor = np.prod(np.arange(power - order + 1, power + 1, dtype=float))
-                value[order] = value[order] * x + factor * c[k]
-        n, w = value[..., :-1], value[..., -1:]
-        r = n[0] / w[0]
-        r1 = (n[1] - w[1] * r) / w[0]
-        r2 = (n[2] - 2.0 * w[1] * r1 - w[2] * r) / w[0]
-        r3 = (n[3] - 3.0 * w[1] * r2 - 3.0 * w[2] * r1 - w[3] * r) / w[0]
-        return np.stack([r, r1, r2, r3], axis=1)
-
-    def along(self, u: FloatArray, *, before: bool = False) -> FloatArray:
-        """(n, 4, A) point [mm] and derivatives by the arc length at the parameters u (n,); `before` as of `at`."""
-        r, r1, r2, r3 = (self.at(u, before=before)[:, k] for k in range(4))
-        sigma = np.linalg.norm(r1, axis=1)[:, None]
-        sigma1 = (r1 * r2).sum(axis=1)[:, None] / sigma
-        sigma2 = ((r2**2 + r1 * r3).sum(axis=1)[:, None] - sigma1**2) / sigma
-        s1 = r1 / sigma
-        s2 = (r2 - s1 * sigma1) / sigma**2
-        s3 = (r3 - 3.0 * s2 * sigma * sigma1 - s1 * sigma2) / sigma**3
-        return np.stack([r, s1, s2, s3], axis=1)
-
-    def length_between(self, u0: FloatArray, u1: FloatArray) -> FloatArray:
-        """(n,) arc length between the parameters u0 and u1 (n,), each pair within one span [mm]."""
-        u0, step = np.asarray(u0, float), np.asarray(u1, float) - u0
-        inside = u0[:, None] + step[:, None] * GAUSS_NODES
-        rate = np.linalg.norm(self.at(inside.ravel())[:, 1], axis=1).reshape(inside.shape)
-        return step * (rate @ GAUSS_WEIGHTS)
-
-    @cached_property
-    def _lengths(self) -> tuple[FloatArray, FloatArray]:
-        """Parameters, and the arc length up to them."""
-        steps = np.linspace(self.breaks[:-1], self.breaks[1:], LENGTH_STEPS, endpoint=False, axis=1).ravel()
-        u = np.append(steps, self.breaks[-1])
-        return u, np.concatenate([[0.0], np.cumsum(self.length_between(u[:-1], u[1:]))])
-
-    @property
-    def length(self) -> float:
-        """Length of the whole curve [mm]."""
-        return float(self._lengths[1][-1])
-
-    @cached_property
-    def kinks(self) -> FloatArray:
-        """(k,) parameters inside the domain at which the tangent jumps."""
-        inner = self.breaks[1:-1]
-        tangents = [self.at(inner, before=side)[:, 1] for side in (True, False)]
-        units = [t / np.linalg.norm(t, axis=1, keepdims=True) for t in tangents]
-        return inner[turning_angle(*units) > COLLINEAR_ANGLE]
+    def at(self, u: FloatArray) -> FloatArray:
+        """(n, A) points [mm] at the parameters u (n,)."""
+        value = self._homogeneous(u)
+        points: FloatArray = value[..., :-1] / value[..., -1:]
+        return points
 
     def stations(self, sagitta: float) -> FloatArray:
         """(k,) parameters, all knots among them, between which the chords leave the curve by at most `sagitta` [mm].
@@ -186,12 +110,12 @@ class Nurbs:
 
     def _deviation(self, u0: FloatArray, u1: FloatArray) -> FloatArray:
         """Distances of the curve from the chords between u0 and u1 (n,), the largest of three places."""
-        start, end = self.at(u0)[:, 0], self.at(u1, before=True)[:, 0]
+        start, end = self.at(u0), self.at(u1)
         chord = end - start
         size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
         worst = np.zeros(len(u0))
         for fraction in MEASURED:
-            off = self.at(u0 + fraction * (u1 - u0))[:, 0] - start
+            off = self.at(u0 + fraction * (u1 - u0)) - start
             along = np.clip((off * chord).sum(axis=1) / size_sq, 0.0, 1.0)
             worst = np.maximum(worst, np.linalg.norm(off - along[:, None] * chord, axis=1))
         return worst
@@ -206,7 +130,7 @@ class Nurbs:
         """
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
-        points = self.at(self.stations(sagitta))[:, 0]
+        points = self.at(self.stations(sagitta))
         return chords(points, self.axes, feed, source)
 
     def exact_program(self, feed: float, *, source: str = "NURBS") -> Program:

@@ -1,4 +1,4 @@
-"""Paper 001's guide: a smooth path, or a curve, as chords so fine that they are the path.
+"""Paper 001's guide: a smooth path as chords so fine that they are the path.
 
 The chords leave the path by a fraction of its tolerance at most (`SAGITTA`), which is taken off the tolerance, and turn by little
 from one to the next. Each chord knows the largest curvature beside it, and how fast the limits of the axes let a point go round a
@@ -21,7 +21,6 @@ from planner.baselines.fir.command import lower_between
 from planner.baselines.fir.guide import Guide, per_leg, picked
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
-from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
 
 # Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their turning from one to the next
@@ -136,109 +135,20 @@ def guide_of_path(
     _evaluate(on, chords, start, end)
     row = np.repeat(np.arange(len(samples)), chords)
     first = np.concatenate([[0], np.cumsum(chords)])[samples.piece]
-    made = _guide(
-        machine,
-        start,
-        end,
-        axes=toolpath.axes,
-        first=first,
-        own=own,
-        dwell=toolpath.dwell[path.legs.first[samples.stop]],
-        columns={
-            "feed": toolpath.feed[segment][row],
-            "tol": tol[row],
-            "corner": corner[row],
-            "sin_half": np.where(corner >= 0, np.sin(path.theta[corner] / 2), 0.0)[row],
-            "whole": whole[row],
-            "segment": segment[row],
-        },
-    )
-    return cut_beside_slower(made)
-
-
-def guide_of_curve(
-    curve: Nurbs,
-    machine: Machine,
-    feed: float,
-    tolerance: float,
-    blocks: FloatArray,
-    reversals: FloatArray,
-    own: tuple[float, float] | None = None,
-) -> ChordGuide:
-    """The chords of a curve; full stops at its kinks and reversals.
-
-    feed      : programmed feed [mm/s]
-    tolerance : of the path [mm]
-    blocks    : (B+1,) parameters of the ends of the program's blocks
-    reversals : (n,) those of them at which the blocks turn back: cusps sharper than the chords
-    own       : lengths of the two filters [s]; None to choose them
-    """
-    u = curve.stations(SAGITTA * tolerance)
-    kappa = [
-        np.linalg.norm(curve.along(at, before=side)[:, 2], axis=1)
-        for at, side in ((u[:-1], False), (u[1:], True))
-    ]
-    turn = curve.length_between(u[:-1], u[1:]) * np.maximum(*kappa)
-    chords = np.maximum(np.ceil(turn / TURN), 1).astype(np.int64)
-    number = np.arange(chords.sum()) - np.repeat(np.cumsum(chords) - chords, chords)
-    u = np.append(np.repeat(u[:-1], chords) + number * np.repeat(np.diff(u) / chords, chords), u[-1])
-    stops = np.append(np.union1d(curve.kinks, reversals), u[-1])
-    closing = np.insert(np.zeros(len(u) - 1, bool), np.searchsorted(u, stops), True)
-    at = u[np.arange(len(closing)) - np.cumsum(closing) + closing]  # a kink's parameter is there twice
-    start, end = curve.along(at), curve.along(np.append(at[1:], at[-1]), before=True)
-    start[closing] = end[closing] = curve.along(at[closing], before=True)
-    count = len(at)
-    return _guide(
-        machine,
-        start,
-        end,
-        axes=curve.axes,
-        first=np.concatenate([[0], np.flatnonzero(closing) + 1]),
-        own=own,
-        dwell=np.zeros(len(stops) + 1),
-        columns={
-            "feed": np.full(count, feed),
-            "tol": np.full(count, tolerance),
-            "corner": np.full(count, -1),
-            "sin_half": np.zeros(count),
-            "whole": np.full(count, tolerance),
-            "segment": np.clip(np.searchsorted(blocks, at, side="right") - 1, 0, len(blocks) - 2),
-        },
-    )
-
-
-def _guide(
-    machine: Machine,
-    start: FloatArray,
-    end: FloatArray,
-    *,
-    axes: tuple[str, ...],
-    first: Array,
-    own: tuple[float, float] | None,
-    dwell: FloatArray,
-    columns: dict[str, Array],
-) -> ChordGuide:
-    """From points and arc-length derivatives (P, 4, A) at start and end of each chord; each run ends with one that has no length.
-
-    first   : (S+1,) first row of each run
-    columns : of the record, (P,); `feed` as programmed, `tol` with what the chords use of it
-    """
     chord = end[:, 0] - start[:, 0]
-    chord[first[1:] - 1] = 0.0
+    chord[first[1:] - 1] = 0.0  # each run ends with one that has no length
     length = np.linalg.norm(chord, axis=1)
     moving = length > 0
-    start, end, chord, length = start[moving], end[moving], chord[moving], length[moving]
-    columns = {name: column[moving] for name, column in columns.items()}
+    start, end, chord, length, row = start[moving], end[moving], chord[moving], length[moving], row[moving]
+    axes, programmed, at_corner = toolpath.axes, toolpath.feed[segment][row], corner[row]
     with np.errstate(divide="ignore", over="ignore"):
         axes_allow = length * (machine.limits("velocity", axes) / np.abs(chord)).min(axis=1)
     speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
-    programmed = columns.pop("feed")
-    columns["tol"] = columns["tol"] * (1 - SAGITTA)
-    return ChordGuide(
+    made = ChordGuide(
         axes=axes,
         own=own,
         first=np.append(0, np.cumsum(moving)[first[1:] - 1]),
-        dwell=dwell,
+        dwell=toolpath.dwell[path.legs.first[samples.stop]],
         point=np.vstack([start[:, 0], end[-1:, 0]]),
         s=np.append(0.0, np.cumsum(length)),
         length=length,
@@ -248,8 +158,13 @@ def _guide(
         kappa=np.maximum(*(np.linalg.norm(side[:, 2], axis=1) for side in (start, end))),
         v_acc=np.minimum(speeds[0][0], speeds[1][0]),
         v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
-        **columns,
+        tol=tol[row] * (1 - SAGITTA),
+        corner=at_corner,
+        sin_half=np.where(at_corner >= 0, np.sin(path.theta[at_corner] / 2), 0.0),
+        whole=whole[row],
+        segment=segment[row],
     )
+    return cut_beside_slower(made)
 
 
 def _circle_speeds(

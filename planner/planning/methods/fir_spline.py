@@ -1,7 +1,7 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
-1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance. Curves are taken as they
-   are (`plan_curve`). Either becomes chords so fine that they are the path (baselines/fir/chord_guide.py).
+1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance. It becomes
+   chords so fine that they are the path (baselines/fir/chord_guide.py).
 2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of every run between full
    stops (baselines/fir/chord_speeds.py).
 3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured, and where something is
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.baselines.fir.chord_guide import ChordGuide, guide_of_curve, guide_of_path
+from planner.baselines.fir.chord_guide import ChordGuide, guide_of_path
 from planner.baselines.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised, v_sc
 from planner.baselines.fir.guide import check_profile_filters
 from planner.baselines.fir.superpose import axes_of, reached, superpose
@@ -27,27 +27,20 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
-from planner.geometry.build import toolpath_from_program
-from planner.geometry.nurbs import Nurbs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method, faster
+from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
-from planner.planning.job.stages import Progress, Stages
 
-# Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow. Pentagon 1.073, 1.055, 1.054 s and
-# zig-zag 2.93, 2.66, 2.65 s with 0.5, 0.1, 0.05; circle and spiral of chords do not care.
+# Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow.
 ROUNDING_FRACTION = 0.1
 # Interpolation error of the grid that the chords start from, as of feedrate/sampling/samples.py: they are refined by the
-# angle they turn. Ten jobs take 0.08 % longer with 0.2.
+# angle they turn.
 RESOLUTION = 0.05
-# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them. With 80 and 25
-# degrees alone ten jobs take 0.6 % longer, one 3.9.
+# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
-# Fraction of the tolerance that the chords of a curve's program may use [-]: costs half of it in feed.
-CHORD_FRACTION = 0.05
 # Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (docs/papers.md).
 PHASE_LAG = 0.5
 
@@ -82,50 +75,7 @@ class FirSplineMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
             stopping = job.toolpath if self.plain else self._with_stops(job.toolpath, job.machine)
-            guide = _guide_of(stopping, job.machine, self.profile_filters)
-        return self._finish(job, guide, "bezier")
-
-    def plan_curve(
-        self,
-        curve: Nurbs,
-        machine: Machine,
-        feed: float,
-        tolerance: float | None = None,
-        progress: Progress | None = None,
-    ) -> Plan:
-        """Plan the motion along a curve. The plan's program are chords of it, within which it is verified.
-
-        feed      : programmed feed [mm/s]
-        tolerance : contour tolerance [mm]; None for that of the machine
-        progress  : called with the stage's name and the fraction done; None for nobody
-
-        Raises InputError for a feed, a tolerance or a curve that cannot be planned.
-        """
-        stages = Stages(progress)
-        with stages.stage("geometry"):
-            whole = machine.tolerance if tolerance is None else tolerance
-            chords = CHORD_FRACTION * whole
-            program = curve.to_program(chords, feed)
-            toolpath = toolpath_from_program(program, machine, whole)
-            ends = curve.stations(chords)
-            back = ends[1:][toolpath.block[np.flatnonzero(toolpath.joint[1:-1] == Joint.STOP)]]
-        job = Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
-
-        def within(fraction: float) -> Plan:
-            """The plan within this fraction of what the chords leave of the tolerance."""
-            with job.stage("geometry"):
-                guide = guide_of_curve(
-                    curve, machine, feed, fraction * (whole - chords), ends, back, self.profile_filters
-                )
-            return self._finish(job, guide, None)
-
-        best = within(1.0)
-        for fraction, _ in self.ways if machine.fir is not None else ():
-            best = faster(best, within(fraction))
-        return best
-
-    def _finish(self, job: Job, guide: ChordGuide, corner: str | None) -> Plan:
-        """Plan speeds and filters along a guide, and deliver the motion."""
+            guide = guide_of(stopping, job.machine, self.profile_filters)
         with job.stage("solve"):
             alone = guide.pick(np.ones(guide.runs, bool))
             speeds = self._plain(alone, job.machine) if self.plain else fastest_speeds(alone, job.machine)
@@ -134,7 +84,7 @@ class FirSplineMethod(Method):
         return job.plan(
             job.deliver(motion, as_it_is=True) if self.plain else job.deliver_in_time(motion),
             method="fir-spline-plain" if self.plain else "fir-spline",
-            corner=corner,
+            corner="bezier",
             solver="filters",
             status=Status.ACCEPTABLE,
             sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
@@ -152,7 +102,7 @@ class FirSplineMethod(Method):
                 continue
             stopping = toolpath.with_joints(sharp, Joint.STOP)
             joint = stopping.joint
-            guide = _guide_of(stopping, machine, self.profile_filters)
+            guide = guide_of(stopping, machine, self.profile_filters)
             time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
             run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
             time = np.bincount(run, time, len(ends) - 1)
@@ -171,13 +121,15 @@ class FirSplineMethod(Method):
         return ChordSpeeds(guide=guide, v=v, T1=T1, T2=T2, margin=np.ones((guide.runs, 2)))
 
 
-def _guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None) -> ChordGuide:
-    """The guide along a toolpath whose corners are rounded within a fraction of the tolerance."""
+def guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None = None) -> ChordGuide:
+    """The guide along a toolpath whose corners are rounded within a fraction of the tolerance.
+
+    own : lengths of the two filters [s]; None to choose them
+    """
     less = dataclasses.replace(toolpath, tolerance=ROUNDING_FRACTION * toolpath.tolerance)
     path = round_corners(less, machine.model_copy(update={"fir": None}), BezierCorner())
-    path = dataclasses.replace(
-        path, toolpath=toolpath, tol=path.tol / ROUNDING_FRACTION
-    )  # from here on the whole of it
+    # from here on the whole of it
+    path = dataclasses.replace(path, toolpath=toolpath, tol=path.tol / ROUNDING_FRACTION)
     return guide_of_path(sample_path(path, machine, RESOLUTION), machine, own)
 
 

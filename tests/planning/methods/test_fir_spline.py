@@ -14,12 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.jobs import problems
-from planner.baselines.fir.chord_guide import ChordGuide, guide_of_curve
+from planner.baselines.fir.chord_guide import ChordGuide
 from planner.baselines.fir.chord_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
+from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
 from planner.motion.filters import Filters
-from planner.planning.methods.fir_spline import CHORD_FRACTION, FirSplineMethod
+from planner.planning.methods.fir_spline import FirSplineMethod, guide_of
 
 MACHINE = problems.machine()
 T1, T2 = 0.05, 0.03  # the papers' filters
@@ -34,7 +35,7 @@ def mean_on_circle(rho: float, v: float, T1: float, T2: float) -> complex:
 
 
 def guide_on(curve: Nurbs, machine: Machine, feed: float = 100.0) -> ChordGuide:
-    return guide_of_curve(curve, machine, feed, machine.tolerance, curve.breaks, np.zeros(0))
+    return guide_of(toolpath_from_program(curve.exact_program(feed), machine), machine)
 
 
 # --- the closed forms on a circle -----------------------------------------------------------------------------------------
@@ -176,8 +177,8 @@ GIVEN = FirSplineMethod(plain=True, profile_filters=(T1, T2), phase_lag=np.deg2r
 def test_the_plain_motion_on_a_circle_runs_on_the_one_further_inside(rho):
     """In the steady part the radius is rho less the exact error, at the speed v_eps in time, within what the chords leave."""
     machine = strong(dt=1e-4)
-    made = GIVEN.plan_curve(circle(rho, turns=6), machine, 1e3)
-    tol = (1 - CHORD_FRACTION) * machine.tolerance * 0.99
+    made = GIVEN.plan(circle(rho, turns=6).exact_program(1e3), machine)
+    tol = machine.tolerance * 0.99
     v = np.sqrt(24 * rho * tol / (T1**2 + T2**2))
     t = made.trajectory
     steady = (t.t > T1 + T2) & (t.t < t.cycle_time - T1 - T2)
@@ -209,15 +210,14 @@ def test_on_varying_curvature_the_plain_mode_exceeds_and_says_so_and_the_safe_on
     name, tolerance, exceeded
 ):
     """docs/papers.md G3: v_sc varies within the window, so none of the formulas is a bound; the verdict shows it. v_ph, when it is
-    not left
-    out of the way, hides most of it. Papers' limits: 2000 mm/s2 and 66 667 mm/s3, filters of 50 and 30 ms."""
+    not left out of the way, hides most of it. Papers' limits: 2000 mm/s2 and 66 667 mm/s3, filters of 50 and 30 ms."""
     curve, machine = curve_named(name), problems.machine(jerk=66_667.0, tolerance=tolerance)
-    plain = GIVEN.plan_curve(curve, machine, 100.0)
+    plain = GIVEN.plan(curve.exact_program(100.0), machine)
     worst = excess(plain)
     assert not plain.verdict.passed
     assert {name for name, ratio in worst.items() if ratio > 1.05} == set(exceeded.split())
     assert all(ratio < 2.0 for ratio in worst.values())  # docs/papers.md: up to 1.46, 1.93 and 1.07
-    safe = FirSplineMethod().plan_curve(curve, machine, 100.0)
+    safe = FirSplineMethod().plan(curve.exact_program(100.0), machine)
     assert safe.verdict.passed, safe.verdict.faults
     assert max(excess(safe).values()) > 0.93  # no large margins are left
 

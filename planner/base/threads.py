@@ -12,6 +12,7 @@ from typing import TypeVar
 Here = TypeVar("Here")
 There = TypeVar("There")
 
+PERIOD = 0.1  # [s]
 _given: int | None = None
 
 
@@ -36,28 +37,22 @@ def cores() -> int:
 
 
 def side_by_side(
-    work: Sequence[Callable[[], None]],
-    stop: Callable[[], None],
-    waiting: Callable[[], None],
-    period: float = 0.1,
+    work: Sequence[Callable[[], None]], stop: Callable[[], None], waiting: Callable[[], None]
 ) -> None:
     """Run all of `work` in as many threads as there may be, in this order; returns when all is done.
 
     stop    : called after an error or an interrupt, which is then raised: makes what is still running end soon
-    waiting : called in this thread, about once a period [s]
+    waiting : called in this thread, about once in `PERIOD`
     """
-    from concurrent.futures import (  # not loaded by commands that solve nothing
-        FIRST_EXCEPTION,
-        ThreadPoolExecutor,
-        wait,
-    )
+    # not loaded by commands that solve nothing
+    from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
     with ThreadPoolExecutor(max_workers=min(threads(), len(work))) as pool:
         running = [pool.submit(task) for task in work]
         try:
             pending = set(running)
             while pending:
-                done, pending = wait(pending, timeout=period, return_when=FIRST_EXCEPTION)
+                done, pending = wait(pending, timeout=PERIOD, return_when=FIRST_EXCEPTION)
                 for future in done:
                     future.result()
                 waiting()

@@ -120,7 +120,7 @@ class Nurbs:
             worst = np.maximum(worst, np.linalg.norm(off - along[:, None] * chord, axis=1))
         return worst
 
-    def to_program(self, sagitta: float, feed: float, *, source: str = "NURBS") -> Program:
+    def to_program(self, sagitta: float, feed: float) -> Program:
         """The curve as a program of G1 moves.
 
         sagitta : largest distance of a chord from the curve [mm]; its ends are on the curve
@@ -131,9 +131,9 @@ class Nurbs:
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
         points = self.at(self.stations(sagitta))
-        return chords(points, self.axes, feed, source)
+        return chords(points, self.axes, feed)
 
-    def exact_program(self, feed: float, *, source: str = "NURBS") -> Program:
+    def exact_program(self, feed: float) -> Program:
         """The curve itself as a program of one block, as G6.2 is read: every method plans it.
 
         feed : programmed feed [mm/s]
@@ -146,17 +146,17 @@ class Nurbs:
             raise InputError(f"NURBS of degree {self.degree}; exact curves have degree 1, 2 or {DEGREE_MAX}")
         pieces = cubic_pieces(homogeneous(self.points, self.weights), self.knots, self.degree)
         points, weights = pieces[..., :-1] / pieces[..., -1:], pieces[..., -1]
-        program = chords(points[[0, -1], [0, -1]], self.axes, feed, source)
+        program = chords(points[[0, -1], [0, -1]], self.axes, feed)
         splines = SplineTable(block=np.zeros(len(pieces)), points=points, weights=weights)
         return dataclasses.replace(program, kind=np.full(1, Kind.SPLINE), splines=splines)
 
 
-def chords(points: FloatArray, axes: tuple[str, ...], feed: float, source: str) -> Program:
+def chords(points: FloatArray, axes: tuple[str, ...], feed: float) -> Program:
     """A program of G1 moves at `feed` [mm/s] through points (B+1, A) [mm]; the machine stands at the first of them."""
     blocks = len(points) - 1
     none: Array = np.zeros(0)
     return Program(
-        source=source,
+        source="NURBS",
         axes=axes,
         start=points[0],
         kind=np.full(blocks, Kind.LINE),

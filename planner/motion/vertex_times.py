@@ -10,7 +10,6 @@ apart. (Which block each point of a motion is at, by distances and budgets, is i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,22 +26,6 @@ SLACK = 8.0
 STANDING = 1e-9
 
 
-class _Seen(NamedTuple):
-    """Samples of a motion from the chord on that was reached."""
-
-    position: FloatArray  # (T, A) [mm]
-    s: FloatArray  # (T,) the way run [mm]
-    t: FloatArray  # (T,) [s]
-
-
-class _Wanted(NamedTuple):
-    """The joints of a path."""
-
-    vertex: FloatArray  # (M+1, A) [mm]
-    length: FloatArray  # (M,) of the segment after each [mm]
-    slack: FloatArray  # (M,) by how much the way run may differ from it [mm]
-
-
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
 
@@ -57,29 +40,30 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     times = np.empty(len(toolpath) + 1)
     for first, last, leaves, arrives in zip(stop[:-1], stop[1:], end[:-1], begin[1:], strict=True):
         run = slice(leaves, arrives + 1)
-        seen = _Seen(motion.position[run], motion.s[run], motion.t[run])
+        seen = motion.position[run], motion.s[run], motion.t[run]
         wanted = _wanted(toolpath, first, last)
         of_run = times[first : last + 1]
-        of_run[0] = seen.t[0]
+        of_run[0] = motion.t[leaves]
         _pass(seen, wanted, of_run, 1, 0.0, True)
-        of_run[-1] = seen.t[-1]
+        of_run[-1] = motion.t[arrives]
     return times
 
 
 def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
     """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one before."""
     times = np.empty(len(toolpath) + 1)
-    wanted, seen = _wanted(toolpath, 0, len(toolpath)), None
+    wanted = _wanted(toolpath, 0, len(toolpath))
+    seen: tuple[FloatArray, ...] | None = None
     done, share = 1, 0.0
     for chunk in chunks:
-        new = _Seen(chunk.position, chunk.s, chunk.t)
+        new = chunk.position, chunk.s, chunk.t
         if seen is None:
             seen, times[0] = new, chunk.t[0]
         else:
-            fresh = int(np.searchsorted(chunk.t, seen.t[-1], side="right"))
-            seen = _Seen(*(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True)))
+            fresh = int(np.searchsorted(chunk.t, seen[2][-1], side="right"))
+            seen = tuple(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True))
         done, k, share = _pass(seen, wanted, times, done, share, False)
-        seen = _Seen(*(column[k:].copy() for column in seen))
+        seen = tuple(column[k:].copy() for column in seen)
     assert seen is not None
     _pass(seen, wanted, times, done, share, True)
     return times
@@ -110,17 +94,20 @@ def _standing(motion: Trajectory) -> tuple[Array, Array]:
     return still[np.append(True, new)[: len(still)]], still[np.append(new, True)[: len(still)]]
 
 
-def _wanted(toolpath: Toolpath, first: int, last: int) -> _Wanted:
-    """The joints from one to another."""
+def _wanted(toolpath: Toolpath, first: int, last: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`wanted` of `_pass` for the joints from one to another."""
     vertex = np.vstack([toolpath.start[first:last], toolpath.end[last - 1 : last]])
     slack = SLACK * np.maximum(toolpath.tolerance[first:last], toolpath.tolerance[first + 1 : last + 1])
-    return _Wanted(vertex, toolpath.length[first:last], slack)
+    return vertex, toolpath.length[first:last], slack
 
 
 @njit(cache=True, error_model="numpy")
 def _pass(seen, wanted, times, i, share, last_part):
     """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as it goes; of the last part
     to the end. The place reached is at the `share` of the first chord.
+
+    seen   : samples of the motion from the chord on that was reached: positions (T, A) [mm], way run (T,) [mm] and times (T,) [s]
+    wanted : vertices (M+1, A) [mm], lengths (M,) of the segments after them, and by how much the way run may differ (M,) [mm]
 
     Returns the next vertex, and the place reached: chord and share of it.
     """

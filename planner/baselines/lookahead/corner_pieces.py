@@ -60,14 +60,15 @@ ARC_RAMP = 5 * ARC_SHORTEST
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
-class PieceRows(NamedTuple):
-    """L pieces of constant jerk, as the kernels write them.
+class CornerPieces(NamedTuple):
+    """L pieces of constant jerk.
 
     joint    : (L,) the joint k that the piece is anchored at
     leg      : (L,) the leg it belongs to
     duration : (L,) [s], > 0
     before   : (L, 4) c1 and its derivatives at the start
     after    : (L, 4) c2
+    segment  : (L,) segment of the toolpath that it belongs to
     """
 
     joint: Array
@@ -75,16 +76,6 @@ class PieceRows(NamedTuple):
     duration: FloatArray
     before: FloatArray
     after: FloatArray
-
-
-class CornerPieces(NamedTuple):
-    """L pieces of constant jerk.
-
-    rows    : what the kernels know of them
-    segment : (L,) segment of the toolpath that each belongs to
-    """
-
-    rows: PieceRows
     segment: Array
 
 
@@ -99,9 +90,8 @@ def corner_pieces(ways: np.recarray, limits: np.recarray, path: Legs, dwell: Flo
     rows = _empty(_emit(ways, limits, dwell, _empty(0)))
     _emit(ways, limits, dwell, rows)
     cut = _empty(len(rows.leg) + len(path.offset))
-    segment = np.zeros(len(cut.leg), np.int64)
-    count = _cut(rows, limits.length, path.first, path.offset, cut, segment)
-    return CornerPieces(PieceRows(*(column[:count] for column in cut)), segment[:count])
+    count = _cut(rows, limits.length, path.first, path.offset, cut)
+    return CornerPieces(*(column[:count] for column in cut))
 
 
 def along_axes(
@@ -110,7 +100,7 @@ def along_axes(
     """Position, velocity, acceleration and jerk (L, A) of the axes at the start of every piece."""
     vertex = np.vstack([path.table["start"], toolpath.end[-1:]])
     direction = path.table["direction"]
-    joint, before, after = pieces.rows.joint, pieces.rows.before, pieces.rows.after
+    joint, before, after = pieces.joint, pieces.before, pieces.after
     u1, u2 = direction[np.maximum(joint - 1, 0)], direction[np.minimum(joint, len(path) - 1)]
     position, velocity, acceleration, jerk = (
         before[:, c, None] * u1 + after[:, c, None] * u2 for c in range(4)
@@ -126,17 +116,17 @@ def along_axes(
 
 def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[FloatArray, ...]:
     """The same of the pieces `move`, which lie on arcs from rest to rest."""
-    leg, segment = pieces.rows.leg[move], pieces.segment[move]
+    leg, segment = pieces.leg[move], pieces.segment[move]
     ends = np.append(leg[1:] != leg[:-1], True)[: len(move)]
     at = np.arange(len(move)) + np.cumsum(ends) - ends  # with room for the end point of every arc
     # relative to the arc's centre, so that the rounding is that of the radius and not of the coordinates
     points = np.empty((len(move) + int(ends.sum()), len(toolpath.axes)))
-    points[at] = arc_point(toolpath, segment, pieces.rows.after[move, 0])
+    points[at] = arc_point(toolpath, segment, pieces.after[move, 0])
     points[at[ends] + 1] = arc_point(toolpath, segment[ends], toolpath.length[segment[ends]])
     last = np.ones(len(points), bool)
     last[at] = False
     position = points[at] + toolpath.arcs.center[toolpath.arc[segment]]
-    return position, *_spline_at_rest(pieces.rows.duration[move], points, last)
+    return position, *_spline_at_rest(pieces.duration[move], points, last)
 
 
 def _spline_at_rest(
@@ -164,14 +154,15 @@ def _spline_at_rest(
     return velocity, M[start], (M[start + 1] - M[start]) / duration[:, None]
 
 
-def _empty(count: int) -> PieceRows:
+def _empty(count: int) -> CornerPieces:
     """Room for so many pieces."""
-    return PieceRows(
+    return CornerPieces(
         joint=np.zeros(count, np.int64),
         leg=np.zeros(count, np.int64),
         duration=np.zeros(count),
         before=np.zeros((count, 4)),
         after=np.zeros((count, 4)),
+        segment=np.zeros(count, np.int64),
     )
 
 
@@ -264,7 +255,7 @@ def _emit_arc(n, k, leg, phases, state, rows):
 
 
 @njit(cache=True, error_model="numpy")
-def _cut(rows, length, first, offset, out, segment):
+def _cut(rows, length, first, offset, out):
     """Cut pieces where they pass the end of a segment inside their leg; returns the number of pieces."""
     n, m = 0, 0
     state = np.zeros((2, 4))
@@ -289,13 +280,13 @@ def _cut(rows, length, first, offset, out, segment):
                 count = n
                 n = _put(n, low, rows.joint[i], leg, state, out)
                 if n > count:
-                    segment[count] = m
+                    out.segment[count] = m
                     left -= low
             m += 1
         count = n
         n = _put(n, left, rows.joint[i], leg, state, out)
         if n > count:
-            segment[count] = m
+            out.segment[count] = m
     return n
 
 

@@ -183,7 +183,7 @@ def _motion(chain: _Chain, axes: tuple[str, ...], radius: float) -> AxisMotion:
     """The pieces of legs and corners, along the axes."""
     pieces = corner_pieces(chain.passage, chain.legs, chain.path, chain.lines.dwell[chain.path.first])
     position, velocity, acceleration, jerk = along_axes(pieces, chain.path, chain.lines)
-    end = np.cumsum(pieces.rows.duration)
+    end = np.cumsum(pieces.duration)
     return AxisMotion(
         axes=axes,
         radius=radius,

@@ -20,7 +20,7 @@ by `GROWTH` of the distance from there, and stay below what a motion needs to bu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -136,20 +136,13 @@ def lay(corridor: Corridor, longest: FloatArray) -> Splines:
         begin, end = int(corridor.first[q]), int(corridor.first[q + 1]) - 1
         count = (end - begin) // RANGE
         cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
-        tasks = [_range(corridor, float(longest[q]), a, b, distance) for a, b in pairwise(cuts)]
+
+        def work(a: int, b: int, longest: float) -> None:
+            distance[a + 1 : b] = needed_distances(corridor, longest, a, b)
+
+        tasks = [partial(work, a, b, float(longest[q])) for a, b in pairwise(cuts)]
         side_by_side(tasks, lambda: None, lambda: None)
     return Splines(*_lay(corridor, longest, distance))
-
-
-def _range(
-    corridor: Corridor, longest: float, first: int, last: int, distance: FloatArray
-) -> Callable[[], None]:
-    """What writes the distances of knots at the vertices inside first..last, as many as that range by itself needs."""
-
-    def work() -> None:
-        distance[first + 1 : last] = needed_distances(corridor, longest, first, last)
-
-    return work
 
 
 @njit(cache=True, error_model="numpy")

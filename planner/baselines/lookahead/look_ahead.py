@@ -6,8 +6,7 @@ A, takes l of the legs beside it and lasts T. A and l grow with V (or do not dep
 parameter. What a leg can do between two corners is in baselines/lookahead/ramps.py, with V' and x as there.
 
 Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible iff from the slower
-of its ends that speed of the faster one is within reach of what the corners leave: W_fast <= k (V' + x). The factor k, 0 < k <= 1,
-is paper 003's for short segments (eq. (9) as docs/papers.md reads it); with k = 1 the leg is used completely.
+of its ends that speed of the faster one is within reach of what the corners leave: W_fast <= V' + x.
 
 1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible. Lowering a speed never
    lengthens its corner, which leaves the neighbouring leg feasible, so two sweeps are enough.
@@ -47,31 +46,28 @@ BISECTIONS = 60  # of a speed's bracket: to its last digit
 SPEED_ROUNDING = 4e-16
 
 
-def look_ahead(
-    legs: np.recarray, candidates: Sequence[np.recarray], k: float = 1.0
-) -> tuple[np.recarray, FloatArray]:
+def look_ahead(legs: np.recarray, candidates: Sequence[np.recarray]) -> tuple[np.recarray, FloatArray]:
     """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each joint's corner [s].
 
     Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the corners beside them allow.
 
     legs       : (n,) records `LEG`
     candidates : (n+1,) records `WAY` each; may overlap nowhere on a leg at their speeds (see `capped`)
-    k          : factor of the short-segment rule, 0 < k <= 1
     """
     wished = np.stack(candidates)
     straight = (wished["kind"] == PASS).all(axis=0)
     rows = np.concatenate([np.zeros((1, len(legs) + 1), WAY), wished])
     for way in rows[1:]:
-        _sweep(way, legs, k)
+        _sweep(way, legs)
     rows["V"][1:, straight] = wished["V"][:, straight]
-    ways, time = _choose(rows, straight, legs, k)
+    ways, time = _choose(rows, straight, legs)
     return ways.view(np.recarray), time
 
 
-def swept(legs: np.recarray, ways: np.recarray, k: float = 1.0) -> np.recarray:
-    """The same ways (n+1,), lowered to the largest speeds at which every leg can be run; k as of `look_ahead`."""
+def swept(legs: np.recarray, ways: np.recarray) -> np.recarray:
+    """The same ways (n+1,), lowered to the largest speeds at which every leg can be run."""
     lower = ways.copy()
-    _sweep(lower, legs, k)
+    _sweep(lower, legs)
     return lower
 
 
@@ -96,12 +92,12 @@ def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]
 
 
 @njit(cache=True, error_model="numpy")
-def _feasible(one, other, leg, k, slack):
+def _feasible(one, other, leg, slack):
     """Whether a leg with the ends `one`, `other` can be run, up to `slack` of its length."""
     fast, slow = (one, other) if one.top >= other.top else (other, one)
     D = leg.length * (1.0 + slack) - one.corner - other.corner - fast.ramp + slow.pre
     # gains are compared, not speeds: see leg_top
-    return D >= 0.0 and fast.top - k * slow.start <= k * gain_max(slow.start, D, leg.a, leg.j)
+    return D >= 0.0 and fast.top - slow.start <= gain_max(slow.start, D, leg.a, leg.j)
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,27 +135,27 @@ def _cap(ways, legs, room):
 
 
 @njit(cache=True, error_model="numpy")
-def _lowered(way, V, behind, fixed, leg, k):
+def _lowered(way, V, behind, fixed, leg):
     """The largest speed up to V with which a leg is feasible towards its other end `fixed`, but not below that end's W.
 
     behind : True if the joint passed at V is the one that the leg begins at
     """
     here = leg_end(way, V, leg.j, behind)
-    if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+    if here.top <= fixed.top or _feasible(here, fixed, leg, 0.0):
         return V
     low, high = 0.0, V
     if way.kind != ENTRY and way.kind != ZERO:  # what they take of the leg does not depend on the speed
         D = leg.length - here.corner - fixed.corner + fixed.pre
-        trial = min(V, k * (fixed.start + gain_max(fixed.start, max(D, 0.0), leg.a, leg.j)))
+        trial = min(V, fixed.start + gain_max(fixed.start, max(D, 0.0), leg.a, leg.j))
         for _ in range(BISECTIONS):
             here = leg_end(way, trial, leg.j, behind)
-            if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+            if here.top <= fixed.top or _feasible(here, fixed, leg, 0.0):
                 return trial
             trial *= 1.0 - SPEED_ROUNDING
     for _ in range(BISECTIONS):
         trial = 0.5 * (low + high)
         here = leg_end(way, trial, leg.j, behind)
-        if here.top <= fixed.top or _feasible(here, fixed, leg, k, 0.0):
+        if here.top <= fixed.top or _feasible(here, fixed, leg, 0.0):
             low = trial
         else:
             high = trial
@@ -167,75 +163,43 @@ def _lowered(way, V, behind, fixed, leg, k):
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(ways, legs, k):
+def _sweep(ways, legs):
     """Lower the speeds of the ways (n+1,), in place, until every leg is feasible."""
-    if k < 1.0:  # where both ends want the same speed, the rule bounds that speed
-        for i in range(len(legs)):
-            _lower_both(ways, i, legs[i], k)
     for i in range(len(legs) - 1, -1, -1):
         fixed = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
-        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i], k)
+        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i])
     for i in range(len(legs)):
         fixed = leg_end(ways[i], ways[i].V, legs[i].j, True)
-        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i], k)
-
-
-@njit(cache=True, error_model="numpy")
-def _at_most(way, j, W):
-    """The largest speed of a way up to its own whose V + A^2/(2j) is at most W."""
-    if leg_end(way, way.V, j, True).top <= W:
-        return way.V
-    if way.kind != ENTRY:
-        return W
-    return min(way.V, max(W - 0.5 * way.p * way.p / j, W / (1.0 + way.q / j)))
-
-
-@njit(cache=True, error_model="numpy")
-def _lower_both(ways, i, leg, k):
-    """Lower both ends of leg i to the largest common W at which the leg is feasible."""
-    first, last, j = ways[i], ways[i + 1], leg.j
-    low, high = 0.0, min(leg_end(first, first.V, j, True).top, leg_end(last, last.V, j, False).top)
-    trial = high
-    for _ in range(BISECTIONS):
-        one = leg_end(first, _at_most(first, j, trial), j, True)
-        other = leg_end(last, _at_most(last, j, trial), j, False)
-        if _feasible(one, other, leg, k, 0.0) and _feasible(other, one, leg, k, 0.0):
-            low = trial
-            if trial == high:
-                return
-        else:
-            high = trial
-        trial = 0.5 * (low + high)
-    first.V, last.V = _at_most(first, j, low), _at_most(last, j, low)
+        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i])
 
 
 # ---- the fastest choice ----------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True, error_model="numpy")
-def _between(ways, first, last, legs, k):
+def _between(ways, first, last, legs):
     """Time [s] from the joint `first` to the joint `last`, the corner at that one not counted; inf if that is impossible.
 
     In between there is no corner: there the speeds of the ways are lowered, in place, to the largest ones.
     """
     for i in range(first, last - 1):
         fixed = leg_end(ways[i], ways[i].V, legs[i].j, True)
-        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i], k)
+        ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i])
     for i in range(last - 1, first, -1):
         fixed = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
-        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i], k)
+        ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i])
     time = 0.0
     for i in range(first, last):
         one = leg_end(ways[i], ways[i].V, legs[i].j, True)
         other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
-        if not _feasible(one, other, legs[i], k, LENGTH_ROUNDING):
+        if not _feasible(one, other, legs[i], LENGTH_ROUNDING):
             return np.inf
         time += leg_time(one, other, legs[i])
     return time
 
 
 @njit(cache=True, error_model="numpy")
-def _choose(rows, straight, legs, k):
+def _choose(rows, straight, legs):
     """The fastest choice (n+1,) among the rows (R, n+1), and the time at the end of each corner; row 0 is the stop."""
     count, joints = rows.shape
     best, back = np.full((joints, count), np.inf), np.zeros((joints, count), np.int64)
@@ -252,7 +216,7 @@ def _choose(rows, straight, legs, k):
                 if time < best[at, t]:
                     ways[i : at + 1] = rows[count - 1, i : at + 1]
                     ways[i], ways[at] = rows[s, i], rows[t, at]
-                    time += _between(ways, i, at, legs, k)
+                    time += _between(ways, i, at, legs)
                     if time < best[at, t]:
                         best[at, t], back[at, t] = time, s
     row = 0
@@ -262,7 +226,7 @@ def _choose(rows, straight, legs, k):
         row = back[corners[n], row]
     time = np.zeros(joints)
     for n in range(1, len(corners)):
-        _between(ways, corners[n - 1], corners[n], legs, k)
+        _between(ways, corners[n - 1], corners[n], legs)
         for i in range(corners[n - 1], corners[n]):
             one = leg_end(ways[i], ways[i].V, legs[i].j, True)
             other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)

@@ -51,22 +51,17 @@ CHORD_FRACTION = 0.5
 class KinematicMethod(Method):
     """Kinematic corners with look-ahead.
 
-    start_stop    : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at
-                    the vertex where no axis steps by more. Such a step breaks the limits of acceleration and jerk, and the verdict
-                    says so
-    short_segment : paper 003's factor k, 0 < k <= 1, on the speed that a leg can reach; 1 uses short legs completely
+    start_stop : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at the
+                 vertex where no axis steps by more. Such a step breaks the limits of acceleration and jerk, and the verdict says so
     """
 
     start_stop: float = 0.0
-    short_segment: float = 1.0
 
     ways, keeps_tangential = CLOSED_FORM_WAYS, False
 
     def __post_init__(self) -> None:
         if not 0 <= self.start_stop < np.inf:
             raise InputError(f"start_stop = {self.start_stop} mm/s; it must be finite and not negative")
-        if not 0 < self.short_segment <= 1:
-            raise InputError(f"short_segment = {self.short_segment}; allowed are 0 < k <= 1")
 
     def plan_job(self, job: Job) -> Plan:
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
@@ -108,7 +103,7 @@ class KinematicMethod(Method):
         legs = leg_limits(path, lines, machine)
         free = corner_passages(path, lines, legs, machine, self.start_stop)
         fitting = [fitted(way, legs) for way in free]
-        passage, time = look_ahead(legs, fitting, self.short_segment)
+        passage, time = look_ahead(legs, fitting)
         return _Chain(
             lines=lines, path=path, legs=legs, free=free, fitting=fitting, passage=passage, time=time
         )

@@ -135,12 +135,11 @@ def test_a_leg_takes_the_time_that_ruckig_finds(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("k", [1.0, 0.5])
 @pytest.mark.parametrize("family", [0, 1])
-def test_no_leg_is_too_short_on_thousands(k, family):
+def test_no_leg_is_too_short_on_thousands(family):
     legs, candidates = random_case(5, 6000)
     way = candidates[family]
-    slower = swept(legs, way, k)
+    slower = swept(legs, way)
     assert (slower.V <= way.V).all()
     lowered = (slower.V < way.V * (1 - 1e-9)).mean()
     assert 0.1 < lowered < 0.9
@@ -151,19 +150,19 @@ def test_no_leg_is_too_short_on_thousands(k, family):
     assert (before > 1e-3 * legs.length).sum() > 500
 
 
-@given(seed=seeds, k=st.floats(0.2, 1.0))
+@given(seed=seeds)
 @settings(max_examples=15)
-def test_short_segment_rule_holds_in_both_directions(seed, k):
-    """V_target <= k (V + reach), towards either end, where both ends run through."""
+def test_speeds_are_within_reach_in_both_directions(seed):
+    """V_target <= V + reach, towards either end, where both ends run through."""
     legs, candidates = random_case(seed, 200)
     way = candidates[0]
-    slower = swept(legs, way, k)
+    slower = swept(legs, way)
     V = slower.V
     length = [corner_of(slower, i)[1] for i in range(len(V))]
     for i in range(len(legs)):
         low, high = sorted(V[i : i + 2])
         free = legs.length[i] - length[i] - length[i + 1]
-        assert high <= k * (low + gain_max(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
+        assert high <= (low + gain_max(low, max(free, 0.0), legs.a[i], legs.j[i])) * (1 + 1e-9) + 1e-12
 
 
 def total_time(legs: np.recarray, passage: np.recarray) -> float:

@@ -97,7 +97,7 @@ def test_random_paths_are_verified_and_never_slower_than_stopping(seed):
         rng, blocks=int(rng.integers(2, 30)), shortest=0.01, longest=100.0, dimensions=dims
     )
     program = dataclasses.replace(program, feed=10 ** rng.uniform(0.5, 2.5, len(program)))
-    made = kinematic(program, machine, short_segment=float(rng.choice([1.0, 0.7])))
+    made = kinematic(program, machine)
     assert made.trajectory.cycle_time <= made.stop_time * (1 + 1e-6)
 
 
@@ -248,14 +248,8 @@ def test_without_use_a_start_stop_speed_changes_nothing():
     assert made.trajectory.cycle_time == kinematic(JOBS["pentagon"]).trajectory.cycle_time
 
 
-def test_short_segment_factor_only_costs_time():
-    times = [kinematic(JOBS["spiral"], short_segment=k).trajectory.cycle_time for k in (1.0, 0.9, 0.5)]
-    assert times[0] < times[1] < times[2]
-
-
 @pytest.mark.parametrize(
-    "settings_", [{"start_stop": -1.0}, {"start_stop": np.inf}, {"start_stop": np.nan},
-                  {"short_segment": 0.0}, {"short_segment": 1.1}, {"short_segment": np.nan}],
+    "settings_", [{"start_stop": -1.0}, {"start_stop": np.inf}, {"start_stop": np.nan}],
 )  # fmt: skip
 def test_settings_that_make_no_sense_are_refused(settings_):
     with pytest.raises(InputError, match=next(iter(settings_))):

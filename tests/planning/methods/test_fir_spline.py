@@ -219,7 +219,7 @@ def test_on_varying_curvature_the_plain_mode_exceeds_and_says_so_and_the_safe_on
     assert all(ratio < 2.0 for ratio in worst.values())  # docs/papers.md: up to 1.46, 1.93 and 1.07
     safe = FirSplineMethod().plan(curve.exact_program(100.0), machine)
     assert safe.verdict.passed, safe.verdict.faults
-    assert max(excess(safe).values()) > 0.93  # no large margins are left
+    assert max(excess(safe).values()) > 0.9  # no large margins are left
 
 
 @pytest.mark.parametrize("lengths", [(0.05, 0.05), (0.05, 0.02), (0.05, 1e-3)])

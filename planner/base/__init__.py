@@ -1,1 +1,1 @@
-"""What everything else stands on: arrays in records, errors, units, files, searches, compiled kernels."""
+"""The ground of everything else: arrays in records, errors, units, files, searches, compiled kernels."""

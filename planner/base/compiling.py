@@ -48,8 +48,8 @@ choose_processor()
 
 
 class _NoEnvironment:
-    """What numba's code generator is to a part: the Python objects that its code uses, such as the text of an exception, are set in the
-    wholes that it becomes a piece of."""
+    """In place of numba's code generator for a part: the Python objects that its code uses, such as the text of an exception, are set
+    in the wholes that it becomes a piece of."""
 
     @staticmethod
     def set_env(name: str, environment: Any) -> None:
@@ -83,7 +83,7 @@ class _PartCompiler(compiler.Compiler):
 
 
 def part(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
-    """What other kernels call."""
+    """The dispatcher that other kernels call."""
     entries = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     made = numba.njit(pipeline_class=_PartCompiler, **{**settings, **entries})(function)
     numba_s = made.get_call_template
@@ -98,7 +98,7 @@ def part(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
 
 
 def whole(function: Callable[..., Any], settings: dict[str, Any], cache: KernelCache) -> Any:
-    """What Python calls."""
+    """The dispatcher that Python calls."""
     made = numba.njit(**{"no_cfunc_wrapper": True, **settings})(function)
     made._cache = cache
     return made
@@ -126,7 +126,7 @@ class KernelCache(caching.NullCache):
         self._begins, self._ends, self._fails = begins, ends, fails
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled for these types; None if there is nothing, or nothing of use."""
+        """The code that was compiled for these types; None if there is nothing, or nothing of use."""
         rtsys.initialize(target_context)  # all that machine code needs; compiling has numba load more
         kept = None if self._content is None else kernel_files.read(self._file(sig, target_context.codegen()))
         if kept is not None:
@@ -162,8 +162,8 @@ class KernelCache(caching.NullCache):
 
 
 def _to_keep(made: Any) -> tuple[Any, ...]:
-    """What numba pickles of a whole, without what is for being linked into others and for people to read, and without environments that
-    have nothing in them, of numba's own functions, whose modules would be imported for that."""
+    """The part of a whole that numba pickles, without what is for being linked into others and for people to read, and without
+    environments that have nothing in them, of numba's own functions, whose modules would be imported for that."""
     (name, kind, (code, _)), *others, _, reload_init, environments = made._reduce()
     entry = f'define void @"{made.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
     library = name, kind, (code, binding.parse_assembly(entry).as_bitcode())

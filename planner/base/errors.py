@@ -1,4 +1,4 @@
-"""What can go wrong, and how it is reported.
+"""Kinds of failure, and how they are reported.
 
 There are three kinds of failure:
 

@@ -43,7 +43,7 @@ def require_ending(path: str | Path) -> None:
 
 
 def standard_input() -> bytes:
-    """What is on the standard input, to its end. Raises OSError if there is none, or it cannot be read."""
+    """The bytes on the standard input, to its end. Raises OSError if there is none, or it cannot be read."""
     if sys.stdin is None:  # closed by the caller: <&-
         raise OSError("the standard input is closed")
     return sys.stdin.buffer.read()

@@ -108,7 +108,7 @@ def place(function: FunctionType, content: bytes, types_and_tools: str) -> Kerne
 
 
 def read(file: KernelFile) -> bytes | None:
-    """What was written to it, or None: what is damaged, of another content, or may be somebody else's, is not there."""
+    """The kernel that was written to it, or None: what is damaged, of another content, or may be somebody else's, is not there."""
     for folder in (*folders(), *([] if fault_of(installed()) else [installed()])):
         path = os.path.join(folder, file.name)
         try:

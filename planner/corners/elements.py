@@ -32,7 +32,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 
 
 class ElementTable(NamedTuple):
-    """What the kernels need of a smooth path with R legs."""
+    """The records of a smooth path with R legs, for the kernels."""
 
     legs: Array  # (R,) records, geometry/legs.py
     corners: Array  # (R+1,) records, corners/blend.py

@@ -48,5 +48,5 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
 
 
 def _claim(free: FloatArray, fraction: FloatArray, other_can: FloatArray) -> FloatArray:
-    """What one end may take of the free length (R,): its fraction, or all that the other end cannot use [mm]."""
+    """The share of one end in the free length (R,): its fraction, or all that the other end cannot use [mm]."""
     return np.maximum(free * fraction, free - other_can)

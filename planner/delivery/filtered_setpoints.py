@@ -1,4 +1,4 @@
-"""What comes out behind the filters of a machine that is given the setpoints of a motion, for planning.
+"""The motion behind the filters of a machine that is given the setpoints of a motion, for planning.
 
 Between setpoints dt apart the machine moves as its file says. In periods, with one setpoint at 0 that is 1 and all others 0, it makes
 of that the shape (k and m are places and powers of truncated powers x^m/m! for x > 0, c their factors)

@@ -52,7 +52,7 @@ class Errors(NamedTuple):
 
     @property
     def over(self) -> bool:
-        """Whether the motion leaves the tolerance."""
+        """True if the motion leaves the tolerance."""
         return bool(len(self.time)) or bool((self.near > 1.0 - SPARE).any())
 
 

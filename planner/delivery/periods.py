@@ -1,4 +1,4 @@
-"""What the interpolation period adds to the contour error, and what is done about it.
+"""The share of the interpolation period in the contour error, and what is done about it.
 
 The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the motion by
 

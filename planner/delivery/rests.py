@@ -52,7 +52,7 @@ class Mean:
 
 
 def mean_of_filters(filters: Filters) -> Mean:
-    """What moving averages make of a motion: that of each of `STEPS` parts of it counts as it is in the middle."""
+    """The mean of moving averages: the motion in each of `STEPS` parts of it counts as it is in the middle."""
     weight = np.diff(filters.step(filters.delay * np.arange(STEPS + 1) / STEPS))
     middle = np.arange(STEPS) + 0.5
     edge = np.arange(STEPS + 1)[:, None]
@@ -66,7 +66,7 @@ def mean_of_filters(filters: Filters) -> Mean:
 
 
 def mean_of_copies(shaper: Shaper) -> Mean:
-    """What delayed copies make of a motion."""
+    """The mean of delayed copies."""
     step = np.arange(STEPS + 1.0)
     since = step - shaper.delay[:, None] * STEPS / shaper.length
 

@@ -1,4 +1,4 @@
-"""What the extruder of a 3-D printer does along a path: an axis that follows the way, and moves alone at full stops.
+"""The extruder of a 3-D printer along a path: an axis that follows the way, and moves alone at full stops.
 
 Between two joints at which it has its programmed place it feeds in proportion to the length of the motion's path, so that what is
 programmed is fed, whatever corners the path cuts. Where its ratio changes its speed steps, as on printers: no motion that goes on could

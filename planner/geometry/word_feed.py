@@ -1,4 +1,4 @@
-"""What F goes by on the segments of a toolpath: x, y and z, where they stand u, v and w, where these stand too the rotary axes."""
+"""The axes that F goes by: x, y and z, where they stand u, v and w, where these stand too the rotary axes."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ CHUNK = SIZES.samples_at_once
 
 
 class _AnyMotion(Protocol):
-    """What motion/timing.py calls `MotionInTime`."""
+    """`MotionInTime` of motion/timing.py, as far as it is used here."""
 
     @property
     def end(self) -> float: ...

@@ -82,7 +82,7 @@ class AxisPulses:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """What the drives' inputs take.
+    """The limits of the drives' inputs.
 
     frequency_max : pulses per second [Hz]; None for no limit
     width         : shortest time that the step signal has to be high, and low, for each pulse [s]; None for no limit

@@ -73,7 +73,7 @@ class _Interval(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """What an interval is evaluated with: coefficients of its span (6, A) and of the derivatives (5, A), (4, A), (3, A) of that;
+    """Room to evaluate an interval in: coefficients of its span (6, A) and of the derivatives (5, A), (4, A), (3, A) of that;
     work (2, 4, A), speed (8,)."""
 
     coef: FloatArray

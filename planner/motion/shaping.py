@@ -67,7 +67,7 @@ class Shaper:
         return float(self.weight @ (self.delay - self.middle) ** 2)
 
     def remains(self, mode: Mode) -> float:
-        """What is left of a mode's ringing, as a fraction of the ringing without shaping [-]."""
+        """The rest of a mode's ringing, as a fraction of the ringing without shaping [-]."""
         w = 2.0 * math.pi * mode.frequency
         pole = -mode.damping * w + 1j * w * math.sqrt(1.0 - mode.damping**2)
         return float(abs((self.weight * np.exp(-pole * (self.delay - self.length))).sum()))

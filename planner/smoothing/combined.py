@@ -62,7 +62,7 @@ HELD = 3
 
 
 class MotionLimits(NamedTuple):
-    """What the motion of A axes keeps."""
+    """Limits of the motion of A axes."""
 
     axes: FloatArray  # (3, A) velocity, acceleration and jerk
     pulled: FloatArray  # (A,) jerks that the pull counts in [mm/s3]

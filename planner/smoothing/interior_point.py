@@ -53,7 +53,7 @@ class Accuracy(NamedTuple):
 
 
 class Optimum(NamedTuple):
-    """What the search found: control points (n, A), multipliers (m,) of g, the gap, and the iterations."""
+    """The result of a search: control points (n, A), multipliers (m,) of g, the gap, and the iterations."""
 
     control: FloatArray
     multiplier: FloatArray

@@ -59,7 +59,7 @@ RANGE = SIZES.relaxed_range
 
 
 class Goal(NamedTuple):
-    """What the control points c of all runs are moved to: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to a gap for each run
+    """The aim of the control points c of all runs: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to a gap for each run
     plus the share `relative` of the integral of its squared third derivatives, if H is its form."""
 
     H: FloatArray  # (A, n, 6) lower bands of all runs

@@ -1,4 +1,4 @@
-"""What paper 001 commands: a speed on every chord of a guide; and how it gets slower.
+"""Paper 001's command: a speed on every chord of a guide; and how it gets slower.
 
 The command runs the guide's chords one after another at a constant speed each.
 

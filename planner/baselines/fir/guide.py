@@ -1,4 +1,4 @@
-"""What the filters are led along: straight legs between joints, in runs between full stops.
+"""The guides that filters are led along: straight legs between joints, in runs between full stops.
 
 Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself (leg_guide.py),
 paper 001 along the fine chords of a smooth path (chord_guide.py).

@@ -1,4 +1,4 @@
-"""What a planned motion really does, measured exactly, and what has to become slower for it.
+"""A planned motion measured exactly, and what has to become slower for it.
 
 The filtered position is the mean of the commanded one over the last Td with the kernel as weight, and so is the filtered length
 along the guide, sigma(t). With the corners c of the guide, at s_c, that turn by Du_c, the motion q differs from the point of the
@@ -37,7 +37,7 @@ FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is roundi
 
 
 class Measured(NamedTuple):
-    """What was measured at n times: start and middle of all pieces, and when the joints that are no full stops are passed.
+    """Measured at n times: start and middle of all pieces, and when the joints that are no full stops are passed.
 
     t            : (n,) ascending [s]
     error        : (n,) deviation from the guide with the chord error, over the tolerance there [-]

@@ -1,4 +1,4 @@
-"""What paper 000 commands: a speed on every leg, a wait or a largest speed at every joint; and how it gets slower.
+"""Paper 000's command: a speed on every leg, a wait or a largest speed at every joint; and how it gets slower.
 
 What is exceeded at time t comes from what was commanded within [t - Td, t]: legs that are short there get slower, joints that flow
 are passed more slowly, joints that wait wait longer. Everything falls with that: the error of a flow joint with V to V^2, that of a

@@ -52,7 +52,7 @@ class SpeedPlan(ABC):
 
     @abstractmethod
     def command(self) -> Command:
-        """What goes into the filters."""
+        """The input of the filters."""
 
     @abstractmethod
     def time(self) -> FloatArray:

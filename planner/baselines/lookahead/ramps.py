@@ -31,7 +31,7 @@ NEWTON_STEPS = 100  # safeguarded by bisection: never reached, as a bisection to
 
 
 class JointKind(IntEnum):
-    """What happens at a joint; p, q and r are the parameters of the kind."""
+    """How a joint is passed; p, q and r are the parameters of the kind."""
 
     STOP = 0  # a full stop
     PASS = 1  # the vertex itself is passed at a speed: straight on, or with a step of velocity

@@ -2,6 +2,7 @@
 
 Most of a search is finding which limit holds where. Long steps tell that in fewer of them, and what they end at is an optimum of the
 shorter ones but for the freedom these have more: each step is divided into equal parts of the same jerk, which is the same motion.
+It tells, too, how much of the tolerance chords and filters take on each leg, so that the motion may use the rest (`reserve_for`).
 """
 
 from __future__ import annotations
@@ -12,10 +13,36 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.joint.checks import watched_shares
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
-from planner.joint.own import TubeOwn
+from planner.joint.own import TubeOwn, keeps_of
 from planner.joint.run import TubeRun
+
+# Of the normal acceleration that a motion was found to have, what budgets leave room for [-]: with less the search has to hold it down
+# in more places and takes longer, with more the path gets less of the tolerance. And at least, of the largest that the axes give [-].
+HEADROOM, LEAST = 1.05, 0.05
+
+
+def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) -> FloatArray:
+    """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times its own there and
+    within an interpolation period beside it, as far as chords reach.
+
+    leg    : (N,) of the steps that were found
+    period : of interpolation [s]
+    """
+    steps = found.steps
+    assert steps is not None
+    state = np.stack([steps.position, steps.velocity, steps.acceleration], axis=1)
+    state = np.concatenate([state, state[-1:]])  # of the last node nothing is looked at
+    of_one = keeps_of(run)._replace(normal=np.ones(len(run)), state=np.zeros(0))
+    across = watched_shares(of_one, leg, steps.h, state, steps.jerk)
+    end = np.cumsum(steps.h)
+    begin = end - steps.h
+    within = np.stack([np.searchsorted(end, begin - period), np.searchsorted(begin, end + period)], axis=1)
+    most = LEAST * run.reserved
+    np.maximum.at(most, leg, HEADROOM * np.maximum.reduceat(np.append(across, 0.0), within.ravel())[::2])
+    return most
 
 
 class Divided(NamedTuple):

@@ -5,8 +5,9 @@ A leg consists of collinear lines with one feed and one budget, or is an arc. Ov
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
 with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
-chord error of the interpolation period and for the filters that follow (corners/budget.py, eq. (18)-(20)), with the largest
-normal acceleration that the axes can give in any direction.
+chord error of the interpolation period and for the filters that follow (corners/budget.py, eq. (18)-(20)): at first with the
+largest normal acceleration that the axes can give in any direction, then with little more than what a motion was found to have on the
+leg, which becomes its limit there (`with_reserve`).
 
 A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that meets P(x(t)) at both ends
 with its velocity has the control points
@@ -20,7 +21,7 @@ the control points of a step belong to; on a line they are the places themselves
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -48,6 +49,7 @@ class Budgets(NamedTuple):
     leg: FloatArray  # (R,) [mm]
     vertex: FloatArray  # (R+1,) 0 at both ends [mm]
     across: FloatArray  # (R,) normal acceleration [mm/s2]
+    reserved: FloatArray  # (R,) that chords and filters have room for [mm/s2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,6 +69,7 @@ class TubeRun:
     velocity, acceleration, jerk : (A,) limits of the axes
     state                        : (K,) other limits of velocity and acceleration (state_limits.py)
     linear                       : (A,) 1 for x, y and z, else 0
+    reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
     left                         : why the search cannot look for a motion here, "" if it can
     """
 
@@ -90,13 +93,14 @@ class TubeRun:
     jerk: FloatArray
     state: FloatArray
     linear: FloatArray
+    reserved: FloatArray
     left: str = ""
 
     def __post_init__(self) -> None:
         legs, axes = len(self.length), len(self.axis)
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
-        for name in ("length", "radius", "rate", "curvature", "budget"):
+        for name in ("length", "radius", "rate", "curvature", "budget", "reserved"):
             freeze(self, name, np.float64, (legs,))
         for name in ("feed", "across_max"):
             freeze(self, name, np.float64, (legs,), finite=False)
@@ -190,6 +194,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             jerk=limits.jerk[moves],
             state=bounds_of(limits, moves),
             linear=linear[moves],
+            reserved=budgets.reserved,
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
 
@@ -205,20 +210,38 @@ def _left(toolpath: Toolpath, part: slice) -> str:
     return ""
 
 
-def budgets_of(toolpath: Toolpath, machine: Machine, first: Array) -> Budgets:
-    """What eq. (18)-(20) leave for the legs that hold the segments first[r] : first[r+1], first (R+1,)."""
+def budgets_of(
+    toolpath: Toolpath, machine: Machine, first: Array, reserved: FloatArray | None = None
+) -> Budgets:
+    """What eq. (18)-(20) leave for the legs that hold the segments first[r] : first[r+1], first (R+1,).
+
+    reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest that the axes can give
+    """
     reachable = normal_anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
     row = first[:-1]  # the segment that stands for its leg
     tol_leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
-    most = np.full(len(tol_leg), reachable)
+    most = np.full(len(tol_leg), reachable) if reserved is None else np.minimum(reserved, reachable)
     tol_ap = allocate(tol_leg, most, rate)
     at_vertex = np.minimum(
         toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
     )
-    vertex_ap = allocate(at_vertex, np.full(len(first), reachable), rate)
+    beside = np.maximum(np.append(most, 0.0), np.append(0.0, most))
+    vertex_ap = allocate(at_vertex, beside, rate)
     vertex_ap[[0, -1]] = 0.0
-    return Budgets(tol_ap, vertex_ap, normal_within_budget(tol_leg, tol_ap, most, rate))
+    return Budgets(tol_ap, vertex_ap, normal_within_budget(tol_leg, tol_ap, most, rate), most)
+
+
+def with_reserve(run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: FloatArray) -> TubeRun:
+    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg, and no more than that."""
+    budgets = budgets_of(toolpath, machine, run.first, reserved)
+    return replace(
+        run,
+        budget=budgets.leg,
+        vertex_budget=budgets.vertex,
+        reserved=budgets.reserved,
+        across_max=np.minimum(run.across_max, budgets.across),
+    )
 
 
 def _edges(toolpath: Toolpath) -> Array:

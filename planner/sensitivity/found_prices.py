@@ -145,8 +145,8 @@ def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], cha
     """dT/d(ln limit) through eq. (20), from a machine with `STEP` more of a limit [s]."""
     total = 0.0
     for run in runs:
-        first = run.found.run.first
-        before, after = (budgets_of(toolpath, one, first) for one in (machine, changed))
+        first, reserved = run.found.run.first, run.found.run.reserved
+        before, after = (budgets_of(toolpath, one, first, reserved) for one in (machine, changed))
         total += float(run.room @ np.log(after.leg / before.leg))
         total += float(run.normal @ np.log(after.across / before.across))
         total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
@@ -166,7 +166,9 @@ class _OfTolerance:
         wider = dataclasses.replace(toolpath, tolerance=toolpath.tolerance * (1.0 + STEP))
         for run in runs:
             first = run.found.run.first
-            before, after = (budgets_of(one, machine, first) for one in (toolpath, wider))
+            before, after = (
+                budgets_of(one, machine, first, run.found.run.reserved) for one in (toolpath, wider)
+            )
             room, normal = (
                 np.log(a / b) / STEP for a, b in ((after.leg, before.leg), (after.across, before.across))
             )

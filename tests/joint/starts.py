@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.machine import Machine
@@ -30,6 +31,11 @@ MACHINES = {"pushed": MACHINE.model_copy(update={"tangential_acceleration": 300.
 def begun(name: str, cut: Cut = DEFAULT_CUT) -> tuple[TubeRun, Guess]:
     """A run, and its motion on Bezier corners cut into steps."""
     return begun_on(PROGRAMS[name], cut, MACHINES.get(name, MACHINE))
+
+
+def toolpath_of(name: str) -> Toolpath:
+    """The toolpath of a run."""
+    return toolpath_from_program(PROGRAMS[name], MACHINES.get(name, MACHINE))
 
 
 def begun_on(program: Program, cut: Cut = DEFAULT_CUT, machine: Machine = MACHINE) -> tuple[TubeRun, Guess]:

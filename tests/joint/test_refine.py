@@ -6,15 +6,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from starts import begun
+from starts import begun, toolpath_of
 
 from benchmarks.jobs import problems
+from planner.corners.budget import error_rate
 from planner.joint.guess import Cut
-from planner.joint.motion import CLOSED_EVERY, closed_at_nodes, integrated
+from planner.joint.motion import CLOSED_EVERY, Steps, closed_at_nodes, integrated
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
-from planner.joint.refine import divided, searched_again
-from planner.joint.run import TubeRun
+from planner.joint.refine import HEADROOM, LEAST, divided, reserve_for, searched_again
+from planner.joint.run import TubeRun, with_reserve
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.optimal.effort import EFFORTS
 
@@ -93,3 +94,39 @@ def test_the_search_of_every_effort_has_its_steps():
     ]
     assert times[1] < times[0] * (1.0 - 1e-5)
     assert times[2] < times[1] * (1.0 + 1e-5)
+
+
+def test_the_reserve_is_for_what_a_motion_has_on_the_leg_and_a_period_beside_it():
+    run, leg, found = found_in_long_steps("pentagon")
+    period, steps = 0.004, found.steps
+    assert isinstance(steps, Steps)
+    t = np.linspace(0.0, steps.h.sum(), 40_001)
+    end = np.cumsum(steps.h)
+    of = np.minimum(np.searchsorted(end, t, side="right"), len(end) - 1)
+    since = (t - (end - steps.h)[of])[:, None]
+    v = steps.velocity[of] + since * (steps.acceleration[of] + since * steps.jerk[of] / 2)
+    a = steps.acceleration[of] + since * steps.jerk[of]
+    across = np.abs(v[:, 0] * a[:, 1] - v[:, 1] * a[:, 0]) / np.maximum(np.linalg.norm(v, axis=1), 1e-12)
+    reserved = reserve_for(run, leg, found, period)
+    for r in range(len(run)):
+        on = np.flatnonzero(leg[of] == r)
+        begin, finish = t[on[0]] - period, t[on[-1]] + period
+        most = across[(t >= begin) & (t <= finish)].max()
+        wider = across[(t >= begin - steps.h.max()) & (t <= finish + steps.h.max())].max()
+        assert most * HEADROOM * (1 - 1e-3) <= reserved[r] <= max(wider * HEADROOM, LEAST * run.reserved[r])
+
+
+@pytest.mark.parametrize("name", ["corner", "arcs", "pentagon"])
+def test_path_and_reserve_are_the_tolerance(name: str):
+    """Eq. (18): eps_ap + c X = eps on every leg, and at every vertex for the larger X beside it."""
+    run, leg, found = found_in_long_steps(name)
+    machine, toolpath = problems.machine(), toolpath_of(name)
+    rate, tol = error_rate(machine), toolpath.tolerance
+    wider = with_reserve(run, toolpath, machine, reserve_for(run, leg, found, machine.dt))
+    of_leg = np.maximum(tol[run.first[:-1]], tol[run.first[:-1] + 1])
+    np.testing.assert_allclose(wider.budget + rate * wider.reserved, of_leg, rtol=1e-12)
+    larger = np.maximum(wider.reserved[1:], wider.reserved[:-1])
+    np.testing.assert_allclose(wider.vertex_budget[1:-1] + rate * larger, tol[run.first[1:-1]], rtol=1e-12)
+    assert (wider.across_max <= wider.reserved * (1 + 1e-9)).all()
+    assert (wider.budget >= run.budget).all()
+    assert wider.vertex_budget[0] == wider.vertex_budget[-1] == 0.0

@@ -145,7 +145,7 @@ def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: fl
     present = value_of(setting.name, machine, tolerance)
     if present is None or name not in (FEED, *prices.limits):
         return None
-    planned = present if setting.name in of_key else _planned_limit(name, machine)
+    planned = present if name == FEED or setting.name in of_key else _planned_limit(name, machine)
     price = prices.feed if name == FEED else prices.limits[name] * planned
     ratio = setting.value / present
     share = 1.0 - 1.0 / ratio

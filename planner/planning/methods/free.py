@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.delivery.periods import missed
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
@@ -18,8 +18,8 @@ from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
 from planner.joint.parts import FoundRun, parts_of
-from planner.joint.refine import divided, searched_again
-from planner.joint.run import TubeRun
+from planner.joint.refine import divided, reserve_for, searched_again
+from planner.joint.run import TubeRun, with_reserve
 from planner.joint.solvers import TubeSolver
 from planner.joint.splice import Spliced, SplicedRun
 from planner.motion.timing import MotionInTime
@@ -91,8 +91,13 @@ class Start(RunsInTime):
 
     def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT, plan: Plan | None = None):
         super().__init__(motion, job)
-        self.plan, self.cut = plan, cut
+        self.plan, self.cut, self._job = plan, cut, job
         self._guesses: dict[int, Guess] = {}
+
+    def with_reserve(self, run: TubeRun, leg: Array, found: TubeSolution) -> TubeRun:
+        """A run whose budgets leave room for the chords of the motion that was found along it, and no more; leg (N,) of its steps."""
+        job = self._job
+        return with_reserve(run, job.toolpath, job.machine, reserve_for(run, leg, found, job.machine.dt))
 
     def guess(self, k: int, run: TubeRun) -> Guess:
         """The motion along run k, cut into steps."""
@@ -159,7 +164,7 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver | I
             break
         guess = start.guess(k, run)
         if isinstance(solver, InTwo):
-            guess, solution = _in_two(k, run, start, solver)
+            run, guess, solution = _in_two(k, run, start, solver)
         else:
             solution = solver.solve(run, guess)
         steps, kept = solution.steps, solution.kept
@@ -178,20 +183,21 @@ def search(k: int, run: TubeRun, starts: Iterable[Start], solver: TubeSolver | I
     return FoundRun(run, Status.ACCEPTABLE, why[0])
 
 
-def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[Guess, TubeSolution]:
-    """What the two searches find, and the steps from which the last one began."""
+def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun, Guess, TubeSolution]:
+    """The run with the budgets that the last of the searches had, the steps from which that began, and its solution."""
     guess = start.guess(k, run)
     found = solver.first.solve(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         cut, own = solver.finer[0]
         guess = start.guess_in(k, run, cut)
-        return guess, own.solve(run, guess)
+        return run, guess, own.solve(run, guess)
     for cut, own in solver.finer:
-        finer = divided(run, guess.leg, found, cut)
-        again = searched_again(run, found, finer, own)
+        wider = start.with_reserve(run, guess.leg, found)
+        finer = divided(wider, guess.leg, found, cut)
+        again = searched_again(wider, found, finer, own)
         if again is not None and again.steps is not None and again.steps.h.sum() <= found.steps.h.sum():
-            guess, found = finer.guess, again
-    return guess, found
+            run, guess, found = wider, finer.guess, again
+    return run, guess, found
 
 
 def delivered(job: Job, first: Start, found: list[FoundRun]) -> tuple[Delivered, list[int], str]:

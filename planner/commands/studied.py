@@ -155,9 +155,8 @@ def sweep_command(
         raise InputError("--threads is for processes of this machine; a cluster has the workers that it has")
     from planner.commands.study.points import SweepFolder
     from planner.commands.study.settings import grid_of, parse_varied
-    from planner.commands.study.sweep import sweep
+    from planner.commands.study.sweep import sweep, write_sweep
     from planner.commands.study.what_if import sweep_table
-    from planner.commands.study.written import write_sweep
     from planner.report.tables import assumed_lines
 
     varied = [parse_varied(text, studied.machine, studied.present_tolerance) for text in vary]

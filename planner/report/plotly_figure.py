@@ -17,8 +17,17 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES
-from planner.report.colours import DIM, LIGHT, LOW_TO_HIGH, PRICES, limit_colours
-from planner.report.figure import AGAINST, FLAT, Panel, highest_feed
+from planner.report.figure import (
+    AGAINST,
+    DIM,
+    FLAT,
+    LIGHT,
+    LOW_TO_HIGH,
+    PRICES,
+    Panel,
+    highest_feed,
+    limit_colours,
+)
 
 if TYPE_CHECKING:
     from planner.report.html.data import Samples

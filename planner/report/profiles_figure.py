@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
-from planner.report.colours import COLOURS, GREY, LIGHT, limit_colours
-from planner.report.figure import MotionColumns, profile_panels
+from planner.report.figure import COLOURS, GREY, LIGHT, MotionColumns, limit_colours, profile_panels
 from planner.report.html.data import used_limits
 from planner.report.rows import held_by_rows
 from planner.sensitivity.records import WORDS

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from planner.report.colours import CIVIDIS, COLOURS, GREY, LIGHT, LOW_TO_HIGH
+from planner.report.figure import CIVIDIS, COLOURS, GREY, LIGHT, LOW_TO_HIGH
 
 SEEN = {
     "by most": np.eye(3),

@@ -10,10 +10,9 @@ from planner.base.arrays import Array
 from planner.base.sizes import SIZES
 from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES, Machine
-from planner.report.colours import COLOURS
 from planner.report.compare import Row, best_of
 from planner.report.comparison import row_dict
-from planner.report.figure import AGAINST, Panel, Series, three
+from planner.report.figure import AGAINST, COLOURS, Panel, Series, three
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import fitted_scene, panel_figure
 from planner.report.summary import json_ready

@@ -17,12 +17,13 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
-from planner.report.colours import CIVIDIS, limit_colours
 from planner.report.figure import (
     AGAINST,
+    CIVIDIS,
     TOOL,
     MotionColumns,
     highest_feed,
+    limit_colours,
     profile_panels,
     three,
     tool_lines,

@@ -23,9 +23,9 @@ from planner.base.names import known_name
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
 from planner.planning.job.at_tip import joints_of
-from planner.report.colours import COLOURS
 from planner.report.export import check_places, write_plan
 from planner.report.figure import (
+    COLOURS,
     FEED,
     QUANTITIES,
     MotionColumns,

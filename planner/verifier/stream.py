@@ -127,16 +127,10 @@ class Watch:
         self._take_feeds(t, position, velocity, skip, place)
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
-        block = SampleBlock(
-            t=t,
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=jerk,
-            piece=place.piece,
-            skip=skip,
-            travelled=self._travelled,
-        )
+        # by columns: the worst of each is looked for
+        of_axes = map(np.asfortranarray, (position, velocity, acceleration, jerk))
+        columns = dict(zip(COLUMNS[1:], of_axes, strict=True))
+        block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
         look_at_axes(block, limits, seen.worst)
         look_at_tangential(block, limits, seen.worst)
         look_at_user_limits(block, limits, seen.worst, GROUPS * len(limits.axes) + ROWS_ALONE)

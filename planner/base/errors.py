@@ -1,15 +1,31 @@
 """Kinds of failure, and how they are reported.
 
-There are three kinds of failure:
+There are three:
 
 * bad input            an `InputError`, raised before any work: file, line and column, what was found and what is allowed;
 * an unsolved problem  a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
 * a bug of ours        an assertion or an uncaught exception.
+
+Packages that only some solvers and outputs need are imported when they are needed, and asked for by name where they are missing.
 """
 
 from __future__ import annotations
 
+import importlib
 import unicodedata
+from typing import Any
+
+
+def import_needed(package: str, user: str) -> Any:
+    """The package, imported; `user` is what needs it. Raises InputError with the command that installs it."""
+    try:
+        return importlib.import_module(package)
+    except ModuleNotFoundError as fault:
+        if fault.name != package.partition(".")[0]:
+            raise  # it is there, and something that it needs is not
+        raise InputError(
+            f"{user} needs the package {fault.name}, which is not installed: pip install {fault.name}"
+        ) from None
 
 
 class PlannerError(Exception):

@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.packages import import_needed
+from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 

@@ -40,7 +40,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from planner.base.packages import import_needed
+from planner.base.errors import import_needed
 from planner.joint.guess import Guess
 from planner.joint.motion import steps_of
 from planner.joint.numbers import acceleration_along, step_numbers

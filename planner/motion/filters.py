@@ -29,7 +29,7 @@ from math import factorial
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 
 # Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this fraction of a period [-].
@@ -154,33 +154,3 @@ def damped_period(frequency: float, damping: float) -> float:
 def _multiple(T: FloatArray, period: float) -> FloatArray:
     """T (S,) [s] rounded up to whole periods, one at least."""
     return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
-
-
-def residual_vibration(
-    t: FloatArray, acceleration: FloatArray, frequency: float, damping: float
-) -> FloatArray:
-    """Amplitude (A,) [mm] at which a mode still rings when the motion is over.
-
-    Each axis carries an oscillator x'' + 2 z w x' + w^2 x = -a(t), at rest before; a is straight between its samples. By Duhamel's
-    integral the state at the end is that of the pole, and its envelope |pole integral| / w_d.
-
-    t            : (T,) [s], ascending
-    acceleration : (T, A) [mm/s2]
-    frequency    : of the undamped mode [Hz]
-    damping      : ratio z, 0 <= z < 1
-    """
-    w = 2.0 * np.pi * frequency
-    damped = w * np.sqrt(1.0 - damping**2)
-    pole = -damping * w + 1j * damped
-    h = np.diff(t)[:, None]
-    z = pole * h
-    small = np.abs(z) < 1e-3
-    safe = np.where(small, 1.0, z)
-    grow = np.exp(z)
-    # integrals of exp(z (1 - x)) and x exp(z (1 - x)) over [0, 1]
-    phi1 = np.where(small, 1 + z / 2 + z**2 / 6 + z**3 / 24, (grow - 1) / safe)
-    phi2 = np.where(small, 0.5 + z / 6 + z**2 / 24 + z**3 / 120, (grow - 1 - safe) / safe**2)
-    rise = np.diff(acceleration, axis=0)
-    terms = h * (acceleration[:-1] * phi1 + rise * phi2)
-    after: Array = np.exp(pole * (t[-1] - t[1:]))[:, None]
-    return np.abs((after * terms).sum(axis=0)) / damped

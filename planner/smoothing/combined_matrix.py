@@ -41,7 +41,7 @@ class Balls(NamedTuple):
 
 
 class SpanBlocks(NamedTuple):
-    """The sum over one span, and where it goes in the banded matrix (banded.py) from the first row of the span on."""
+    """The sum over one span, and where it goes in the banded matrix (interior_point.py) from the first row of the span on."""
 
     values: FloatArray  # (pairs of columns, 6, 8) one after the other, the last two columns of each 0
     source: Array  # (T,) places in `values`

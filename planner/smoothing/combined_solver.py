@@ -23,10 +23,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import ORDER
 from planner.smoothing.combined_matrix import CONTRACT, SQUARE, STRIDE, Balls
 from planner.smoothing.combined_rows import LEAST_SLACK, Rows, first_state, move, predict, weigh
+from planner.smoothing.interior_point import factorise, solve
 from planner.smoothing.sites import Sites
 
 
@@ -167,7 +167,7 @@ THETA = 0.1  # what theta may be from its optimum, about [-], for the gap that t
 class CombinedProblem(NamedTuple):
     """A window's problem over n control points (module text)."""
 
-    H: FloatArray  # (n (A+1), 6 (A+1)) banded (banded.py)
+    H: FloatArray  # (n (A+1), 6 (A+1)) banded (interior_point.py)
     linear: FloatArray  # (n, A+1)
     free: Array  # (n, A+1) False for what stays
     rows: Rows

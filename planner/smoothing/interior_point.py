@@ -14,6 +14,9 @@ method ends early, the path is less smooth than it could be and no less inside.
 
 Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its iterates may be outside,
 and it cannot be called from a compiled kernel.
+
+Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the diagonal first: band[i, d]
+is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that a compiler makes vector instructions of them.
 """
 
 from __future__ import annotations
@@ -24,9 +27,45 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import ORDER
 from planner.smoothing.sites import Sites, site_distance
+
+
+@njit(cache=True, error_model="numpy")
+def factorise(band):
+    """band (n, width) becomes its factor R with R'R = band, the diagonal inverted; False where it is not positive definite."""
+    n, width = band.shape
+    row = np.zeros(2 * width)  # the second half stays 0
+    for i in range(n):
+        if not band[i, 0] > 0.0:
+            return False
+        inverse = 1.0 / np.sqrt(band[i, 0])
+        band[i, 0] = inverse
+        for d in range(1, width):
+            band[i, d] *= inverse
+            row[d] = band[i, d]
+        for d in range(1, min(width, n - i)):
+            value = row[d]
+            for k in range(width):
+                band[i + d, k] -= value * row[d + k]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def solve(band, x):
+    """x (n,) becomes the solution for the right-hand side x, with the factor of `factorise`."""
+    n, width = band.shape
+    for i in range(n):
+        x[i] *= band[i, 0]
+        value = x[i]
+        for d in range(1, min(width, n - i)):
+            x[i + d] -= band[i, d] * value
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for d in range(1, min(width, n - i)):
+            total -= band[i, d] * x[i + d]
+        x[i] = total * band[i, 0]
+
 
 TO_BOUNDARY = 0.95  # of the way to the nearest bound that a step may go [-]: usual are 0.9 to 0.995
 CENTRING = 3.0  # a short step is followed by one towards the middle, with up to so much of the gap [-]; 0 takes twice the iterations
@@ -95,7 +134,7 @@ def _objective(problem, c, gradient):
 
 @njit(cache=True, error_model="numpy")
 def _assemble(problem, z, g, e, band):
-    """The Newton matrix (banded.py), with unit rows for control points that stay."""
+    """The Newton matrix (banded), with unit rows for control points that stay."""
     H, free = problem.H, problem.free
     first, _, values, _, along, slide, radius = problem.sites
     axes, n, width = H.shape

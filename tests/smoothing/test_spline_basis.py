@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
-from planner.smoothing.banded import factorise, solve
 from planner.smoothing.basis import DEGREE, ORDER, clamped, derivatives, span_basis
+from planner.smoothing.interior_point import factorise, solve
 
 seeds = st.integers(0, 10**6)
 

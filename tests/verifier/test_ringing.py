@@ -8,12 +8,12 @@ import time
 
 import numpy as np
 import pytest
+from oracles import residual_vibration
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from benchmarks.jobs import problems
 from planner.machine import Mode
-from planner.motion.filters import residual_vibration
 from planner.motion.trajectory import Trajectory
 from planner.planning.methods.registry import plan
 from planner.verifier.ringing import ringing_of

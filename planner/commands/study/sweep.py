@@ -22,8 +22,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from planner.base.errors import InputError, NotSolvedError
-from planner.base.packages import import_needed
+from planner.base.errors import InputError, NotSolvedError, import_needed
 from planner.base.threads import threads
 from planner.commands.study.points import FAILED, FIGURE, PASSED, TABLE, SweepFolder, planned_point
 from planner.commands.study.settings import Setting, StudiedJob, Varied, grid_of

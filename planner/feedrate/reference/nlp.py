@@ -48,7 +48,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.packages import import_needed
+from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.exact_motion import polished

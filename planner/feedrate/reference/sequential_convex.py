@@ -57,7 +57,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.packages import import_needed
+from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.near_rest import NODES, WEIGHTS, IntervalShape, beside_rest

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.errors import InputError
-from planner.base.packages import import_needed
+from planner.base.errors import InputError, import_needed
 from planner.base.series import Series
 from planner.machine import ROTARY_AXES
 from planner.machine.kinematics.chain import LINEAR

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import residual_vibration
 
 from planner.motion.filters import (
     Filters,
     damped_period,
     lengths_from_limits,
-    residual_vibration,
     suppressing,
 )
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracles import residual_vibration
 
 from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.machine import Mode
-from planner.motion.filters import damped_period, residual_vibration
+from planner.motion.filters import damped_period
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program
 from planner.planning.methods.fir import FirMethod

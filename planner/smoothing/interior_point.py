@@ -15,8 +15,8 @@ method ends early, the path is less smooth than it could be and no less inside.
 Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its iterates may be outside,
 and it cannot be called from a compiled kernel.
 
-Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the diagonal first: band[i, d]
-is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that a compiler makes vector instructions of them.
+Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the diagonal first:
+band[i, d] is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that a compiler makes vector instructions.
 """
 
 from __future__ import annotations

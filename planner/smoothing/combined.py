@@ -48,6 +48,7 @@ from planner.smoothing.sites import (
     run_control,
     run_knots,
     run_sites,
+    sites_between,
     with_radius,
 )
 from planner.smoothing.windows import TIGHTENED, in_ranges, in_shares, next_window
@@ -108,10 +109,8 @@ def _sites_of_window(sites, lo, hi, spans):
     """The sites that the control points lo .. hi - 1 move, their spans counted from the control point lo - DEGREE, or 0."""
     a = first_not_before(sites.span, max(lo - DEGREE, 0))
     b = first_not_before(sites.span, min(hi, spans))
-    return Sites(
-        sites.span[a:b] - max(lo - DEGREE, 0), sites.place[a:b], sites.weights[a:b], sites.target[a:b], sites.along[a:b],
-        sites.slide[a:b], sites.radius[a:b],
-    )  # fmt: skip
+    span, place, weights, target, along, slide, radius = sites_between(sites, a, b)
+    return Sites(span - max(lo - DEGREE, 0), place, weights, target, along, slide, radius)
 
 
 @njit(cache=True, error_model="numpy")

@@ -251,9 +251,7 @@ def minimise_in_corridor(problem, start, accuracy, iterations):
         for site in range(m):
             complementarity += z[site] * -g[site]
         residual = 0.0
-        for i in range(n):
-            for k in range(axes):
-                step_1[i, k] = gradient[i, k]
+        step_1[:] = gradient
         _add_gradient(sites, e, z, step_1)
         for i in range(n):
             if free[i]:
@@ -283,9 +281,7 @@ def minimise_in_corridor(problem, start, accuracy, iterations):
         # the cube of what the predictor leaves of the gap (Mehrotra 1992)
         mu = max((after / complementarity) ** 3, CENTRING * (1.0 - went)) * complementarity / m
         mu = max(mu, AIM * small / m)
-        for i in range(n):
-            for k in range(axes):
-                step[i, k] = -gradient[i, k]
+        step[:] = -gradient
         for site in range(m):
             # second order: z (g + slope + curvature) with the predictor's products
             dz = -z[site] + z[site] / -g[site] * slope_1[site]
@@ -305,11 +301,8 @@ def minimise_in_corridor(problem, start, accuracy, iterations):
             if dz < 0.0:
                 dual = min(dual, TO_BOUNDARY * -z[site] / dz)
             slope_1[site] = dz
-        for i in range(n):
-            for k in range(axes):
-                c[i, k] += longest * step[i, k]
-        for site in range(m):
-            z[site] += dual * slope_1[site]
+        c += longest * step
+        z += dual * slope_1
         _constraint(sites, c, g, e)
         if longest < STALLED:
             return Optimum(c, z, gap, iteration)

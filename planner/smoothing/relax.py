@@ -96,22 +96,12 @@ class Run(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _relaxed_window(window, run, control, radius, goal, gap):
     """The optimum of a window's control points while the others stay: control points (hi - lo, A), multipliers (site_end - site,)."""
-    (n, axes), (lo, hi, j0, j1), sites = control.shape, window, run.sites
+    n, (lo, hi, j0, j1), sites = len(control), window, run.sites
     a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
-    origin = control[a].copy()
-    part, free = np.empty((axes, b - a, ORDER)), np.zeros(b - a, np.bool_)
-    near, target = np.empty((b - a, axes)), np.empty((j1 - j0, axes))  # from `origin`
-    for i in range(a, b):
-        free[i - a] = lo <= i < hi
-        for k in range(axes):
-            near[i - a, k] = control[i, k] - origin[k]
-            for d in range(ORDER):
-                part[k, i - a, d] = run.H[k, i, d]
-    span = np.empty(j1 - j0, np.int64)
-    for j in range(j0, j1):
-        span[j - j0] = sites.span[j] - a
-        for k in range(axes):
-            target[j - j0, k] = sites.target[j, k] - origin[k]
+    origin, free = control[a].copy(), np.zeros(b - a, np.bool_)
+    free[lo - a : hi - a] = True
+    part, near = run.H[:, a:b].copy(), control[a:b] - origin
+    span, target = sites.span[j0:j1] - a, sites.target[j0:j1] - origin
     energy = 0.0
     if goal.relative > 0.0:
         last = min(hi, len(run.knots.breaks) - 1)
@@ -121,11 +111,7 @@ def _relaxed_window(window, run, control, radius, goal, gap):
     )  # fmt: skip
     accuracy = Accuracy(energy, energy + FIRST_GAP * gap, max(gap, STRAIGHT * energy), goal.relative)
     found = minimise_in_corridor(Problem(part, run.linear[a:b], free, around), near, accuracy, ITERATIONS)
-    moved = found.control[lo - a : hi - a].copy()
-    for i in range(hi - lo):
-        for k in range(axes):
-            moved[i, k] += origin[k]
-    return moved, found.multiplier
+    return found.control[lo - a : hi - a] + origin, found.multiplier
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -201,9 +187,7 @@ def _begin(q, corridor, splines, runs, used, goal, inside):
     """Run q, and its control points (n, A) to begin with: those that it has, or a little further inside."""
     run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
     if inside:
-        for i in range(len(start)):
-            for k in range(start.shape[1]):
-                start[i, k] += (1.0 - AGAIN) * (run.middle[i, k] - start[i, k])
+        start += (1.0 - AGAIN) * (run.middle - start)
     return run, start
 
 

@@ -54,17 +54,7 @@ def run_control(splines, q):
 @njit(cache=True, error_model="numpy")
 def run_sites(splines, q):
     """The sites of run q."""
-    a, b = splines.site_first[q], splines.site_first[q + 1]
-    sites = splines.sites
-    return Sites(
-        sites.span[a:b],
-        sites.place[a:b],
-        sites.weights[a:b],
-        sites.target[a:b],
-        sites.along[a:b],
-        sites.slide[a:b],
-        sites.radius[a:b],
-    )
+    return sites_between(splines.sites, splines.site_first[q], splines.site_first[q + 1])
 
 
 # These constants decide how much the certificate has to ask for later.
@@ -113,6 +103,13 @@ def used_share(sites, control):
     for j in range(len(used)):
         used[j] = site_distance(sites, j, control, 0, e) / sites.radius[j]
     return used
+
+
+@njit(cache=True, error_model="numpy")
+def sites_between(sites, a, b):
+    """The sites a .. b - 1."""
+    span, place, weights, target, along, slide, radius = sites
+    return Sites(span[a:b], place[a:b], weights[a:b], target[a:b], along[a:b], slide[a:b], radius[a:b])
 
 
 @njit(cache=True, error_model="numpy")

@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     from planner.nc.program import Program
     from planner.nc.reader import read_program
     from planner.nc.reading import Reading
-    from planner.planning.job.method import Method
     from planner.planning.job.plan import Plan
     from planner.planning.job.trace import Trace
     from planner.planning.methods.listing import MethodNames
     from planner.planning.methods.registry import plan
+    from planner.planning.page import Method
     from planner.report.compare import compare
     from planner.report.interactive.points import path, verify
     from planner.verifier import Verdict
@@ -62,7 +62,7 @@ _HOME = {
     "JointLimit": "planner.machine.user_limit",
     "PathLimit": "planner.machine.user_limit",
     "PolynomialCorner": "planner.corners.own",
-    "Method": "planner.planning.job.method",
+    "Method": "planner.planning.page",
     "methods": "planner.planning.methods.listing",
     "path": "planner.report.interactive.points",
     "verify": "planner.report.interactive.points",

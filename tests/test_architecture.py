@@ -187,11 +187,11 @@ def test_a_plan_loads_only_what_it_uses(tmp_path: Path) -> None:
     planner.plan(job, "mill")  # its kernels are on the disk now
     in_python = f"import planner; planner.plan({str(job)!r}, 'mill')"
     loaded = _loaded(in_python)
-    assert {"planner.planning.optimal.loop", "numba"} <= loaded
+    assert {"planner.planning.page", "numba"} <= loaded
     assert loaded & NOT_OF_A_PLAN == set()
     options = ["plan", str(job), "--quiet", "-o", str(tmp_path / "out")]
     loaded = _loaded(f"from planner.cli import app; app({options}, standalone_mode=False)")
-    assert {"planner.planning.optimal.loop", "numba"} | OF_THE_FILES <= loaded
+    assert {"planner.planning.page", "numba"} | OF_THE_FILES <= loaded
     assert loaded & NOT_OF_A_PLAN == OF_THE_FILES
 
 

@@ -30,11 +30,11 @@ from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
 from planner.motion.trajectory import Trajectory
-from planner.planning.job.method import Method
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.second_order import SecondOrderMethod
 from planner.planning.methods.stop import StopMethod
+from planner.planning.page import Method
 from planner.report.trajectory_reader import read_trajectory
 from planner.verifier import Given, Kind, Verdict, verify
 

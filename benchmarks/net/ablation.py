@@ -1,4 +1,4 @@
-"""What the default loses without each of its retries, rivals, rounds and second starts.
+"""What the default loses without each of its retries, those of the table of planner/planning/attempts.py.
 
     python -m benchmarks.net.ablation ROWS --net NET [--without NAME] [--most 60]     plan without one of them, or all in turn
     python -m benchmarks.net.ablation ROWS --net NET --report                         into results/ablation.json and .md
@@ -10,13 +10,11 @@ whose trace it shows; no more than `--most` of them, evenly spread. Rows are add
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -26,155 +24,98 @@ from benchmarks.net.golden_net import SAME, Row, jobs, read, row_of
 from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
 from planner.delivery import mending
-from planner.feedrate.jerk import window
-from planner.joint import own
-from planner.planning.job import method
-from planner.planning.methods import at_once, optimal
+from planner.planning import attempts, joint_search
+from planner.planning.attempt import Attempt
+from planner.planning.attempts import RETRIES
+from planner.planning.job import less_tolerance, runs_alone
+from planner.planning.methods import optimal, second_order
 from planner.planning.methods.optimal import OptimalMethod
-from planner.planning.optimal import behind_filters, geometry, loop, shaped, tighten
-from planner.planning.optimal.effort import EFFORTS
-from planner.smoothing import initial, relax
+from planner.planning.optimal import behind_filters, geometry, path_motion, shaped, tighten
 
 Switch = Callable[[], None]
-Fires = Callable[[Row], bool]
-ANY_TENTH = 10
+NONE = Attempt("none", lambda *_: False, lambda job, settings, tried: tried)
 
 
 def _set(owner: Any, name: str, value: Any) -> Switch:
     return lambda: setattr(owner, name, value)
 
 
-def _step(*names: str, least: int = 1) -> Fires:
-    """Whether steps whose names begin so were taken so often."""
-    return lambda row: sum(n for step, n in row.get("steps", {}).items() if step.startswith(names)) >= least
+def _no_attempt(name: str) -> Switch:
+    """Without an attempt, in all lists of them."""
 
-
-def _round(name: str, number: int) -> Fires:
-    return lambda row: row.get("steps", {}).get(name, 0) >= number
-
-
-def _all(row: Row) -> bool:
-    return True
-
-
-def _searches(row: Row) -> bool:
-    return row.get("steps", {}).get("search", 0) > 0
-
-
-def _starts(count: int) -> Switch:
     def switch() -> None:
-        inner = window.ScaledWindow._starts
-        window.ScaledWindow._starts = lambda self, *way: islice(inner(self, *way), count)  # type: ignore[method-assign]
+        for owner, listed in (
+            (attempts, "ALONE"),
+            (attempts, "ON_PATH"),
+            (optimal, "ATTEMPTS"),
+            (second_order, "ON_PATH"),
+        ):
+            kept = tuple(NONE if one.name == name else one for one in getattr(owner, listed))
+            setattr(owner, listed, kept)
 
     return switch
-
-
-def _fallback(kind: str) -> Switch:
-    """What is planned where the search from the first motion does not take all of a job."""
-
-    def planned(job: Any, settings: Any, once: Any) -> Any:
-        from planner.planning.methods.from_plan import freed
-
-        again = job.afresh()
-        if kind == "path":
-            return loop.fastest_plan(again, settings)
-        rounds = 0 if kind == "first splines" else settings.rounds
-        effort = EFFORTS["quick"] if kind == "first splines" else settings.effort
-        start = loop.fastest_plan(again, dataclasses.replace(settings, effort=effort, rounds=rounds))
-        made = freed(again, start, settings.effort.search).plan
-        return made if once is None else method.faster(made, once)
-
-    return _set(optimal, "_from_plans", planned)
 
 
 def _no_corners(rounded: Any, best: Any, *more: Any) -> Any:
     return best, np.zeros(0, dtype=np.int64)
 
 
-def _one_search() -> None:
-    usual = EFFORTS["normal"]
-    EFFORTS["normal"] = dataclasses.replace(usual, search=dataclasses.replace(usual.search, finer=()))
+def _not_in_long_steps() -> None:
+    inner = joint_search.joint_plan
+
+    def joint_plan(job: Any, settings: Any, planned: Any, search: Any, alone: Any, motion: Any = None) -> Any:
+        again = motion is None and not search.finer and settings.effort.search.finer
+        return joint_search.Joint(None, 0) if again else inner(job, settings, planned, search, alone, motion)
+
+    joint_search.joint_plan = joint_plan
 
 
-# What it is called; in which jobs it shows; how it is switched off.
-SWITCHES: dict[str, tuple[Fires, Switch]] = {
-    "search on reshaped splines where small paths double back": (
-        _step("search", least=2),
-        _set(optimal, "_doubles_back", lambda job: False),
-    ),
-    "fallback: start on reshaped splines": (_step("reshape"), _fallback("first splines")),
-    "fallback: start on first splines": (_step("search", least=2), _fallback("reshaped")),
-    "fallback: any search": (_step("search", least=2), _fallback("path")),
-    "fallback: runs planned by themselves": (
-        lambda row: row.get("steps", {}).get("plan optimal auto", 0) > 1,
-        _set(at_once, "ALONE_MOST", 0),
-    ),
-    "search: second verdict": (_searches, _set(at_once, "VERDICTS", 1)),
-    "search: finer steps after long ones": (_searches, _one_search),
-    "search: second and third tuning of a window": (_searches, _set(own, "TRIES", own.TRIES[:1])),
-    "search: normal acceleration tightened": (_searches, _set(own, "TIGHTENED", 1)),
-    "search: division of windows": (_searches, _set(own, "LEAST", 10**9)),
-    "search: start made nearer for finer steps": (_searches, _set(own, "NEAR", own.FAR)),
-    "corners between full stops": (_step("bound on corners"), _set(loop, "with_corners", _no_corners)),
-    "fir corners as a whole plan": (
-        _step("bound on corners fir", "compare optimal fir"),
-        _set(loop, "fir_corners_may_be_faster", lambda *_: False),
-    ),
-    "runs alone where the verdict finds something": (
-        _step("runs alone"),
-        _set(method.Method, "_runs_alone", lambda *_: None),
-    ),
-    "less for the period": (_step("less for the period"), _set(method, "PERIOD_ROUNDS", 0)),
-    "less for the period: rounds after 2": (
-        _round("less for the period", 3),
-        _set(method, "PERIOD_ROUNDS", 2),
-    ),
-    "less for the period: rounds after 4": (
-        _round("less for the period", 5),
-        _set(method, "PERIOD_ROUNDS", 4),
-    ),
-    "shares of the tolerance behind filters": (_step("share of tolerance"), _set(OptimalMethod, "ways", ())),
-    "shares of the tolerance: 0.1": (_step("share of tolerance"), _set(OptimalMethod, "ways", ((0.5, 1.0),))),
-    "slower in places: rounds after 2": (_round("slower in places", 3), _set(mending, "ROUNDS", 2)),
-    "slower in places": (_step("slower in places"), _set(mending, "ROUNDS", 0)),
-    "tighten": (_step("tighten"), _set(tighten, "TIGHTENING_ROUNDS", 0)),
-    "stops for splines": (_step("splines"), _set(geometry, "STOP_ROUNDS", 0)),
-    "stops for splines: second round": (_step("splines", least=2), _set(geometry, "STOP_ROUNDS", 1)),
-    "knots made denser": (_all, _set(initial, "DENSER_MAX", 0)),
-    "sites tightened more than twice": (_all, _set(relax, "ROUNDS", 3)),
-    "second start of a feed window": (_all, _starts(1)),
-    "third start of a feed window": (_all, _starts(2)),
-    "feed at corners behind filters": (_step("filters"), _set(behind_filters, "ROUNDS", 1)),
-    "feed at corners behind filters: rounds after 5": (
-        _round("filters", 6),
-        _set(behind_filters, "ROUNDS", 5),
-    ),
-    "candidates behind a shaper but two": (
-        _step("shaped"),
-        _set(shaped.shaped, "__defaults__", ((shaped.CANDIDATES[0], shaped.CANDIDATES[2]),)),
-    ),
+def _never_alone(*_: Any, **__: Any) -> None:
+    return None
+
+
+# How each of `RETRIES` is switched off, by its first step.
+SWITCHES: dict[str, Switch] = {
+    "search": _not_in_long_steps,
+    "search, reshaped splines": _no_attempt("search, reshaped splines"),
+    "runs alone": _set(runs_alone, "VERDICTS", 0),
+    "closed form": _no_attempt("closed form"),
+    "splines": _set(geometry, "STOP_ROUNDS", 0),
+    "corners": _set(path_motion, "with_corners", _no_corners),
+    "tighten": _set(tighten, "TIGHTENING_ROUNDS", 0),
+    "filters": _set(behind_filters, "ROUNDS", 1),
+    "share of tolerance": _set(OptimalMethod, "ways", ()),
+    "less for the period": _set(less_tolerance, "PERIOD_ROUNDS", 0),
+    "slower in places": _set(mending, "ROUNDS", 0),
+    "shaped": _set(shaped.shaped, "__defaults__", (shaped.CANDIDATES[:1],)),
 }
 
 
-def chosen_jobs(net: dict[str, Row], fires: Fires, most: int) -> list[str]:
+def fires(name: str, row: Row) -> bool:
+    """Whether a plan took a step of the retry."""
+    steps = next(retry.steps for retry in RETRIES if retry.steps[0] == name)
+    least = 2 if name == "search" else 1  # one search is no retry
+    return sum(n for step, n in row.get("steps", {}).items() if step.startswith(steps)) >= least
+
+
+def chosen_jobs(net: dict[str, Row], name: str, most: int) -> list[str]:
     """The names of the jobs on which a switch is tried: of method `optimal`, evenly spread."""
     ours = [
         row
         for row in net.values()
         if row["outcome"] in ("passed", "failed") and row["solver"].startswith("optimal ")
     ]
-    names = [row["name"] for row in ours if fires(row)]
+    names = [row["name"] for row in ours if fires(name, row)]
     at = np.unique(np.linspace(0, len(names) - 1, min(most, len(names))).astype(int))
     return [names[k] for k in at] if names else []
 
 
 def rows_without(name: str, net: dict[str, Row], known: set[str], most: int, limit: float) -> Iterator[Row]:
     """Rows of the jobs without one of the switches."""
-    fires, switch = SWITCHES[name]
-    wanted = set(chosen_jobs(net, fires, most)) - known
+    wanted = set(chosen_jobs(net, name, most)) - known
     if not wanted:
         return
-    switch()
+    SWITCHES[name]()
     for job, planned in jobs(10**6):
         if job in wanted:
             yield {"without": name} | row_of(job, planned, limit)
@@ -191,7 +132,7 @@ def report(net: dict[str, Row], rows: list[Row]) -> tuple[dict[str, Any], str]:
         for row in net.values()
         if row["outcome"] in ("passed", "failed") and row["solver"].startswith("optimal ")
     ]
-    for name, (fires, _) in SWITCHES.items():
+    for name in SWITCHES:
         pairs = [(net[row["name"]], row) for row in rows if row["without"] == name and row["name"] in net]
         pairs = [(a, b) for a, b in pairs if "too long" not in (a["outcome"], b["outcome"])]
         if not pairs:
@@ -199,7 +140,7 @@ def report(net: dict[str, Row], rows: list[Row]) -> tuple[dict[str, Any], str]:
         timed = [b["time"] / a["time"] - 1.0 for a, b in pairs if a["outcome"] == b["outcome"] == "passed"]
         longer = np.array(timed or [0.0])
         entry = {
-            "fires": sum(fires(row) for row in ours),
+            "fires": sum(fires(name, row) for row in ours),
             "of": len(ours),
             "jobs": len(pairs),
             "changed": int((np.abs(longer) > SAME).sum()),

@@ -25,13 +25,13 @@ from planner.feedrate.sampling.samples import sample_path
 from planner.machine import Machine
 from planner.nc.program import Program
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.geometry import splined_with_stops
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import ThirdOrder
 from planner.planning.optimal.result import plan_of_solution
 from planner.planning.optimal.tighten import within_limits
+from planner.planning.page import Method
 from planner.smoothing.spline_path import with_spline
 
 RESOLUTION = 2e-3  # of F = 1: the coarsest final grid of small jobs is 8e-3, the finest 2e-4 (planning/optimal/effort.py)

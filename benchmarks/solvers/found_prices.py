@@ -43,7 +43,7 @@ WORTH = 3e-4  # by how much a limit's 2 % have to change the time to be planned 
 RIGHT, NOISE = 0.1, 2e-4  # how far a forecast may be off, as a share of what was found, and of the time [-]
 CORNERS = 2  # dearest ones
 RANDOM = 3  # job of jobs/random_lines.py
-METHOD = TubeMethod(starts=(OptimalMethod(effort="quick"),))
+METHOD = TubeMethod(start=OptimalMethod(effort="quick"))
 
 
 def jobs() -> dict[str, Callable[[], tuple[Program, Machine]]]:

@@ -93,7 +93,7 @@ def measured(program: Program, machine: Machine) -> dict[str, Any]:
     for name, start in STARTS.items():
         began = time.process_time()
         try:
-            plan = TubeMethod(starts=(start,)).plan(program, machine)
+            plan = TubeMethod(start=start).plan(program, machine)
         except PlannerError as fault:
             row[name] = {"sentence": str(fault)}
             continue

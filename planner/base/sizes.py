@@ -95,10 +95,10 @@ class Sizes:
     small_grids: tuple[float, float, float] = _size(EFFORT, (1_500, 4_000, 40_000), (15, 40, 400))
     # more have a coarser grid, which leaves 0.3 to 0.5 % (feedrate/sampling/samples.py)
     corners_finely: int = _size(EFFORT, 50_000, 2)
-    searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (planning/methods/optimal.py)
+    searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (planning/attempts.py)
     searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: up to 2e-3 (planning/optimal/effort.py)
     searched_most: int = _size(EFFORT, 1_000_000, 200)  # steps: what takes a minute or two on two processors
-    # points of a plan, and of each corner shape: about as many as get the finest grid
+    # blocks of a job beside whose motion on a path method kinematic is planned
     rivals_planned: int = _size(EFFORT, 40_000, 100)
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
     # points: beyond, only where it is worth solving again (planning/optimal/tighten.py)

@@ -48,10 +48,8 @@ MISSED_MOST = max(missed for _, missed in TRIES)
 # Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
 USUAL, NEARLY = 25.0, 0.9
 QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
-# Complementarity of the start, share of the time, and its slacks at least [-]: of any motion, and of one that is an optimum of longer
-# steps. From there a relief of 2,000 blocks takes 714 iterations with the second, 832 with the first, chips 308 and 837; with 1e-3
-# and 0.01 693 and 364.
-FAR, NEAR = (0.3, 0.05), (0.01, 0.01)
+# Complementarity of the start, share of the time, and its slacks at least [-].
+START = (0.3, 0.05)
 # Normal acceleration and the state's limits are watched in two places of a step only. Where one is exceeded between them, it is lowered
 # by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
@@ -72,14 +70,12 @@ class TubeOwn:
     progress : called with the share of the steps that are done [-]
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: 31
                runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times the iterations
-    near     : whether the guess is an optimum of longer steps (refine.py)
     """
 
     gap: float = 1e-5
     divide: bool = True
     progress: Callable[[float], None] | None = None
     least: float = 1.0
-    near: bool = False
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
@@ -249,7 +245,6 @@ class _Search:
 
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
-        first = NEAR if self.settings.near else FAR
         normal = np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any()
         watched = bool(normal or len(self._keeps.state))
         for prox, missed in tries:
@@ -258,7 +253,7 @@ class _Search:
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least, *first)
+                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least, *START)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
                 )

@@ -86,7 +86,7 @@ def searched_again(run: TubeRun, found: TubeSolution, finer: Divided, solver: Tu
 
     finer : that motion, divided
     """
-    again = replace(solver, near=True, divide=True).solve(run, finer.guess)
+    again = replace(solver, divide=True).solve(run, finer.guess)
     if again.steps is None:
         return None
     price = again.price

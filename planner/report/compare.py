@@ -24,9 +24,9 @@ from planner.report.summary import summary, verdict_summary
 
 if TYPE_CHECKING:
     from planner.machine.user_limit import OwnLimit
-    from planner.planning.job.method import Method
     from planner.planning.job.plan import Plan
     from planner.planning.job.stages import Progress
+    from planner.planning.page import Method
     from planner.report.html.data import Samples
     from planner.verifier import Verdict
 # Stages of a plan that cost every method the same per second of motion; the others are its planning time.

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.motion.timing import MotionInTime
-from planner.motion.trajectory import Trajectory
-from planner.verifier import Verdict
 
 SAVED_MIN = 1e-6  # what saves less is not worth telling [s]
 SHARE_DIGITS = 4  # of a share of the cycle time, in every output
@@ -173,47 +168,3 @@ class PriceList:
         """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""
         worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
         return sorted(worth, key=lambda entry: -entry[1])
-
-
-Pricing = Callable[[], PriceList | None]  # finds a plan's prices, once the plan is the one that is taken
-
-
-class Delivered(NamedTuple):
-    """A motion that was sampled and judged.
-
-    trajectory : its samples
-    verdict    : on them and on the motion
-    motion     : with the standstills that the samples need
-    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that costs time; else None
-    """
-
-    trajectory: Trajectory
-    verdict: Verdict
-    motion: MotionInTime
-    slower: Delivered | None = None
-
-
-class Making(NamedTuple):
-    """What is known of a plan on its way, which may not be the one that is taken.
-
-    motion  : that of its trajectory
-    slower  : as in `Delivered`
-    pricing : finds its prices; None where they are there, or not to be had
-    """
-
-    motion: MotionInTime
-    slower: Delivered | None = None
-    pricing: Pricing | None = None
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Tables:
-    """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
-
-    rounded: CornerTable | None = None
-    grid: GridHistory | None = None
-    prices: PriceList | None = None
-    pricing: Pricing | None = None
-
-
-NO_TABLES = Tables()

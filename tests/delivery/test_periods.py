@@ -19,7 +19,7 @@ from planner.motion.trajectory import joined
 from planner.motion.vertex_times import passing_times, passing_times_of, standstills
 from planner.nc.reader import parse_program
 from planner.planning.job import job as jobs
-from planner.planning.job import method as job_method
+from planner.planning.job import less_tolerance
 from planner.planning.methods.fir import FirMethod
 from planner.planning.methods.registry import plan
 
@@ -180,7 +180,7 @@ def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged
 @pytest.mark.slow
 def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
-    monkeypatch.setattr(job_method, "PERIOD_ROUNDS", 0)
+    monkeypatch.setattr(less_tolerance, "PERIOD_ROUNDS", 0)
     monkeypatch.setattr(mending, "ROUNDS", 0)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="second-order").verdict.passed
     nothing = periods.Standing(np.empty(0), np.empty(0))

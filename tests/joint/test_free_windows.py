@@ -255,7 +255,7 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     monkeypatch.setattr(own, "JOIN_WITHIN", 10)
     start = OptimalMethod(corner="bezier")
     job = problems.pentagon(side=6.0)
-    made = TubeMethod(starts=(start,)).plan(job, MACHINE).require()
+    made = TubeMethod(start=start).plan(job, MACHINE).require()
     assert made.verdict.passed, made.verdict.faults
     assert own.KEPT in made.sentence
     assert made.trajectory.cycle_time < start.plan(job, MACHINE).trajectory.cycle_time
@@ -297,7 +297,7 @@ def test_scaled_lengths_and_limits_take_the_same_time(k):
     machine = problems.machine(velocity=100 * k, acceleration=2000 * k, jerk=2e5 * k, tolerance=0.05 * k)
     scaled = problems.polyline(k * np.array([[0, 0], [4, 0], [4, 4]]), feed=100.0 * k)
     times = [
-        TubeMethod(starts=(OptimalMethod(corner="bezier"),)).plan(job, limits).trajectory.cycle_time
+        TubeMethod(start=OptimalMethod(corner="bezier")).plan(job, limits).trajectory.cycle_time
         for job, limits in ((CORNER, MACHINE), (scaled, machine))
     ]
     assert times[1] == pytest.approx(times[0], rel=1e-5)
@@ -306,7 +306,7 @@ def test_scaled_lengths_and_limits_take_the_same_time(k):
 def test_backwards_takes_the_same_time():
     points = np.array([[0, 0], [4, 0], [5, 3], [1, 4]])
     times = [
-        TubeMethod(starts=(OptimalMethod(corner="bezier"),))
+        TubeMethod(start=OptimalMethod(corner="bezier"))
         .plan(problems.polyline(way), MACHINE)
         .trajectory.cycle_time
         for way in (points, points[::-1] - points[-1])

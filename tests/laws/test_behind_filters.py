@@ -21,7 +21,7 @@ from planner.planning.methods.fir_spline import FirSplineMethod
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.registry import plan
 from planner.planning.methods.tube import TubeMethod
-from planner.planning.optimal import loop as loop_module
+from planner.planning.optimal import path_motion
 
 FINE = 2e-4  # [s] of the convolution
 STEP = 2e-3  # [mm] between points of the path
@@ -139,7 +139,9 @@ def test_a_shorter_filter_costs_less():
 @pytest.mark.parametrize("method", ["stop", "optimal"])
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
-    monkeypatch.setattr(loop_module, "within_filters", lambda planned, motion, *rest: (planned, motion))
+    monkeypatch.setattr(
+        path_motion, "within_filters", lambda planned, motion, *rest: (planned, motion, False)
+    )
     monkeypatch.setattr(mending, "mended", lambda *of_motion: None)
     made = plan(CORNER, machine((0.05, 0.03)), method=method, corner=BEZIER.get(method))
     assert not made.verdict.passed

@@ -14,7 +14,7 @@ from planner.delivery import mending
 from planner.feedrate.constraints import chord_error, normal_limit
 from planner.machine import Machine
 from planner.nc.reader import parse_program
-from planner.planning.job import method as job_method
+from planner.planning.job import less_tolerance
 from planner.planning.methods.bezier import BezierMethod
 from planner.verifier import CornerCheck, verify
 from planner.verifier.pieces import RATIO_ROUNDING
@@ -156,7 +156,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     assert not any(
         laws_broken(repaired.corners)
     )  # planned again with less of the tolerance (delivery/periods.py)
-    monkeypatch.setattr(job_method, "PERIOD_ROUNDS", 0)
+    monkeypatch.setattr(less_tolerance, "PERIOD_ROUNDS", 0)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
     assert laws_broken(free.corners)[1]

@@ -22,7 +22,7 @@ PROGRAMS = {
 
 @cache
 def made(name: str) -> Plan:
-    return TubeMethod(starts=(OptimalMethod(corner="bezier"),)).plan(PROGRAMS[name], MACHINE).require()
+    return TubeMethod(start=OptimalMethod(corner="bezier")).plan(PROGRAMS[name], MACHINE).require()
 
 
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -30,7 +30,7 @@ START = OptimalMethod(corner="bezier")
 
 
 def made(program=PROGRAM, machine=MACHINE, tolerance=None, solver="own") -> Plan:
-    method = TubeMethod(starts=(START,), solver=solver)
+    method = TubeMethod(start=START, solver=solver)
     return planner.plan(program, machine, method=method, tolerance=tolerance).require()
 
 

@@ -12,8 +12,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.run_in import run_in
 from planner.machine import Fir, Mode
 from planner.nc.reader import parse_program
-from planner.planning.job.method import IN_STEP
-from planner.planning.methods.kinematic import KinematicMethod
+from planner.planning.job.choice import IN_STEP, thread_remedy
 from planner.planning.methods.registry import plan
 from planner.verifier.spindle_sync import room_of
 
@@ -137,4 +136,4 @@ def test_a_thread_that_cannot_be_kept_in_step_is_not_delivered():
 def test_the_remedy_is_never_the_method_that_was_asked() -> None:
     made = plan(parse_program(f"G21 G90 M3 S{60 * FEED}\nG33 Z-{LENGTH} K1\nM2"), M, method="kinematic")
     assert IN_STEP == ("optimal", "kinematic")
-    assert KinematicMethod()._in_step(made) == "plan threads by method optimal"
+    assert thread_remedy(made.method, shaped=False) == "plan threads by method optimal"

@@ -12,13 +12,12 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.machine.kinematics import Chain, at_tip, kinematics_of
+from planner.machine.kinematics import Chain, kinematics_of
 from planner.machine.kinematics.along_path import in_rad
-from planner.machine.kinematics.limits import WIDE, LinearJoint
+from planner.machine.kinematics.limits import LinearJoint
 from planner.motion.chain_setpoints import joint_setpoints
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
-from planner.nc.set_limits import limited
 from planner.planning.job.plan import Plan
 from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
 
@@ -81,20 +80,6 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
     if chain is None:
         return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
     return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how)  # type: ignore[arg-type]
-
-
-def planned(
-    program: Program, machine: Machine, plan_on: Callable[[Program, Machine], Plan], *, joints: bool = True
-) -> Plan:
-    """The plan of a program by `plan_on`, through the kinematics where its tool centre point is on.
-
-    joints : whether `plan_on` keeps limits of joints; otherwise it is given those of the axes for the tip's coordinates
-    """
-    machine = limited(machine, program.limits)
-    chain = chain_of(program, machine)
-    if chain is None:
-        return plan_on(program, machine)
-    return in_joints(plan_on(program, at_tip(machine, chain, wide=WIDE if joints else None)), machine, chain)
 
 
 def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:

@@ -81,4 +81,4 @@ def job_of_run(job: Job, first: int, last: int) -> Job:
 
     machine, judged_by = job.real
     judged = None if job.judged is None else (machine, part(judged_by))
-    return dataclasses.replace(job, toolpath=part(job.toolpath), judged=judged, noted=[], most=np.inf)
+    return dataclasses.replace(job, toolpath=part(job.toolpath), judged=judged, most=np.inf)

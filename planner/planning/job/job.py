@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from planner.base.arrays import Array
 from planner.base.names import OPTIMAL, SECOND_ORDER
 from planner.baselines.lookahead.rest_to_rest import stop_time
 from planner.corners.budget import filter_rate, with_less_normal
@@ -27,14 +28,15 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
+from planner.planning.job.made import NO_TABLES, Delivered, Making, Tables
 from planner.planning.job.notes import job_notes
 from planner.planning.job.plan import Plan
 from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Tell
-from planner.sensitivity.records import NO_TABLES, Delivered, GridHistory, Making, Tables
+from planner.sensitivity.records import GridHistory
 from planner.verifier import OF_CHORDS, verify
 
-FILTERS = "filters"
+NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
 # A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this share of its time [-].
 CHEAP = 1e-4
 # A motion that turns in less time than the filters are long is nearer to its path than the closed form says. Twice its acceleration is
@@ -52,20 +54,16 @@ class Job:
     toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones (`with_share`,
                 delivery/periods.py)
     stages    : the clock
-    noted     : what the method has noted so far (`note`)
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
     most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
-    slowed_by : what made one of the motions slower than its limits did, noted as it happens: `FILTERS` or nothing
     """
 
     program: Program
     machine: Machine
     toolpath: Toolpath
     stages: Stages
-    noted: list[str] = field(default_factory=list)
     judged: tuple[Machine, Toolpath] | None = None
     most: float = np.inf
-    slowed_by: set[str] = field(default_factory=set)
 
     @property
     def real(self) -> tuple[Machine, Toolpath]:
@@ -99,8 +97,15 @@ class Job:
             machine=planned,
             toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
             judged=(machine, toolpath),
-            noted=[],
         )
+
+    def faster_than(self, time: float) -> Job:
+        """The job, of which only motions are asked for that take less time [s]."""
+        return dataclasses.replace(self, most=min(self.most, time))
+
+    def with_own_clock(self) -> Job:
+        """The job for a plan inside the plan, whose progress is not told."""
+        return dataclasses.replace(self, stages=self.stages.own_clock())
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
@@ -110,17 +115,6 @@ class Job:
     def tell(self) -> Tell:
         """Tell of a step (planning/job/trace.py)."""
         return self.stages.tell
-
-    def note(self, *sentences: str) -> None:
-        """Add sentences to the notes of the plan: what was given up, with the first line and a count. Repeated ones are dropped."""
-        for sentence in sentences:
-            if sentence not in self.noted:
-                self.noted.append(sentence)
-                self.tell("given up", what=sentence)
-
-    def afresh(self) -> Job:
-        """The same job with no notes, for another plan of it."""
-        return dataclasses.replace(self, noted=[])
 
     @cached_property
     def stop_time(self) -> float:
@@ -138,16 +132,14 @@ class Job:
         """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
         with self.stage("filters"):
             machine, toolpath = self.real
-            made = kept(motion, toolpath, machine)
-            if made.end > motion.end:
-                self.slowed_by.add(FILTERS)
-            return made
+            return kept(motion, toolpath, machine)
 
     def deliver_in_time(self, motion: TimedT, *, as_it_is: bool = False) -> Delivered | None:
         """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer than `most`."""
-        if motion.end <= self.most:
-            motion = self.behind_filters(motion)
-        return self.deliver(motion, as_it_is=as_it_is) if motion.end <= self.most else None
+        slower = self.behind_filters(motion) if motion.end <= self.most else motion
+        if slower.end > self.most:
+            return None
+        return self.deliver(slower, as_it_is=as_it_is)._replace(filtered=slower.end > motion.end)
 
     def deliver(
         self, motion: MotionInTime, not_limited: tuple[str, ...] = (), *, as_it_is: bool = False
@@ -214,22 +206,10 @@ class Job:
                 not_limited=not_limited,
                 progress=progress,
             )
-        return Delivered(self._named(trajectory, places), verdict, motion), stands
-
-    def _named(self, trajectory: Trajectory, places: SegmentsInOrder) -> Trajectory:
-        """The trajectory with each sample at the block whose programmed path it is at, in order; where that cannot be told, the
-        method's own blocks and a note."""
-        toolpath, runs = self.real[1], places.runs()
+        runs = places.runs()
         if runs is None:
-            self.note(
-                "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
-            )
-            return trajectory
-        first, segment = runs
-        if isinstance(trajectory, TrajectoryOnDemand):
-            return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
-        segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))
-        return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
+            return Delivered(trajectory, verdict, motion, notes=(NOT_ON_PATH,)), stands
+        return Delivered(_at_blocks(trajectory, toolpath, *runs), verdict, motion), stands
 
     def plan(
         self,
@@ -242,14 +222,19 @@ class Job:
         sentence: str,
         grid_points: int,
         tables: Tables = NO_TABLES,
+        notes: Iterable[str] = (),
     ) -> Plan:
         """The plan of the job.
 
-        made : None if the job could not be solved
+        made  : None if the job could not be solved
+        notes : what was given up, each with its first line and a count
 
         The other arguments are fields of `Plan`.
         """
         trajectory, verdict = (None, None) if made is None else (made.trajectory, made.verdict)
+        given_up = tuple(dict.fromkeys((*(made.notes if made else ()), *notes, *self._ringing(made, method))))
+        for note in given_up:
+            self.tell("given up", what=note)
         held: dict[str, Any] = {} if tables.grid is None else {"held_by": _largest_shares(tables.grid)}
         self.tell(
             "plan",
@@ -260,7 +245,6 @@ class Job:
             passed=verdict is not None and verdict.passed,
             **held,
         )
-        self._note_ringing(made, method)
         return Plan(
             method=method,
             corner=corner,
@@ -277,13 +261,13 @@ class Job:
             stop_time=self.stop_time,
             grid_points=grid_points,
             prices=tables.prices,
-            making=None if made is None else Making(made.motion, made.slower, tables.pricing),
-            notes=(*job_notes(self.program, *self.real), *self.noted),
+            making=None if made is None else Making(*made[2:5], tables.priced, given_up),
+            notes=(*job_notes(self.program, *self.real), *given_up),
             timings=self.stages.timings,
         )
 
-    def _note_ringing(self, made: Delivered | None, method: str) -> None:
-        """Say so where vibration modes are excited; method fir makes its filters as long as leaves them at rest."""
+    def _ringing(self, made: Delivered | None, method: str) -> Iterator[str]:
+        """That vibration modes are excited, if they are; method fir makes its filters as long as leaves them at rest."""
         shaped = made is None or isinstance(made.motion, ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
             can = (
@@ -291,9 +275,15 @@ class Job:
                 if method in (OPTIMAL, SECOND_ORDER)
                 else f"{OPTIMAL} and {SECOND_ORDER} do with --shaped"
             )
-            self.note(
-                f"method {method} does not shape its setpoints for the machine's vibration modes; {can}"
-            )
+            yield f"method {method} does not shape its setpoints for the machine's vibration modes; {can}"
+
+
+def _at_blocks(trajectory: Trajectory, toolpath: Toolpath, first: Array, segment: Array) -> Trajectory:
+    """The trajectory with each sample at the block whose path it is at: from the samples `first` (n,) on at `segment` (n,)."""
+    if isinstance(trajectory, TrajectoryOnDemand):
+        return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
+    segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))
+    return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
 
 
 def _largest_shares(grid: GridHistory) -> str:

@@ -13,8 +13,9 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.planning.job.beside import Beside, beside_motion
+from planner.planning.job.made import Delivered, Making
 from planner.planning.job.shown import Shown
-from planner.sensitivity.records import CornerTable, Delivered, GridHistory, Making, PriceList
+from planner.sensitivity.records import CornerTable, GridHistory, PriceList
 from planner.verifier import CornerCheck, Verdict
 
 
@@ -94,10 +95,19 @@ class Plan(Shown):
 
     def delivering(self, made: Delivered, **changes: Any) -> Plan:
         """The plan with another motion, which has its prices, and with other `changes` of its fields."""
-        pricing = self.making.pricing if self.making is not None else None
-        making = Making(made.motion, made.slower, pricing)
+        making = self.making and self.making._replace(motion=made.motion, slower=made.slower)
         motion: dict[str, Any] = {"trajectory": made.trajectory, "verdict": made.verdict, "making": making}
         return replace(self, **motion | changes)
+
+    def slower_in_places(self) -> Plan:
+        """The plan with its motion run slower where the verdict found something, if that mends it; else as it is."""
+        slower = self.making.slower if self.making is not None else None
+        return self if slower is None else self.delivering(slower)
+
+    def without_motion(self, why: str) -> Plan:
+        """The plan without its motion, which is not delivered."""
+        gone = dict.fromkeys(("trajectory", "verdict", "rounded", "grid", "prices", "making"))
+        return replace(self, status=Status.INFEASIBLE, sentence=why, **gone)  # type: ignore[arg-type]
 
     @property
     def solved(self) -> bool:

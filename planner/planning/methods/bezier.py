@@ -3,9 +3,9 @@
 1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the fraction of the tolerance
    that eq. (20) gives it (three sources: rounding, chord error, filters that follow).
 2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes' limits, jerk included, allow
-   from its one end to the other (baselines/lookahead/constant_speed_corners.py).
+   from its one end to the other (lookahead/constant_speed_corners.py).
 3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop at its vertex where that
-   is faster (baselines/lookahead/look_ahead.py); on arcs the limits are constant.
+   is faster (lookahead/look_ahead.py); on arcs the limits are constant.
 4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually nothing.
 """
 
@@ -22,19 +22,19 @@ from planner.baselines.lookahead.look_ahead import look_ahead, moves, swept
 from planner.baselines.lookahead.ramps import JointKind
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import SmoothPath, exact_stops, round_corners
-from planner.feedrate.sampling.path_samples import PathSamples
-from planner.feedrate.sampling.samples import sample_path
+from planner.feedrate.sampling.samples import PathSamples, sample_path
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.motion.timing import Motion, law_of_moves
 from planner.planning.job.job import Job
-from planner.planning.job.method import CLOSED_FORM_WAYS, Method
+from planner.planning.job.made import Tables
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.notes import exact_note
 from planner.planning.optimal.tighten import slowed
+from planner.planning.page import CLOSED_FORM_WAYS, Method
 from planner.sensitivity.closed_form import corner_apexes, corners_at
-from planner.sensitivity.records import CornerTable, Tables
+from planner.sensitivity.records import CornerTable
 
 # The fraction of every leg that its corners leave free, to change the speed on it [-]: with none all corners are as slow as the first.
 FREE_FRACTION = 0.3
@@ -62,7 +62,6 @@ class BezierMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         machine = job.machine
-        job.note(*exact_note(job.toolpath, exact_stops(job.toolpath)))
         with job.stage("geometry"):
             shares = machine if self.allocate else machine.model_copy(update={"dt": NO_PERIOD, "fir": None})
             path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_FRACTION)
@@ -90,6 +89,7 @@ class BezierMethod(Method):
             sentence=f"{len(corner_apexes(samples))} corners are run through, {len(stops)} are faster as full stops",
             grid_points=len(samples),
             tables=Tables(rounded=rounded),
+            notes=exact_note(job.toolpath, exact_stops(job.toolpath)),
         )
 
 

@@ -28,8 +28,8 @@ from planner.baselines.fir.superpose import Filtered, axes_of, reached, superpos
 from planner.feedrate.solution import Status
 from planner.motion.axis_motion import AxisMotion
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
+from planner.planning.page import Method
 
 
 @dataclass(frozen=True, kw_only=True)

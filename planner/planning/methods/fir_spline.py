@@ -31,8 +31,8 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
+from planner.planning.page import Method
 
 # Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow.
 ROUNDING_FRACTION = 0.1

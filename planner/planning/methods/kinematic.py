@@ -38,9 +38,10 @@ from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
 from planner.planning.job.job import Job
-from planner.planning.job.method import CLOSED_FORM_WAYS, Method
+from planner.planning.job.made import Tables
 from planner.planning.job.plan import Plan
-from planner.sensitivity.records import CornerTable, Tables
+from planner.planning.page import CLOSED_FORM_WAYS, Method
+from planner.sensitivity.records import CornerTable
 
 # Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill
 # their chords: those leave the vertex by 2/3 to 1 of the sagitta.
@@ -65,7 +66,6 @@ class KinematicMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
-        job.note(*_curve_notes(job.toolpath, exact))
         with job.stage("solve"):
             # legs alone could keep a tangential acceleration, corners would not begin as they end
             machine = job.machine.model_copy(update={TANGENTIAL.key: None})
@@ -83,6 +83,7 @@ class KinematicMethod(Method):
             sentence=_sentence(chain),
             grid_points=len(chain.path) + 1,
             tables=Tables(rounded=rounded),
+            notes=_curve_notes(job.toolpath, exact),
         )
 
     def _chain(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Chain:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from planner.base.names import METHODS
 
 if TYPE_CHECKING:
-    from planner.planning.job.method import Method
+    from planner.planning.page import Method
 
 
 class MethodNames:

@@ -23,15 +23,18 @@ from planner.base.names import (
 )
 from planner.corners.smooth import CornerShape
 from planner.machine import Machine, load_machine
+from planner.machine.kinematics import at_tip
+from planner.machine.kinematics.limits import WIDE
 from planner.machine.user_limit import OwnLimit
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.nc.reading import AS_USUAL, Reading
-from planner.planning.job.at_tip import planned
-from planner.planning.job.method import Method
+from planner.nc.set_limits import limited
+from planner.planning.job.at_tip import chain_of, in_joints
 from planner.planning.job.plan import Plan
 from planner.planning.job.stages import Progress, Stages
 from planner.planning.job.trace import Log
+from planner.planning.page import Method
 
 DEFAULT_MACHINE = "mill"
 
@@ -103,17 +106,18 @@ def plan(
     if limits:
         machine = machine.with_own((*machine.own, *limits))
 
-    def on(read: Program, used: Machine) -> Plan:
-        return method.plan(read, used, tolerance, progress, log)
-
-    if isinstance(program, Program):
-        if reading != AS_USUAL:
-            raise InputError("reading: the program is read already; give the settings to read_program")
-        return planned(program, machine, on, joints=joints)
     stages = Stages(progress)
-    with stages.stage("read"):
-        program = read_program(program, machine, reading)
-    made = planned(program, machine, on, joints=joints)
+    if not isinstance(program, Program):
+        with stages.stage("read"):
+            program = read_program(program, machine, reading)
+    elif reading != AS_USUAL:
+        raise InputError("reading: the program is read already; give the settings to read_program")
+    machine = limited(machine, program.limits)
+    chain = chain_of(program, machine)
+    used = machine if chain is None else at_tip(machine, chain, wide=WIDE if joints else None)
+    made = method.plan(program, used, tolerance, progress, log)
+    if chain is not None:
+        made = in_joints(made, machine, chain)
     return dataclasses.replace(made, timings=stages.timings | made.timings)
 
 

@@ -1,8 +1,8 @@
 """Method `second-order`: all limits but jerk, time-optimal on a smoothed path, by reachability analysis.
 
 The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited. The
-algorithm is that of method `optimal`, planning/optimal/loop.py, with another solver; splines are reshaped by the multipliers of
-this motion (feedrate/costates.py).
+algorithm is that of method `optimal` on a path (planning/optimal/path_motion.py), with another solver; splines are reshaped by the
+multipliers of this motion (feedrate/costates.py).
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
+from planner.planning.attempts import ON_PATH
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import EFFORTS, Settings
-from planner.planning.optimal.loop import fastest_plan
 from planner.planning.optimal.order import SecondOrder
 from planner.planning.optimal.shaped import shaped_plan
+from planner.planning.page import Method, best_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,4 +47,4 @@ class SecondOrderMethod(Method):
         settings = Settings(
             method="second-order", corner=self.corner, order=order, effort=effort, rounds=self.rounds
         )
-        return shaped_plan(job, settings) if self.shaped else fastest_plan(job, settings)
+        return shaped_plan(job, settings) if self.shaped else best_of(ON_PATH, job, settings)

@@ -14,8 +14,8 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Joint
 from planner.motion.timing import Motion, law_of_moves
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.plan import Plan
+from planner.planning.page import Method
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,15 +1,9 @@
-"""Method `tube`: geometry and feed found together, anywhere inside the tolerance.
+"""Method `tube`: geometry and feed found together, anywhere inside the tolerance, from the motion of another method.
 
 All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (joint/rows.py,
 joint/nlp.py), so nothing is given away between the two. What is found is the best motion near the one from which the search starts,
-with no certificate that there is no better one elsewhere.
-
-1. The path is divided into runs between full stops; each is a problem of its own (joint/run.py).
-2. Methods of `starts` make motions from which the search begins (joint/guess.py): the first one's, and where that does not lead to a
-   faster one the next one's.
-3. A solver finds the motion: the own one window by window (joint/own.py), ipopt and fatrop a whole run at a time.
-4. Where no search ends faster than the first start, its motion stays, run by run and window by window (joint/parts.py): the plan is
-   never slower.
+with no certificate that there is no better one elsewhere. Where no search ends faster than the start, its motion stays, run by run and
+window by window (joint/parts.py): the plan is never slower. `optimal` searches in the same way; this method has the reference solvers.
 """
 
 from __future__ import annotations
@@ -21,53 +15,51 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.names import QUICK
 from planner.feedrate.solution import Status
-from planner.joint.parts import FoundRun
+from planner.joint.parts import FoundRun, parts_of
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.joint.solvers import TubeSolver, tube_solver
+from planner.joint.splice import Spliced
 from planner.nc.program import Program
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
+from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
-from planner.planning.methods.free import Starts, delivered, said, search, tabled
+from planner.planning.joint_search import said, search_run, tabled
+from planner.planning.joint_start import Start
 from planner.planning.methods.optimal import OptimalMethod
-from planner.sensitivity.records import NO_TABLES, Delivered, Tables
+from planner.planning.page import Method, within_tolerance
 
 
 @dataclass(frozen=True, kw_only=True)
 class TubeMethod(Method):
-    """The best motion inside the tolerance near those of other methods.
+    """The best motion inside the tolerance near that of another method.
 
-    starts : methods whose motions the search starts from; the first one's is what the plan is never slower than
+    start  : the method whose motion the search starts from, and than which the plan is never slower
     solver : name of the solver, "own", "ipopt" or "fatrop" (joint/solvers.py), or a solver
     """
 
-    starts: tuple[Method, ...] = field(
-        default_factory=lambda: (OptimalMethod(effort=QUICK), OptimalMethod(corner="bezier"))
-    )
+    start: Method = field(default_factory=lambda: OptimalMethod(effort=QUICK))
     solver: str | TubeSolver = "own"
 
     def plan_job(self, job: Job) -> Plan:
+        solver = tube_solver(self.solver)
         with job.stage("geometry"):
             runs = list(tube_runs_of(job.toolpath, job.machine))
-            _check_size(runs, job.program, tube_solver(self.solver))
+            _check_size(runs, job.program, solver)
         with job.stage("start"):
-            starts = Starts(self.starts, job)
-            first = next(iter(starts), None)
-        found: list[FoundRun] = []
+            first = within_tolerance(job.with_own_clock(), self.start)
+        if first.making is None:
+            return self._plan(job, None, first.status, f"no motion to start from: {first.sentence}", 0)
+        start, found = Start(first.making.motion, job), list[FoundRun]()
         with job.stage("solve") as report:
-            for k, run in enumerate(runs if first else ()):
-                found.append(search(k, run, starts, tube_solver(self.solver)))
+            for k, run in enumerate(runs):
+                found.append(search_run(k, run, start, solver, within=start.lasting(k)))
                 report((k + 1) / len(runs))
-        if first is None:
-            failed = starts.failed[0]
-            return self._plan(job, None, failed.status, f"no motion to start from: {failed.sentence}", 0)
-        assert first.plan is not None
-        made, kept, why = delivered(job, first, found)
-        corner = f" with corner {first.plan.corner}" if first.plan.corner else ""
-        status, sentence = said(job, first, found, kept, why, f"{first.plan.method}{corner}")
-        grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.plan.grid_points
-        tables = tabled(job, first.plan, made, found, kept)
-        return self._plan(job, made, status, sentence, grid_points, tables)
+        made, stays, why = _delivered(job, first, start, found)
+        corner = f" with corner {first.corner}" if first.corner else ""
+        status, sentence = said(job, start, found, stays, why, f"{first.method}{corner}")
+        grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.grid_points
+        tables, notes = tabled(job, first.grid, made, found, stays)
+        return self._plan(job, made, status, sentence, grid_points, tables, notes)
 
     def _plan(
         self,
@@ -77,6 +69,7 @@ class TubeMethod(Method):
         sentence: str,
         grid_points: int,
         tables: Tables = NO_TABLES,
+        notes: tuple[str, ...] = (),
     ) -> Plan:
         """The plan of this method with what was delivered."""
         return job.plan(
@@ -88,7 +81,32 @@ class TubeMethod(Method):
             sentence=sentence,
             grid_points=grid_points,
             tables=tables,
+            notes=notes,
         )
+
+
+def _delivered(
+    job: Job, first: Plan, start: Start, found: list[FoundRun]
+) -> tuple[Delivered, list[int], str]:
+    """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
+    motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
+    assert first.making is not None
+    assert first.trajectory is not None
+    assert first.verdict is not None
+    stays, why = [k for k, one in enumerate(found) if one.steps is None], ""
+    filtered = job.real[0].fir is not None  # what goes on between two stops is felt behind them
+    if len(stays) < len(found) and (not filtered or all(one.whole for one in found)):
+        parts = [
+            [start.spliced(k)] if k in stays else parts_of(job.toolpath, one, start.spliced(k))
+            for k, one in enumerate(found)
+        ]
+        motion = Spliced(runs=tuple(part for of_run in parts for part in of_run))
+        made = job.deliver(job.behind_filters(motion.whole()) if filtered else motion)
+        passed = made.verdict.passed or not first.verdict.passed
+        if passed and made.trajectory.cycle_time <= first.trajectory.cycle_time:
+            return made, stays, why
+        why = "what was found there is slower with its standstills" if passed else str(made.verdict.faults[0])
+    return Delivered(first.trajectory, first.verdict, *first.making[:3]), list(range(len(found))), why
 
 
 def _check_size(runs: list[TubeRun], program: Program, solver: TubeSolver) -> None:

@@ -9,13 +9,12 @@ left. Where the contour is left away from corners, the feed is limited wherever 
 
 The rounds keep the limits at grid points only. What they end with keeps them between these too, and the tolerance (`kept`).
 
-Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand (feedrate/constraints/assemble.py).
+Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand (constraints/assemble.py).
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from planner.delivery.path_errors import SPARE, Errors
 from planner.feedrate.constraints.limits import FILTER_ERROR
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.motion.timing import Motion
-from planner.planning.job.job import FILTERS, Job
+from planner.planning.job.job import Job
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again
 from planner.planning.optimal.tighten import within_limits
@@ -49,34 +48,32 @@ BACK = 1.1
 BOUND = FILTER_ERROR.name
 
 
-def within_filters(
-    planned: OnPath, motion: Motion, order: Order, job: Job, useless: Callable[[float], bool]
-) -> tuple[OnPath, Motion]:
-    """The fastest motion found that keeps the tolerance behind the machine's filters, and the solution that it comes from.
+def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> tuple[OnPath, Motion, bool]:
+    """The fastest motion found that keeps the tolerance behind the machine's filters, the solution that it comes from, and whether the
+    filters made it slower. A motion that takes longer than `job.most` is not asked for: the search ends there, without what it looks
+    for.
 
-    motion  : that of `planned`, which keeps all limits
-    useless : whether a motion that takes so long [s] is not asked for: the search ends there, without what it looks for
+    motion : that of `planned`, which keeps all limits
     """
     machine, toolpath = job.real
-    if machine.fir is None or useless(motion.end):
-        return planned, motion
+    if machine.fir is None or motion.end > job.most:
+        return planned, motion, False
     behind, plain = Behind(toolpath, machine), planned.problem
     of_path = behind.path_errors(motion)
     corners = CornerFeeds(plain, motion, behind, of_path)
     contour = _Contour(corners, behind, of_path)
     best, fastest = planned, np.inf
-    if BOUND in (plain.bound_names[k] for k in np.unique(plain.feed_sq_bound)):
-        job.slowed_by.add(FILTERS)
+    filtered = BOUND in (plain.bound_names[k] for k in np.unique(plain.feed_sq_bound))
     for _ in range(ROUNDS):
         waiting = rested(behind, motion)
         places = behind.places(waiting, of_path)
         missed = len(places.time) > 0
         slowed = waiting.end / np.sqrt(places.less.min(initial=1.0))  # what `kept` would make of it, about
         job.tell("filters", found=waiting.end, places=len(places.time), kept=bool(slowed < fastest))
-        if missed or waiting.end > motion.end:
-            job.slowed_by.add(FILTERS)
-        if (missed and useless(waiting.end / BACK)) or not (missed or planned.problem is not plain):
-            return planned, waiting
+        filtered |= missed or waiting.end > motion.end
+        late = missed and waiting.end > BACK * job.most
+        if late or not (missed or planned.problem is not plain):
+            return planned, waiting, filtered
         if slowed < fastest:
             best, fastest = planned, slowed
         of = corners.of_places(places)
@@ -92,7 +89,7 @@ def within_filters(
             break
         motion = planned.motion()
     best, motion = within_limits(best, order, job.toolpath, job.machine)
-    return best, kept(motion, toolpath, machine)
+    return best, kept(motion, toolpath, machine), filtered
 
 
 class CornerFeeds:

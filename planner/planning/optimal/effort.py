@@ -41,20 +41,18 @@ class Grids(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """How a motion is searched for geometry and feed together (planning/methods/free.py).
+    """How a motion is searched for geometry and feed together (planning/joint_search.py).
 
     steps_max : of constant jerk that it may have
-    kept      : share of the time that this may leave as it was; where it leaves more it begins on reshaped splines too [-]
     cut       : how finely the first motion is cut into steps
     gap       : complementarity at the end, share of the time [-]
     finer     : how finely what is found is cut once more, and the gap of the search from there, one after the other
-    again     : begin with a plan where that leaves something
+    again     : search from reshaped splines where that has not ended
     small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a step is at least
                 an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the time for 2e-3 less motion
     """
 
     steps_max: float
-    kept: float = 0.05
     cut: Cut = FIRST_CUT
     gap: float = FIRST_GAP
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
@@ -68,7 +66,7 @@ class Search:
 
 # Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two processors. Steps of a small one.
 STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
-THOROUGH = Search(steps_max=float("inf"), kept=-1.0, finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
+THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +132,7 @@ class Settings:
     bezier : the corner of "bezier", and where there is no spline
     effort : grids and rounds of reshaping
     rounds : of reshaping; None for those of the effort
+    joint  : whether path and feed are searched together (planning/joint_search.py)
     """
 
     method: str
@@ -142,3 +141,9 @@ class Settings:
     bezier: CornerShape = field(default_factory=BezierCorner)
     effort: Effort = EFFORTS[NORMAL]
     rounds: int | None = None
+    joint: bool = False
+
+    @property
+    def corner_name(self) -> str:
+        """The name of the corner."""
+        return self.corner if isinstance(self.corner, str) else self.corner.name

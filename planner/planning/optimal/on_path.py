@@ -1,4 +1,4 @@
-"""The time-optimal motion on a path: what the stages of the loop (planning/optimal/loop.py) hand to each other."""
+"""The time-optimal motion on a path: what its stages (path_motion.py) hand to each other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.constraints import normal_limit
 from planner.feedrate.constraints.limits import FILTER_ERROR
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
 from planner.motion.timing import Motion, law_of_solution
 from planner.smoothing.spline_path import SplineShape

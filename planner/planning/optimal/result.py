@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 
-from planner.corners.smooth import CornerShape
 from planner.feedrate.constraints.limits import Limits
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
 from planner.planning.job.job import Job
+from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
+from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
 from planner.sensitivity.closed_form import corner_table
 from planner.sensitivity.path_prices import SitePrices, path_prices
-from planner.sensitivity.records import NO_TABLES, Delivered, PriceList, Pricing, Tables
+from planner.sensitivity.records import PriceList
 
 
 def plan_of_solution(
     job: Job,
     best: OnPath,
     made: Delivered | None,
-    *,
-    method: str,
-    corner: str | CornerShape,
+    settings: Settings,
     tables: Tables = NO_TABLES,
 ) -> Plan:
     """The plan of a solution and what was delivered of it, None unless solved."""
     rounded = grid = None
+    notes: tuple[str, ...] = ()
     if made is not None:
         delivered = made.motion
         if isinstance(delivered, ShapedMotion):
@@ -39,28 +38,28 @@ def plan_of_solution(
         with job.stage("report"):
             rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, *times_of_pieces(delivered))
-        job.note(*path_notes(job.toolpath, best), *best.notes)
+        notes = (*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
         made,
-        method=method,
-        corner=corner if isinstance(corner, str) else corner.name,
+        method=settings.method,
+        corner=settings.corner_name,
         solver=best.solution.solver,
         status=best.solution.status,
         sentence=best.solution.sentence,
         grid_points=len(best.samples),
         tables=dataclasses.replace(tables, rounded=rounded, grid=grid),
+        notes=notes,
     )
 
 
-def pricing_of(best: OnPath, machine: Machine) -> Pricing | None:
-    """What finds the prices of a jerk-limited motion's limits; None where the solver does not tell, and behind filters, of which the
-    problem knows only a part."""
-    if not best.solution.multipliers or machine.fir is not None:
-        return None
-    return partial(_prices, best, machine)
+def priced(best: OnPath, machine: Machine) -> bool:
+    """Whether the limits of a motion have prices: not where it has no jerk limits or its solver does not tell, nor behind filters, of
+    which the problem knows only a part."""
+    solution = best.solution
+    return solution.jerk_limited and solution.multipliers is not None and machine.fir is None
 
 
-def _prices(best: OnPath, machine: Machine) -> PriceList | None:
+def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
     """The prices of its limits. With limits that are no axis' the tolerance of splines has no price: the machine alone pulls at their
     shapes."""
     by_site = None

@@ -36,12 +36,12 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion, shaper_of
 from planner.motion.timing import Motion
-from planner.planning.job.job import BOLDER, FILTERS, Job
+from planner.planning.job.choice import counted_time
+from planner.planning.job.job import BOLDER, Job
 from planner.planning.job.plan import Plan
-from planner.planning.optimal.compare_plans import counted_time
 from planner.planning.optimal.effort import Settings
-from planner.planning.optimal.loop import time_optimal
 from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.path_motion import time_optimal
 from planner.planning.optimal.result import plan_of_solution
 from planner.planning.optimal.settling import Settling
 
@@ -172,15 +172,13 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
             "and damping"
         )
-    job.slowed_by.add(FILTERS)  # D is measured behind them (settling.py), and p is made slower for it
     # reshaping makes paths for the motion as it is planned, not for the one behind the shaper
     settings = dataclasses.replace(settings, rounds=settings.rounds or 0)
     plan = _plan_of(job, settings, shaped(job, settings))
     if plan.verdict is None or counted_time(plan) < np.inf:
         return plan
     # what is slower is not gentler everywhere behind a shaper, whose copies then meet elsewhere; with the limits as they are D is
-    again = job.afresh()
-    gentle = _plan_of(again, settings, shaped(again, settings, CANDIDATES[:1]))
+    gentle = _plan_of(job, settings, shaped(job, settings, CANDIDATES[:1]))
     kept = counted_time(gentle) < np.inf
     job.tell(
         "shaped, limits as they are",
@@ -199,6 +197,7 @@ def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:
             sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
         )  # fmt: skip
     not_limited = () if settings.order.jerk_limited else ("jerk",)
-    made = job.deliver(found.delivered, not_limited)
-    plan = plan_of_solution(job, found.planned, made, method=settings.method, corner=settings.corner)
+    # D is measured behind filters (settling.py), and p is made slower for it
+    made = job.deliver(found.delivered, not_limited)._replace(filtered=True)
+    plan = plan_of_solution(job, found.planned, made, settings)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

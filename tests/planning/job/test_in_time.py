@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Fir, Machine
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
-from planner.planning.job.method import Method
 from planner.planning.job.stages import Stages
 from planner.planning.methods.fir import FirMethod
 from planner.planning.methods.fir_spline import FirSplineMethod
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
+from planner.planning.page import Method
 
 TEXT = "G21 G90 G64 P0.05 F3000\nG1 X10\nX12 Y5\nX4 Y9\nM2\n"
 AXIS = Axis(velocity=120.0, acceleration=2000.0, jerk=60000.0)
@@ -39,7 +37,7 @@ def test_what_takes_longer_is_not_delivered(method: Method, fir: Fir | None) -> 
     made = method.plan_job(job)
     assert made.making is not None
     end = made.making.motion.end
-    late = dataclasses.replace(job.afresh(), most=0.999 * end)
+    late = job.faster_than(0.999 * end)
     assert method.plan_job(late).trajectory is None
-    early = dataclasses.replace(job.afresh(), most=1.001 * end)
+    early = job.faster_than(1.001 * end)
     assert method.plan_job(early).cycle_time == made.cycle_time

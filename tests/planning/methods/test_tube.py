@@ -56,7 +56,7 @@ def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     made = tube(name).require()
     assert made.verdict.passed, made.verdict.faults
     assert made.status in (Status.OPTIMAL, Status.ACCEPTABLE)
-    start = TubeMethod().starts[0].plan(JOBS[name], MACHINE).trajectory.cycle_time
+    start = TubeMethod().start.plan(JOBS[name], MACHINE).trajectory.cycle_time
     assert made.trajectory.cycle_time < start or (
         made.trajectory.cycle_time == start and "stays on" in made.sentence
     )
@@ -161,17 +161,17 @@ def test_a_lower_feed_holds_on_its_block():
 def test_the_solvers_agree_where_the_feed_changes():
     """Each has the row of a vertex between two feeds: without it what ipopt finds breaks the lower one, and the start stays."""
     job = problems.polyline([[0, 0], [2, 0], [3, 0], [3, 2]], feed=np.array([100.0, 20.0, 100.0]))
-    starts = (OptimalMethod(corner="bezier", effort="quick"),)
-    made = [TubeMethod(starts=starts, solver=name).plan(job, MACHINE) for name in ("own", "ipopt", "fatrop")]
+    start = OptimalMethod(corner="bezier", effort="quick")
+    made = [TubeMethod(start=start, solver=name).plan(job, MACHINE) for name in ("own", "ipopt", "fatrop")]
     assert all(plan.verdict.passed for plan in made)
-    assert all(plan.cycle_time < 0.99 * starts[0].plan(job, MACHINE).cycle_time for plan in made)
+    assert all(plan.cycle_time < 0.99 * start.plan(job, MACHINE).cycle_time for plan in made)
     assert [plan.cycle_time for plan in made[1:]] == pytest.approx([made[0].cycle_time] * 2, rel=SAME)
 
 
 # --- refusals and failures ---------------------------------------------------------------------------------------------------
 
 
-SHORT = (OptimalMethod(corner="bezier"),)
+SHORT = OptimalMethod(corner="bezier")
 
 
 class NeverAsked(OptimalMethod):
@@ -183,10 +183,10 @@ def test_a_job_that_is_too_long_is_refused_before_any_work():
     job = problems.star_spiral(LEGS_MAX // 4)
     points = np.vstack([[0.0, 0.0], *(np.asarray(job.end)[:, :2] for _ in range(5))])
     with pytest.raises(InputError, match=f"at most {LEGS_MAX}.*with the solver own"):
-        TubeMethod(starts=(NeverAsked(),), solver="ipopt").plan(problems.polyline(points), MACHINE)
+        TubeMethod(start=NeverAsked(), solver="ipopt").plan(problems.polyline(points), MACHINE)
     turns = parse_program(f"G21 G17 G90 F6000\nG2 X0 Y0 I50 P{LEGS_MAX}\nM2\n")
     with pytest.raises(InputError, match="steps on arcs"):
-        TubeMethod(starts=(NeverAsked(),), solver="ipopt").plan(turns, MACHINE)
+        TubeMethod(start=NeverAsked(), solver="ipopt").plan(turns, MACHINE)
 
 
 HASTY = TubeNLP(max_iterations=2)
@@ -195,10 +195,10 @@ HASTY = TubeNLP(max_iterations=2)
 @pytest.mark.slow
 def test_where_nothing_converges_the_start_stays_and_says_why():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n")
-    made = TubeMethod(starts=SHORT, solver=HASTY).plan(job, MACHINE)
+    made = TubeMethod(start=SHORT, solver=HASTY).plan(job, MACHINE)
     assert made.verdict.passed
     assert made.status is Status.ACCEPTABLE
-    assert made.trajectory.cycle_time == SHORT[0].plan(job, MACHINE).trajectory.cycle_time
+    assert made.trajectory.cycle_time == SHORT.plan(job, MACHINE).trajectory.cycle_time
     assert (
         "stays on 1 of 1 runs between full stops, the first on lines 2 to 3: not converged" in made.sentence
     )
@@ -214,32 +214,15 @@ class SecondFails(TubeNLP):
 @pytest.mark.slow
 def test_what_is_found_between_two_stops_is_kept_where_the_other_half_fails():
     job = parse_program("G21 G90 F6000\nG1 X4\nY4\nG4 P0.25\nG1 X0\nG4 P0.1\nM2\n")
-    made = TubeMethod(starts=SHORT, solver=SecondFails()).plan(job, MACHINE).require()
+    made = TubeMethod(start=SHORT, solver=SecondFails()).plan(job, MACHINE).require()
     assert made.verdict.passed, made.verdict.faults
-    first = TubeMethod(starts=SHORT, solver="ipopt").plan(
+    first = TubeMethod(start=SHORT, solver="ipopt").plan(
         parse_program("G21 G90 F6000\nG1 X4\nY4\nM2\n"), MACHINE
     )
-    rest = SHORT[0].plan(parse_program("G21 G90 F6000\nG1 X4\nM2\n"), MACHINE)
+    rest = SHORT.plan(parse_program("G21 G90 F6000\nG1 X4\nM2\n"), MACHINE)
     both = first.trajectory.cycle_time + rest.trajectory.cycle_time + 0.35
     assert made.trajectory.cycle_time == pytest.approx(both, rel=1e-6)
     assert "stays on 1 of 2 runs between full stops, the first on lines 5 to 5" in made.sentence
-
-
-@pytest.mark.slow
-def test_the_next_start_is_tried_where_the_first_leads_to_nothing():
-    asked = []
-
-    class Counted(TubeNLP):
-        def solve(self, run, guess):
-            asked.append(guess.h.sum())
-            return TubeNLP(max_iterations=2 if len(asked) == 1 else 300).solve(run, guess)
-
-    made = TubeMethod(starts=(SHORT[0], OptimalMethod(corner="fir")), solver=Counted()).plan(
-        corner(90), MACHINE
-    )
-    assert len(asked) == 2
-    assert "stays" not in made.sentence
-    assert made.trajectory.cycle_time < asked[0]
 
 
 def test_a_start_without_a_motion_is_a_status():
@@ -250,7 +233,7 @@ def test_a_start_without_a_motion_is_a_status():
                 sentence="broke down", grid_points=0,
             )  # fmt: skip
 
-    made = TubeMethod(starts=(Fails(),)).plan(corner(90), MACHINE)
+    made = TubeMethod(start=Fails()).plan(corner(90), MACHINE)
     assert made.status is Status.NUMERICAL_ERROR
     with pytest.raises(NotSolvedError, match="no motion to start from: broke down"):
         made.require()

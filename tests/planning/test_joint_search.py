@@ -13,9 +13,9 @@ from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.feedrate.solution import Status
 from planner.joint.parts import FoundRun
+from planner.planning import joint_search
 from planner.planning.job.trace import Trace
-from planner.planning.methods import all_runs
-from planner.planning.methods.all_runs import LONG
+from planner.planning.joint_search import LONG
 
 RUNS = 60
 STROKE = "G1 X{0} Y{1}\nG1 X{2} Y{1}\nG1 X{2} Y{0}\nG1 X{0} Y{3}\nG1 X{3} Y{2}\nG1 X{1} Y{0}\nG4 P0.01\n"
@@ -75,13 +75,13 @@ def planned(effort: str = "quick") -> tuple[planner.Plan, Trace]:
 def test_a_run_that_the_search_does_not_find_is_planned_alone_and_the_others_are_kept(monkeypatch, effort):
     whole, told = planned(effort)
     assert searched(told)["alone"] == 0
-    own = all_runs.search
+    own = joint_search.search_run
 
-    def one_fails(k, run, starts, solver):
-        found = own(k, run, starts, solver)
+    def one_fails(k, run, *more):
+        found = own(k, run, *more)
         return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else found
 
-    monkeypatch.setattr(all_runs, "search", one_fails)
+    monkeypatch.setattr(joint_search, "search_run", one_fails)
     made, told = planned(effort)
     assert searched(told)["alone"] == 1
     assert made.verdict is not None
@@ -96,10 +96,10 @@ def test_a_run_that_the_search_does_not_find_is_planned_alone_and_the_others_are
 def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
     """Slower in places would mend it; without that the run is not taken, and the others are."""
     monkeypatch.setattr(mending, "ROUNDS", 0)
-    own = all_runs.search
+    own = joint_search.search_run
 
-    def one_is_fast(k, run, starts, solver):
-        found = own(k, run, starts, solver)
+    def one_is_fast(k, run, *more):
+        found = own(k, run, *more)
         if k != 7:
             return found
         steps = found.steps
@@ -111,7 +111,7 @@ def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
         return dataclasses.replace(found, steps=dataclasses.replace(steps, h=f * steps.h, **rates))
 
     whole, _ = planned()
-    monkeypatch.setattr(all_runs, "search", one_is_fast)
+    monkeypatch.setattr(joint_search, "search_run", one_is_fast)
     made, told = planned()
     assert searched(told)["alone"] == 1
     assert made.verdict.passed, made.verdict.faults

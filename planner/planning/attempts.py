@@ -1,0 +1,201 @@
+"""The attempts of methods `optimal` and `second-order` at a motion, in the order in which they are made (planning/page.py).
+
+The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round has reshaped, with a motion
+that need not be fit for delivery. Where it does not end, or where a small path doubles back within the tolerance, the splines are
+reshaped, and it begins there once more; where it cannot run, or leaves something, the motion on that path is delivered.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.names import AUTO
+from planner.base.sizes import SIZES
+from planner.feedrate.constraints.limits import Limits
+from planner.geometry.legs import legs_of
+from planner.geometry.toolpath import Joint
+from planner.planning.attempt import Attempt, Tried
+from planner.planning.job.choice import better, counted_time, faster
+from planner.planning.job.job import Job
+from planner.planning.job.plan import Plan
+from planner.planning.methods.kinematic import KinematicMethod
+from planner.planning.methods.stop import StopMethod
+from planner.planning.optimal.effort import Settings
+from planner.planning.optimal.path_motion import first_motion, kept_on_path, plan_on_path
+from planner.planning.page import best_of
+
+# A motion of more steps than the second that takes no more than the first over what its feed asks for is not searched [-]: on 30,000
+# lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4. Nor are
+# the splines of such a motion reshaped because its path doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19
+# for 8e-5 of the time.
+LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
+SAME_TIME = 1e-4  # less is the gap of the solvers [-]
+# Steps that a motion has on a leg at least (joint/guess.py).
+LEAST_STEPS = 2
+KINEMATIC_MOST = SIZES.rivals_planned  # blocks; of more `kinematic` is planned only where nothing passes
+
+
+def _searched(job: Job, settings: Settings, tried: Tried) -> bool:
+    """Whether the joint search knows all limits of the job, and the effort is for so many steps."""
+    if not settings.joint:
+        return False
+    from planner.planning.joint_search import searchable  # other plans need not load what it uses
+
+    return searchable(job) and _least_steps(job) <= settings.effort.search.steps_max
+
+
+def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """The joint search from the motion on the first splines."""
+    from planner.planning.joint_search import joint_plan
+
+    first, steps = first_motion(job, settings), _least_steps(job)
+    if first is None:
+        return Tried(steps=steps)
+    if steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
+        job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
+        return Tried(steps=steps, left=False)
+    found = joint_plan(job, settings, first, settings.effort.search, partial(_otherwise, settings))
+    return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps)
+
+
+def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
+    """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended from the first ones, and
+    where the path doubles back."""
+    small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
+    return small and (tried.best is None or (tried.steps <= CHEAP and _doubles_back(job)))
+
+
+def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """The joint search from the motion on reshaped splines."""
+    from planner.planning.joint_search import joint_plan
+
+    path = kept_on_path(job, settings)
+    if path is None:
+        return tried
+    planned, motion = path
+    search, alone = settings.effort.search, partial(_on_a_path, settings)
+    found = joint_plan(job, settings, planned, search, alone, motion)
+    if found.plan is None:
+        return dataclasses.replace(tried, path=path)
+    best = found.plan if tried.best is None else faster(tried.best, found.plan)
+    return dataclasses.replace(tried, best=best, path=path, joint=True)
+
+
+def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
+    """Whether there is no plan yet, or the motion on the path takes less time."""
+    if tried.path is None:
+        return tried.best is None
+    return tried.path[1].end < (1.0 - SAME_TIME) * counted_time(tried.best)
+
+
+def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """The motion on the path, delivered."""
+    plan = plan_on_path(job, settings, tried.path)
+    joint = tried.joint and tried.best is not None and faster(tried.best, plan) is tried.best
+    return Tried(
+        best=plan if tried.best is None else faster(tried.best, plan), joint=joint, steps=tried.steps
+    )
+
+
+def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bool:
+    """Whether nothing passes, full stops take less time, which is known before, or there is only the motion on a path of a job that is
+    not long."""
+    if settings.corner != AUTO:
+        return False
+    stops_sooner = job.line_stop_time < counted_time(tried.best)
+    return stops_sooner or (not tried.joint and len(job.toolpath) <= KINEMATIC_MOST)
+
+
+def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """Method kinematic, and full stops at the ends of all blocks but of lines that go straight on, where that does not pass."""
+    best = tried.best
+    if not np.isfinite(Limits.of(job.machine, job.toolpath.axes).tangential):  # which its corners do not keep
+        rival = KinematicMethod().plan_job(job.faster_than(counted_time(best)))
+        best = better(best, rival, "method kinematic takes less time", job)
+    if job.line_stop_time < min(counted_time(best), job.most):
+        rival = StopMethod(join_lines=True).plan_job(job.faster_than(counted_time(best)))
+        best = better(best, rival, "full stops take less time", job)
+    return dataclasses.replace(tried, best=best)
+
+
+ATTEMPTS = (
+    Attempt("joint search", _searched, _joint),
+    Attempt("search, reshaped splines", _worth_reshaping, _from_reshaped),
+    Attempt("motion on the path", _not_joint, _on_path),
+    Attempt("closed form", _closed_form_may_be_faster, _closed_form),
+)
+# Of a run on which the joint search does not end: from the first splines, and from reshaped ones.
+ALONE, ON_PATH = ATTEMPTS[1:], ATTEMPTS[2:]
+
+
+class Retry(NamedTuple):
+    """Something that is tried once more, or in another way.
+
+    steps : in the trace, as they begin
+    when  : and what
+    most  : at most so often
+    worth : how much longer plans are without it in whose trace it shows, on the mean and at worst [-], or what it saves from failing
+    """
+
+    steps: tuple[str, ...]
+    when: str
+    most: str
+    worth: str
+
+
+# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without it; worth as in
+# benchmarks/results/ablation.md.
+RETRIES = (
+    Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
+    Retry(
+        ("search, reshaped splines", "reshape"),
+        "the search has not ended, or a small path doubles back: from reshaped splines; where it cannot run these alone",
+        "1, rounds 40",
+        "5e-4, 8e-3",
+    ),
+    Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "3e-3, 4e-2"),
+    Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "1e-4, 9e-3"),
+    Retry(("splines",), "full stops where a run gets no spline", "2", "saves plans"),
+    Retry(("corners",), "single ones between full stops, where they may be faster", "2", "1e-3, 2e-2"),
+    Retry(("tighten",), "limits, where they are exceeded between grid points", "2, long 8", "9e-4, 5e-3"),
+    Retry(("filters",), "less feed where the tolerance is left behind filters", "16", "5e-1, 3"),
+    Retry(("share of tolerance",), "behind filters that cost time, less for the path", "2", "3e-2, 4e-1"),
+    Retry(
+        ("less for the period",), "chords between samples leave the tolerance", "8", "1e-1, 5e-1; saves plans"
+    ),
+    Retry(("slower in places",), "the verdict finds something", "6", "saves plans"),
+    Retry(
+        ("shaped",), "more limits, less tolerance for what is shaped; at last gently", "5, 1", "saves plans"
+    ),
+)
+
+
+def _otherwise(settings: Settings, run: Job) -> Plan:
+    return best_of(ALONE, run, settings)
+
+
+def _on_a_path(settings: Settings, run: Job) -> Plan:
+    return best_of(ON_PATH, run, settings)
+
+
+def _least_steps(job: Job) -> int:
+    return LEAST_STEPS * len(legs_of(job.toolpath).first)
+
+
+def _at_feed(job: Job) -> float:
+    """Time of the moves at their programmed feed [s]."""
+    return float(np.sum(job.toolpath.length / job.toolpath.feed))
+
+
+def _doubles_back(job: Job) -> bool:
+    """Whether the path turns back on both ends of a block so short that one place is within the tolerance of both: splines that are
+    reshaped find a way without the detour, the search does not find it from the first ones (7 of 320 random jobs, by up to 12 %)."""
+    path = job.toolpath
+    turn = np.sum(path.tangent_end[:-1] * path.tangent_start[1:], axis=1)
+    back = (turn < 0.0) & (path.joint[1:-1] != Joint.STOP)
+    short = (path.length < path.tolerance[:-1] + path.tolerance[1:])[1:-1]
+    return bool((short & back[:-1] & back[1:]).any())

@@ -1,0 +1,59 @@
+"""What the stages of a plan hand to each other: a motion that was delivered, and what is known of a plan that may not be taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
+from planner.planning.optimal.on_path import OnPath
+from planner.sensitivity.records import CornerTable, GridHistory, PriceList
+from planner.verifier import Verdict
+
+
+class Delivered(NamedTuple):
+    """A motion that was sampled and judged.
+
+    trajectory : its samples
+    verdict    : on them and on the motion
+    motion     : with the standstills that the samples need
+    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that costs time; else None
+    filtered   : whether the filters behind the setpoints made the motion slower than its limits did
+    notes      : what the samples do not tell
+    """
+
+    trajectory: Trajectory
+    verdict: Verdict
+    motion: MotionInTime
+    slower: Delivered | None = None
+    filtered: bool = False
+    notes: tuple[str, ...] = ()
+
+
+class Making(NamedTuple):
+    """What is known of a plan on its way, which may not be the one that is taken.
+
+    motion, slower, filtered : as in `Delivered`
+    priced                   : the solution of which the prices are those of the plan; None where they are there, or not to be had
+    given_up                 : what the method has noted
+    """
+
+    motion: MotionInTime
+    slower: Delivered | None = None
+    filtered: bool = False
+    priced: OnPath | None = None
+    given_up: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tables:
+    """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
+
+    rounded: CornerTable | None = None
+    grid: GridHistory | None = None
+    prices: PriceList | None = None
+    priced: OnPath | None = None
+
+
+NO_TABLES = Tables()

@@ -1,0 +1,72 @@
+"""Runs of a motion that are planned each by itself, as jobs of one run, where the others stay as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.joint.splice import Spliced, SplicedRun
+from planner.planning.job.by_run import broken_runs, full_stops, job_of_run
+from planner.planning.job.job import Job
+from planner.planning.job.made import Delivered
+from planner.planning.job.plan import Plan
+
+# So many runs are planned by themselves at most, and so often once more those that the verdict finds something on.
+ALONE_MOST, VERDICTS = 100, 3
+
+
+class Alone(NamedTuple):
+    """A motion that passes.
+
+    begin : (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples [s]
+    plans : of the runs that are planned by themselves, by their number
+    notes : what these gave up
+    """
+
+    delivered: Delivered
+    begin: FloatArray
+    plans: dict[int, Plan]
+    notes: tuple[str, ...]
+
+
+def with_runs_alone(
+    job: Job,
+    parts: Sequence[list[SplicedRun] | None],
+    planned: Callable[[Job], Plan],
+    most: float,
+    not_limited: tuple[str, ...] = (),
+) -> Alone | None:
+    """The motion with those runs planned by themselves that have no parts, and then those on which the verdict finds something; None
+    where these are more than `most` or all, where one of them does not pass, and where the whole does not.
+
+    parts   : of the motion, run by run between the job's full stops
+    planned : plans a job of one run
+    """
+    stops, plans = full_stops(job.toolpath), dict[int, Plan]()
+    runs = list(parts)
+    new = [k for k, part in enumerate(runs) if part is None]
+    for _ in range(VERDICTS):
+        if len(plans) + len(new) > min(most, len(runs) - 1):
+            return None
+        for k in new:
+            plan = planned(job_of_run(job, int(stops[k]), int(stops[k + 1])))
+            if plan.making is None or plan.verdict is None or not plan.verdict.passed:
+                return None
+            motion = plan.making.motion
+            plans[k], runs[k] = plan, [SplicedRun(motion=motion, begin=0.0, end=motion.end)]
+        made = job.deliver(Spliced(runs=tuple(part for of_run in runs for part in of_run or ())), not_limited)
+        if plans:
+            time, kept = made.trajectory.cycle_time, made.verdict.passed
+            job.tell("runs alone", found=time, runs=len(plans), kept=kept)
+        begin = np.cumsum([0.0, *(sum(part.lasting for part in of_run or ()) for of_run in runs)])
+        if made.verdict.passed:
+            noted = (note for plan in plans.values() if plan.making for note in plan.making.given_up)
+            return Alone(made, begin, plans, tuple(dict.fromkeys(noted)))
+        broken = broken_runs(begin, made.verdict)
+        new = [k for k in broken if k not in plans]
+        if len(new) < len(broken) or not new:
+            return None
+    return None

@@ -1,0 +1,296 @@
+"""The joint search of a job: from a motion along a smoothed path to path and feed found together (joint/), run by run.
+
+A run is what lies between two full stops. Long runs are searched one after the other, the windows of each side by side, then short ones
+side by side; what is found does not depend on the number of threads. The motion from which the search begins may keep its limits at
+the points of a coarse grid only: where the search leaves no step of it nothing else is asked of it, and a run on which the search does
+not end is planned by itself in another way (runs_alone.py). Or it keeps them everywhere: then it stays where the search does not end.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from itertools import pairwise
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side
+from planner.feedrate.solution import Status
+from planner.joint.guess import Cut, Guess
+from planner.joint.outcome import TubeSolution
+from planner.joint.own import TubeOwn
+from planner.joint.parts import FoundRun, parts_of
+from planner.joint.refine import divided, searched_again
+from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.solvers import TubeSolver
+from planner.joint.splice import SplicedRun
+from planner.motion.slowed import times_of_pieces
+from planner.motion.timing import Motion
+from planner.planning.job.job import Job
+from planner.planning.job.made import NO_TABLES, Delivered, Tables
+from planner.planning.job.plan import Plan
+from planner.planning.job.runs_alone import ALONE_MOST, with_runs_alone
+from planner.planning.joint_start import Start
+from planner.planning.optimal.effort import Search, Settings
+from planner.planning.optimal.notes import path_notes
+from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.result import priced
+from planner.sensitivity.activity import history
+from planner.sensitivity.found_activity import found_history
+from planner.sensitivity.found_prices import found_prices
+from planner.sensitivity.records import GridHistory
+
+LONG = SIZES.searched_shared
+# Runs that are not found are planned each by itself; with more than this share of the steps on them the job is, as a whole [-].
+FAILED_MOST = 0.5
+# What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each other [-].
+SEARCHES = (1.0, 1.2, 2.3)
+# Share of the time without prices from which that is said, and from which there are none [-].
+UNPRICED, UNPRICED_MOST = 0.01, 0.5
+
+Report = Callable[[float], None]
+
+
+class Joint(NamedTuple):
+    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the steps of the motion."""
+
+    plan: Plan | None
+    steps: int
+
+
+def searchable(job: Job) -> bool:
+    """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of the user, no
+    range in step with the spindle; and whether the path leaves it anything to find."""
+    machine, toolpath = job.real
+    return (
+        machine.fir is None
+        and not machine.own
+        and not (toolpath.curve >= 0).any()
+        and not toolpath.held.any()
+        and not toolpath.exact.all()
+    )
+
+
+def joint_plan(
+    job: Job,
+    settings: Settings,
+    planned: OnPath,
+    search: Search,
+    alone: Callable[[Job], Plan],
+    motion: Motion | None = None,
+) -> Joint:
+    """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where shorter ones do not pass.
+
+    search : how finely, and up to which size
+    alone  : plans a run, as a job, on which the search does not end, or the verdict finds something
+    motion : that on the path where it keeps its limits between grid points too: it stays where the search does not end; else None
+    """
+    stays = motion is not None
+    with job.stage("search") as report:
+        start = Start(motion or planned.motion(), job, search.cut)
+        runs = list(tube_runs_of(job.toolpath, job.machine))
+        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
+        most = search.steps_max
+        if steps > search.small:  # no finer than what is delivered
+            most = min(most, start.motion.end / job.machine.dt)
+        if steps > most:
+            job.tell("search", steps=steps, of=most)
+            return Joint(None, steps)
+        found = searched_runs(runs, start, search.of(steps), report, stays=stays)
+    made = None
+    if found is not None and any(one.steps for one in found):
+        parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
+        made = with_runs_alone(job, parts, alone, most=ALONE_MOST)
+    time = made.delivered.trajectory.cycle_time if made else np.nan
+    count = len(made.plans) if made else 0
+    job.tell("search", found=time, before=start.motion.end, kept=made is not None, steps=steps, alone=count)
+    if made is None and search.of(steps).finer and not stays:
+        return joint_plan(job, settings, planned, dataclasses.replace(search, finer=()), alone)
+    if found is None or made is None:
+        return Joint(None, steps)
+    for k in made.plans:
+        why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
+        found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
+    left = [k for k, one in enumerate(found) if one.steps is None]
+    status, sentence = said(job, start, found, left, "", "a path first, then its feed")
+    held = history(planned.problem, planned.solution, *times_of_pieces(motion)) if motion else None
+    alone_held = {k: plan.grid for k, plan in made.plans.items()}
+    tables, notes = tabled(job, held, made.delivered, found, left, alone_held)
+    if tables.prices is None and stays and priced(planned, job.machine):
+        tables = dataclasses.replace(tables, priced=planned)
+        notes = ("what limits cost is told of the motion before geometry and feed were found together",)
+    plan = job.plan(
+        made.delivered,
+        method=settings.method,
+        corner=settings.corner_name,
+        solver=planned.solution.solver,
+        status=status,
+        sentence=sentence,
+        grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
+        tables=tables,
+        notes=(*made.notes, *path_notes(job.toolpath, planned), *notes),
+    )
+    return Joint(plan, steps)
+
+
+def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:
+    """The parts of the motion along a run; None where it has to be planned by itself."""
+    if found.whole or (stays and found.steps is not None):
+        return parts_of(job.toolpath, found, start)
+    return [start] if stays else None
+
+
+class InTwo(NamedTuple):
+    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones; else in the first of
+    those from the start."""
+
+    first: TubeOwn
+    finer: tuple[tuple[Cut, TubeOwn], ...]
+
+
+def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
+    """The solver as the effort has it; where the start `stays`, windows that fail are divided."""
+    if not search.finer:
+        return TubeOwn(search.gap, divide=stays, progress=report)
+    ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
+    shares = [partial(_of_whole, report, *part) for part in pairwise((ends / ends[-1]).tolist())]
+    return InTwo(
+        TubeOwn(search.gap, divide=False, progress=shares[0]),
+        tuple(
+            (cut, TubeOwn(gap, divide=stays, progress=share))
+            for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
+        ),
+    )
+
+
+def _of_whole(report: Report, begin: float, end: float, share: float) -> None:
+    report(begin + share * (end - begin))
+
+
+def searched_runs(
+    runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
+) -> list[FoundRun] | None:
+    """What is found on each run; None where more than `FAILED_MOST` of the steps are on runs that are not found as a whole, unless the
+    start `stays` there."""
+    size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
+    found: list[FoundRun | None] = [None for _ in runs]
+    stopped = threading.Event()
+
+    def done() -> int:
+        return sum(steps for steps, of_run in zip(size, found, strict=True) if of_run is not None)
+
+    def lost() -> int:
+        return sum(steps for steps, run in zip(size, found, strict=True) if run is not None and not run.whole)
+
+    def one(k: int, tell: Report) -> None:
+        if stopped.is_set():
+            return
+        solver, within = solver_of(search, tell, stays=stays), start.lasting(k) if stays else np.inf
+        found[k] = search_run(k, runs[k], start, solver, within)
+        if not stays and lost() > FAILED_MOST * sum(size):
+            stopped.set()
+
+    def share(before: int, of_run: int, part: float) -> None:
+        report((before + part * of_run) / sum(size))
+
+    for k in range(len(runs)):
+        if size[k] > LONG:
+            one(k, partial(share, done(), size[k]))
+    short = [k for k in range(len(runs)) if size[k] <= LONG]
+    work = [partial(one, k, lambda _: None) for k in short]
+    if sum(size[k] for k in short) > LONG:
+        side_by_side(work, stopped.set, lambda: share(done(), 0, 0.0))
+    else:
+        for task in work:
+            task()
+    return None if stopped.is_set() else [of_run for of_run in found if of_run is not None]
+
+
+def search_run(
+    k: int, run: TubeRun, start: Start, solver: TubeSolver | InTwo, within: float = np.inf
+) -> FoundRun:
+    """What the search along run k leads to from its start; of no use if it takes as long as `within` [s]."""
+    if run.left:
+        return FoundRun(run, Status.ACCEPTABLE, run.left)
+    guess = start.guess(k, run)
+    if isinstance(solver, InTwo):
+        run, guess, solution = _in_two(k, run, start, solver)
+    else:
+        solution = solver.solve(run, guess)
+    steps = solution.steps
+    if steps is None:
+        return FoundRun(run, Status.ACCEPTABLE, solution.sentence)
+    if steps.h.sum() >= within:
+        return FoundRun(run, Status.ACCEPTABLE, "the search did not end faster than its start")
+    times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
+    return FoundRun(
+        run, solution.status, solution.sentence, steps, solution.place, times, solution.kept, solution.price
+    )
+
+
+def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun, Guess, TubeSolution]:
+    """The run with the budgets that the last of the searches had, the steps from which that began, and its solution."""
+    guess = start.guess(k, run)
+    found = solver.first.solve(run, guess)
+    if found.steps is None or (found.kept is not None and found.kept.any()):
+        cut, own = solver.finer[0]
+        guess = start.guess_in(k, run, cut)
+        return run, guess, own.solve(run, guess)
+    for cut, own in solver.finer:
+        wider = start.with_reserve(run, guess.leg, found)
+        finer = divided(wider, guess.leg, found, cut)
+        again = searched_again(wider, found, finer, own)
+        if again is not None and again.steps is not None and again.steps.h.sum() <= found.steps.h.sum():
+            run, guess, found = wider, finer.guess, again
+    return run, guess, found
+
+
+def tabled(
+    job: Job,
+    start: GridHistory | None,
+    made: Delivered,
+    found: list[FoundRun],
+    stays: list[int],
+    alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
+) -> tuple[Tables, tuple[str, ...]]:
+    """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
+    tells: not on the runs in `stays`, of which a note speaks, and not behind filters.
+
+    start : what holds the motion that stays there
+    alone : what holds runs that are planned each by itself
+    """
+    if job.real[0].fir is not None:
+        return NO_TABLES, ()
+    with job.stage("report"):
+        taken = [one for k, one in enumerate(found) if k not in stays]
+        prices = found_prices(job.toolpath, job.machine, taken, made.trajectory.cycle_time)
+        grid = found_history(job.toolpath, made.motion, found, stays, start, alone)
+    moving = made.trajectory.cycle_time - float(job.toolpath.dwell.sum())
+    unpriced = 1.0 - sum(one.priced_time() for one in taken) / moving
+    if prices is None or unpriced > UNPRICED_MOST:
+        return Tables(grid=grid), ()
+    note = f"what limits cost leaves out {unpriced:.2g} of the time, on which the motion before stays"
+    return Tables(grid=grid, prices=prices), (note,) if unpriced > UNPRICED else ()
+
+
+def said(
+    job: Job, first: Start, found: list[FoundRun], stays: list[int], why: str, what: str
+) -> tuple[Status, str]:
+    """Status and sentence: of the worst search, and where the start stays. `what` the start is."""
+    took = [one for k, one in enumerate(found) if k not in stays]
+    worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
+    text = worst.sentence if worst else "no motion faster than the start's was found"
+    text += f"; its start ({what}) took {first.motion.end:.6g} s"
+    if stays:
+        run, line = found[stays[0]].run, job.toolpath.line
+        why = why or found[stays[0]].sentence
+        text += (
+            f" and stays on {len(stays)} of {len(found)} runs between full stops, the first on lines "
+            f"{line[run.first[0]]} to {line[run.first[-1] - 1]}: {why}"
+        )
+    return worst.status if worst and not stays else Status.ACCEPTABLE, text

@@ -1,0 +1,178 @@
+"""The time-optimal motion on a path: rounded corners, or splines shaped for it.
+
+  geometry  round the corners; lay splines over the runs between full stops                       corners/, smoothing/
+  solve     the time-optimal feed on that path, all limits at grid points                         order.py, feedrate/
+  reshape   path and feed improved together, all limits linearised, inside the
+            tolerance; solve on the new path; in turns                                 rounds.py, reshape.py, smoothing/
+  compare   single corners between the full stops, where they may be faster                       compare_corners.py
+
+and then, delivered as a plan,
+
+  tighten   where the motion exceeds a limit between grid points, allow less and solve again      tighten.py
+  filters   the same where it leaves the tolerance behind the machine's own filters               behind_filters.py
+  deliver   setpoints at the interpolation period, judged by the verifier                         planning/job/job.py, verify/
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from planner.base.errors import NotSolvedError
+from planner.base.names import AUTO, QUICK, SPLINE
+from planner.base.sizes import SIZES
+from planner.base.threads import beside, threads
+from planner.corners.smooth import SmoothPath, round_corners
+from planner.feedrate.sampling.samples import PathSamples, sample_path
+from planner.feedrate.solution import Status
+from planner.motion.timing import Motion
+from planner.planning.job.job import Job
+from planner.planning.job.made import Tables
+from planner.planning.job.plan import Plan
+from planner.planning.optimal.behind_filters import within_filters
+from planner.planning.optimal.compare_corners import corner_bounds, with_corners
+from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
+from planner.planning.optimal.geometry import corner_shape, lost_joints, splined_with_stops
+from planner.planning.optimal.notes import no_spline_note, not_compared_note
+from planner.planning.optimal.on_path import OnPath
+from planner.planning.optimal.result import plan_of_solution, priced, prices_of
+from planner.planning.optimal.rounds import reshaped
+from planner.planning.optimal.tighten import within_limits
+from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
+
+PRICED_BESIDE = SIZES.priced_beside
+
+
+def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
+    """The time-optimal motion on a smooth path, tightened where it exceeds a limit between grid points; None where there is none."""
+    try:
+        found = time_optimal(job, settings)
+    except NotSolvedError:  # no grid follows the path
+        return None
+    if not found.solution.solved:
+        return None
+    with job.stage("solve"):
+        return within_limits(found, settings.order, job.toolpath, job.machine, job.tell)
+
+
+def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None) -> Plan:
+    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered; without a trajectory
+    if it takes longer than `job.most`.
+
+    known : its motion, if there is one already (`kept_on_path`)
+    """
+    try:
+        found = [known[0] if known else time_optimal(job, settings)]
+    except NotSolvedError as fault:  # no grid follows the path
+        return job.plan(
+            None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
+        )  # fmt: skip
+    if job.machine.normal_acceleration != job.real[0].normal_acceleration:
+        found = [found.pop().held_by_filters()]
+    if not found[0].solution.solved:
+        return plan_of_solution(job, found[0], None, settings)
+    # from here on the motion is held by no name, so that tightening lets go of it: a third of a kilobyte a point
+    with job.stage("solve"):
+        best, motion = known or within_limits(
+            found.pop(), settings.order, job.toolpath, job.machine, job.tell
+        )
+    with job.stage("filters"):
+        best, motion, filtered = within_filters(best, motion, settings.order, job)
+    if motion.end > job.most:
+        return plan_of_solution(job, best, None, settings)
+    not_limited = () if settings.order.jerk_limited else ("jerk",)
+    if priced(best, job.machine) and len(best.samples) > PRICED_BESIDE and threads() > 1:
+        made, prices = beside(lambda: job.deliver(motion, not_limited), lambda: prices_of(best, job.machine))
+        tables = Tables(prices=prices)
+    else:
+        made = job.deliver(motion, not_limited)
+        tables = Tables(priced=best if priced(best, job.machine) else None)
+    return plan_of_solution(job, best, made._replace(filtered=filtered), settings, tables)
+
+
+def time_optimal(job: Job, settings: Settings) -> OnPath:
+    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines shaped for it."""
+    order, machine = settings.order, job.machine
+
+    # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
+    given = _rounded(job, settings)
+    if settings.corner not in (AUTO, SPLINE):
+        return order.solve(given, job, grids_for(given, job, settings)[0].final)
+    with job.stage("geometry"):
+        rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
+    if not splines.splines.fits.any():
+        cornered = order.solve(given, job, grids_for(given, job, settings)[0].final)
+        return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
+
+    # Solve and reshape in turns, on a coarse grid; then once on the final one. The coarse motion is let go of before: 0.5 kB a point.
+    # Where not one round is worth its work the final grid is the first one.
+    best, grids, resolution = _first(with_spline(rounded, splines), splines, job, settings)
+    if best.solution.solved and resolution != grids.final:
+        best = reshaped(rounded, best, job, settings, resolution)
+        path, splined, coarse = best.path, best.shape, best.solution.cycle_time
+        del best
+        best = dataclasses.replace(order.solve(path, job, grids.final), shape=splined)
+        job.tell(
+            "final grid",
+            found=best.solution.cycle_time,
+            before=coarse,
+            kept=best.solution.solved,
+        )
+    notes: tuple[str, ...] = ()
+
+    # Single corners between full stops where they are faster.
+    if settings.corner == AUTO:
+        with job.stage("solve"):
+            bounds = corner_bounds(rounded, machine, order.jerk_limited)
+        best, left = with_corners(rounded, best, bounds, job, order, grids)
+        notes = not_compared_note(rounded, left, bounds.points)
+
+    return dataclasses.replace(best, notes=notes)
+
+
+def first_motion(job: Job, settings: Settings) -> OnPath | None:
+    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points only; None where a run
+    gets no spline, where there is no solution, and where the splines have more spans than the steps that are searched."""
+    rounded = _rounded(job, settings)
+    with job.stage("geometry"):
+        shape = spline_shape(rounded, job.machine)
+        whole = shape.splines.fits.all() and not len(lost_joints(rounded, shape, fence=False))
+    if not whole or shape.splines.span_first[-1] > settings.effort.search.steps_max:
+        return None
+    try:
+        planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
+    except NotSolvedError:  # no grid follows the splines
+        return None
+    return planned if planned.solution.solved else None
+
+
+def _rounded(job: Job, settings: Settings) -> SmoothPath:
+    """The path with every corner rounded by itself."""
+    with job.stage("geometry"):
+        shape = corner_shape(settings.corner, job.machine, job.toolpath, settings.bezier)
+        return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
+
+
+def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
+    """The motion on the first splines, the grids, and the resolution of the one that it is on."""
+    spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
+    if settings.rounds is None and spans > effort.work and effort.grids(spans) is effort.sizes[-1]:
+        grids = effort.sizes[-1]
+        return (
+            dataclasses.replace(settings.order.solve(path, job, grids.final), shape=shape),
+            grids,
+            grids.final,
+        )
+    grids, samples = grids_for(path, job, settings)
+    reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
+    resolution = grids.rounds if reshaped_at_all else grids.final
+    known = samples if resolution == COARSE else None
+    del samples
+    planned = settings.order.solve(path, job, resolution, samples=known)
+    return dataclasses.replace(planned, shape=shape), grids, resolution
+
+
+def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, PathSamples]:
+    """The grids that a path of this size is worth, and the coarse one by which that is told."""
+    with job.stage("geometry"):
+        coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
+    return settings.effort.grids(len(coarse)), coarse

@@ -1,0 +1,191 @@
+"""The page: from a program to a verified plan, in the order in which it runs.
+
+  path       the programmed path with its joints and tolerances, and the limits on it                       geometry/, machine/
+  motion     the method's attempts, one after the other: each makes a motion and delivers it (job.py):
+             slower where filters behind the setpoints ask for it, sampled, judged by the verifier          planning/attempts.py
+  again      what the verdict finds: single runs planned by themselves (runs_alone.py), all of it with less
+             tolerance (less_tolerance.py), or slower in places
+  shares     on machines with filters: all of that once more with less of the tolerance for the path
+  finish     what limits and tolerance cost                                                                 sensitivity/
+
+Everything that is tried once more is in one table, `RETRIES` of planning/attempts.py.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from planner.base.errors import InputError
+from planner.feedrate.constraints.extruder import with_extruder_limit
+from planner.feedrate.constraints.limits import JERK, Limits
+from planner.geometry.build import toolpath_from_program
+from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
+from planner.motion.timing import require_samples
+from planner.nc.program import Program
+from planner.planning.attempt import Attempt, Tried
+from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
+from planner.planning.job.choice import faster, inside, not_in_step, passed, shown_time
+from planner.planning.job.job import Job
+from planner.planning.job.less_tolerance import with_less_tolerance
+from planner.planning.job.plan import Plan
+from planner.planning.job.runs_alone import with_runs_alone
+from planner.planning.job.stages import Progress, Stages
+from planner.planning.job.trace import Log
+from planner.planning.optimal.effort import Settings
+from planner.planning.optimal.result import prices_of
+
+# Runs on which the verdict finds something are planned each by itself where they are no more than this share of all [-].
+ALONE_SHARE = 0.1
+# Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the mean as seven were, for
+# 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
+CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
+
+
+class Method(ABC):
+    """A way to plan a job. Its repr is its row label in every table.
+
+    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
+              `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
+    measures_filters : whether filters make its motions slower only where they are measured to leave the tolerance
+    keeps_tangential : whether its motions keep the machine's limit of the tangential acceleration
+    """
+
+    ways: ClassVar[tuple[tuple[float, float], ...]] = ()
+    measures_filters: ClassVar[bool] = False
+    keeps_tangential: ClassVar[bool] = True
+
+    @property
+    def keeps_tolerance(self) -> bool:
+        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
+        return True
+
+    @abstractmethod
+    def plan_job(self, job: Job) -> Plan:
+        """Plan a job whose toolpath is laid out. What a method has to provide."""
+
+    def plan(
+        self,
+        program: Program,
+        machine: Machine,
+        tolerance: float | None = None,
+        progress: Progress | None = None,
+        log: Log | None = None,
+    ) -> Plan:
+        """Plan a program, sample the motion and have it judged.
+
+        tolerance : contour tolerance [mm]; None for the one of the program (G64 P) or the machine
+        progress  : called with the stage's name and the fraction done (0 to 1)
+        log       : called with every step of the planning, e.g. a `Trace` (trace.py)
+
+        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep. An unsolved problem is
+        the status of the plan.
+        """
+        job = job_of(program, machine, tolerance, Stages(progress, log))
+        if not self.keeps_tangential and np.isfinite(Limits.of(machine, job.toolpath.axes).tangential):
+            raise InputError(
+                f"the machine limits the tangential acceleration to {machine.tangential_acceleration:g} mm/s2, which {self!r} does not "
+                "keep; plan with method optimal, second-order, bezier or stop, or leave tangential_acceleration out of the machine"
+            )
+        best = within_tolerance(job, self)
+        for share, seen in self.ways if _filters_cost_time(best, job, self) else ():
+            shared = job.with_share(share, seen, curved=self.measures_filters)
+            made = within_tolerance(shared.faster_than(best.cycle_time if passed(best) else np.inf), self)
+            before, best = best, faster(best, made)
+            found, last = shown_time(made), shown_time(before)
+            job.tell(
+                "share of tolerance", found=found, before=last, kept=best is made, share=share, filters=seen
+            )
+        if (why := not_in_step(best, shaped=getattr(self, "shaped", False))) is not None:
+            return best.without_motion(why)
+        return _finished(best, job)
+
+
+def job_of(program: Program, machine: Machine, tolerance: float | None, stages: Stages) -> Job:
+    """The job: path and limits. Raises InputError for a program that cannot be planned."""
+    with stages.stage("geometry"):
+        toolpath = toolpath_from_program(program, machine, tolerance)
+        if (fed := toolpath.extrusion) is not None:
+            machine = with_extruder_limit(machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block)
+    # at the programmed feed, which no motion exceeds: some jobs can be refused before any work
+    at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
+    require_samples(at_feed, machine.dt)
+    stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
+    return Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
+
+
+def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:
+    """Whether filters behind the setpoints make the plan slower, as far as is known: then less of the tolerance for the path may be
+    faster."""
+    if job.machine.fir is None or best.making is None:
+        return False
+    return not method.measures_filters or not passed(best) or best.making.filtered
+
+
+def within_tolerance(job: Job, method: Method) -> Plan:
+    """The plan of a job, of which the chords between samples keep the tolerance too (delivery/periods.py).
+
+    A motion that takes longer than `job.most` is not planned again: with less tolerance it would hardly be faster.
+    """
+    made = method.plan_job(job)
+    if made.verdict is None or (made.verdict.passed and (inside(made) or not method.keeps_tolerance)):
+        return made
+    again = None
+    if method.keeps_tolerance:
+        again = _runs_alone(job, made, method) or with_less_tolerance(job, made, method.plan_job)
+    return faster(again or made, made.slower_in_places())
+
+
+def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan:
+    """The plan of the attempts that apply, in turn; the last one that makes a plan when there is none always does."""
+    tried = Tried()
+    for attempt in attempts:
+        if attempt.applies(job, settings, tried):
+            job.tell(attempt.name)
+            tried = attempt.make(job, settings, tried)
+    assert tried.best is not None
+    return tried.best
+
+
+def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
+    """The plan with the runs on which its verdict finds something planned each by itself, and all others as they are; None where these
+    are not few, or what comes of it does not pass."""
+    machine, toolpath = job.real
+    making, verdict, stops = made.making, made.verdict, full_stops(job.toolpath)
+    if (
+        making is None
+        or verdict is None
+        or machine.fir is not None
+        or isinstance(making.motion, ShapedMotion)
+    ):
+        return None
+    if len(stops) < 3 or len(stops) != len(full_stops(toolpath)):
+        return None
+    runs = RunsInTime(making.motion, job)
+    broken, few = broken_runs(runs.edges(), verdict), ALONE_SHARE * (len(stops) - 1)
+    if not 0 < len(broken) <= few:
+        return None
+    parts = [None if k in broken else [runs.spliced(k)] for k in range(len(stops) - 1)]
+    jerk = verdict.limits.get(JERK.called(toolpath.axes[0]))
+    not_limited = () if jerk is None or jerk.limited else ("jerk",)
+    found = with_runs_alone(job, parts, lambda of_run: within_tolerance(of_run, method), few, not_limited)
+    if found is None:
+        return None
+    grid = made.grid
+    if grid is not None:
+        grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges(), found.begin))
+    return made.delivering(found.delivered, grid=grid, notes=(*made.notes, *found.notes))
+
+
+def _finished(best: Plan, job: Job) -> Plan:
+    """The plan with what its limits cost, and without what only planning needs."""
+    priced = best.making and best.making.priced
+    best = dataclasses.replace(best, making=None)
+    if not priced:
+        return best
+    with job.stage("report"):
+        return dataclasses.replace(best, prices=prices_of(priced, job.machine))

@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.point_to_point import rest_to_rest_times
-from planner.baselines.fir.leg_guide import LegGuide
+from planner.baselines.fir.guide import LegGuide
 from planner.baselines.fir.rules import schedule
 from planner.baselines.fir.schedule import Schedule
 from planner.baselines.fir.slow_down import WORTH, settled_fastest

@@ -52,7 +52,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
-from planner.baselines.fir.leg_guide import LegGuide
+from planner.baselines.fir.guide import LegGuide
 from planner.baselines.fir.schedule import Schedule
 from planner.corners.budget import largest_normal
 from planner.corners.fir import overlap_time

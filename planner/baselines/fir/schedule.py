@@ -15,8 +15,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command, VelocityPulses, command_of, lower_between
-from planner.baselines.fir.guide import per_joint, per_leg
-from planner.baselines.fir.leg_guide import LegGuide
+from planner.baselines.fir.guide import LegGuide, per_joint, per_leg
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.baselines.fir.fastest_schedule import fastest_schedule, plain_plan
-from planner.baselines.fir.guide import check_profile_filters
-from planner.baselines.fir.leg_guide import LegGuide, guide_of_legs
+from planner.baselines.fir.guide import LegGuide, check_profile_filters, guide_of_legs
 from planner.baselines.fir.schedule import Schedule
 from planner.baselines.fir.superpose import Filtered, axes_of, reached, superpose
 from planner.feedrate.solution import Status

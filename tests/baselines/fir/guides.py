@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
-from planner.baselines.fir.leg_guide import LegGuide, guide_of_legs
+from planner.baselines.fir.guide import LegGuide, guide_of_legs
 from planner.baselines.fir.schedule import Schedule
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine

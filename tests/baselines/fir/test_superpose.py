@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.baselines.fir.command import VelocityPulses, command_of
-from planner.baselines.fir.leg_guide import guide_of_legs
+from planner.baselines.fir.guide import guide_of_legs
 from planner.baselines.fir.slow_down import make
 from planner.baselines.fir.superpose import superpose
 from planner.geometry.build import toolpath_from_program

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 
 from planner.nc.language import tree
 from planner.nc.language.expression_reader import Token, TokenReader, ranked
@@ -81,8 +82,9 @@ class Block:
 
     def take(self, pattern: str) -> re.Match[str] | None:
         """Go past what fits a pattern, in small letters too, if it comes next."""
-        match = re.compile(pattern, re.IGNORECASE).match(self.text, self.column)
-        self.column = match.end() if match else self.column
+        match = _compiled(pattern).match(self.text, self.column)
+        if match is not None:
+            self.column = match.end()
         return match
 
     def end(self, message: str = "nothing may follow here") -> None:
@@ -92,16 +94,21 @@ class Block:
 
     def value(self) -> tree.Expression:
         """The number or parameter that comes next. Raises ProgramFault."""
-        self.take(" *")
-        if match := self.take(r"([+-]?)\s*Q(\d+)(?!\d)"):
-            number = int(match[2])
-            if number >= PARAMETERS:
-                raise self.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", match.start())
-            return -parameter(number) if match[1] == "-" else parameter(number)
-        match = self.take(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)")
+        match = self.take(r" *(?:([+-]?)\s*Q(\d+)(?!\d)|([+-]?(?:\d+(?:\.\d*)?|\.\d+)))")
         if match is None:
+            self.take(" *")
             raise self.wrong("a number or a Q parameter is expected here, such as +12.5 or Q3")
-        return tree.Number(float(match[0]))
+        if match[3]:
+            return tree.Number(float(match[3]))
+        number = int(match[2])
+        if number >= PARAMETERS:
+            raise self.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", match.start(1))
+        return -parameter(number) if match[1] == "-" else parameter(number)
+
+
+@cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    return re.compile(pattern, re.IGNORECASE)
 
 
 Rows = list[tree.Statement]
@@ -190,7 +197,7 @@ class Formula(TokenReader):
 
 
 _ITEM = (
-    r"(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
+    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
     r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
     r"(?P<ahead>LA)(?=\s*\d))"
 )
@@ -230,12 +237,13 @@ class Items:
 def items(block: Block, turning: bool = False) -> Items:
     """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises ProgramFault for what a path
     function does not take here."""
-    found = Items()
-    while block.rest.strip():
-        block.take(r"\s*")
-        at, item = block.column, block.take(_ITEM)
+    found, end = Items(), len(block.text.rstrip())
+    while block.column < end:
+        item = block.take(_ITEM)
         if item is None:
+            block.take(r"\s*")
             raise block.wrong(f"{block.rest.split()[0]} is not read here")
+        at = item.end() - len(item[0].lstrip())
         if item["axis"]:
             name = item["axis"].upper()
             if name[-1] not in "XYZ" and not (turning and name in _ROTARY):

@@ -158,6 +158,9 @@ def test_slots_lie_where_they_are_asked_for() -> None:
         (f"251 P {POCKET.format(turn=1)} Q218=60 Q219=40 Q207=0", "the feed in the plane"),
         (f"251 P {POCKET.format(turn=1)} Q218=60 Q219=40 Q202=0.000000001", "too small an infeed"),
         ("205 P Q200=2 Q201=-20 Q379=3", "Q379"),
+        ("200 D Q200=3 Q201=0 Q202=2 Q206=90", "at or above its surface"),
+        ("240 C Q200=3 Q201=-0 Q206=90", "at or above its surface"),
+        ("200 D Q200=3 Q201=-12 Q202=0.00001 Q206=90", "too small an infeed"),
         ("204 B Q200=2", "cycle 204 is not read; read are 1, 7, 8"),
     ],
 )

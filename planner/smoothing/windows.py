@@ -102,7 +102,7 @@ def in_ranges(begin: int, end: int, size: int, window: int, work: Callable[[int,
 
 
 def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None]) -> None:
-    """Work on runs (k,) of these sizes (k,) side by side, where there are `least` spans in all."""
+    """Do `work` on lists of `runs` (k,), whose `size` (k,) is in spans, side by side; on one list if there are less than `least`."""
     shares = _shares(size, threads() if size.sum() >= least else 1)
     tasks = [partial(work, runs[own]) for own in shares]
     if len(tasks) > 1:

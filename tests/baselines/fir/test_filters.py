@@ -190,6 +190,21 @@ def test_the_spectrum_of_sampled_accelerations_is_exact_between_the_samples():
     np.testing.assert_allclose(acceleration_spectrum(t, a, w), expected, rtol=1e-4, atol=1e-6)
 
 
+# --- discrete filters -------------------------------------------------------------------------------------------------
+
+
+def test_filters_in_discrete_time():
+    """Moving averages of N_i periods: delay sum (N_i - 1)/2, variance dt^2 (sum N_i^2 - n)/12 (docs/papers.md A10), so less than the
+    continuous filters' by n dt^2/12."""
+    dt, counts = 1e-3, (50, 30)
+    taps = np.convolve(*(np.full(N, 1.0 / N) for N in counts))
+    t = np.arange(len(taps)) * dt
+    mean = (taps * t).sum()
+    assert mean == pytest.approx(dt * (49 + 29) / 2)
+    less = Filters(tuple(N * dt for N in counts)).variance - len(counts) * dt**2 / 12
+    assert (taps * (t - mean) ** 2).sum() == pytest.approx(less)
+
+
 # --- vibration --------------------------------------------------------------------------------------------------------
 
 

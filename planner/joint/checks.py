@@ -36,6 +36,8 @@ class Keeps(NamedTuple):
     normal: FloatArray  # (R,)
     state: FloatArray  # (K,)
     linear: FloatArray  # (A,)
+    word: FloatArray  # (R, W)
+    counts: FloatArray  # (A,)
     budget: FloatArray  # (R,)
     curvature: FloatArray  # (R,)
     vertex_budget: FloatArray  # (R+1,)
@@ -52,23 +54,28 @@ def _at(v, a, j, t):
 
 
 @njit(cache=True, error_model="numpy")
-def _of_state(keeps, h, v, a, j):
-    """The largest share of the state's limits in a step."""
+def _of_state(keeps, r, h, v, a, j):
+    """The largest share of the state's limits in a step on leg r, and of the feed in the axes that F goes by."""
     worst, axes = 0.0, len(v)
     w, b = np.empty(axes), np.empty(axes)
-    for n in range(PLACES if len(keeps.state) else 0):
+    for n in range(PLACES if len(keeps.state) or keeps.word.shape[1] else 0):
         t = h * n / (PLACES - 1)
         for k in range(axes):
             w[k], b[k] = v[k] + t * (a[k] + 0.5 * t * j[k]), a[k] + t * j[k]
         for kind in range(len(keeps.state)):
             worst = max(worst, used(kind, w, b, keeps.linear) / keeps.state[kind])
+        if keeps.word.shape[1]:
+            square = 0.0
+            for k in range(axes):
+                square += keeps.counts[k] * w[k] * w[k]
+            worst = max(worst, np.sqrt(square) / keeps.word[r, 0])
     return worst
 
 
 @njit(cache=True, error_model="numpy")
 def _of_limits(keeps, r, h, v, a, j):
     """The largest share of a limit in a step on leg r."""
-    worst, axes = _of_state(keeps, h, v, a, j), len(v)
+    worst, axes = _of_state(keeps, r, h, v, a, j), len(v)
     for k in range(axes):
         worst = max(worst, abs(j[k]) / keeps.jerk[k])
         worst = max(worst, max(abs(a[k]), abs(a[k] + h * j[k])) / keeps.acceleration[k])
@@ -101,7 +108,7 @@ def watched_shares(keeps, leg, h, state, jerk):
     h (N,), state (N+1, 3, A), jerk (N, A)."""
     shares = np.zeros(len(leg))
     for i in range(len(leg)):
-        shares[i] = _of_state(keeps, h[i], state[i, 1], state[i, 2], jerk[i])
+        shares[i] = _of_state(keeps, leg[i], h[i], state[i, 1], state[i, 2], jerk[i])
         for n in range(PLACES):
             square, _, across = _at(state[i, 1], state[i, 2], jerk[i], h[i] * n / (PLACES - 1))
             if square > 0.0 and across > 0.0:

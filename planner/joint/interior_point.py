@@ -24,7 +24,7 @@ from planner.base.kernels import njit
 from planner.joint.curvature import Barrier
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.rows import VECTORS, Linear, put_rows, slopes
-from planner.joint.state_limits import ROWS
+from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
 # Growth of prox per iteration once it grows, and its largest value [-]: with 1.5 searches of 80 random jobs take 1.2 times as many
@@ -136,7 +136,7 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         np.zeros((N, 3, axes)),
     )
     node = np.zeros((N, 3, axes))
-    state = np.zeros((N, ROWS * limits.state.shape[1], S + C))
+    state = np.zeros((N, ROWS * limits.state.shape[1] + WORD_ROWS * limits.word.shape[1], S + C))
     lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), state)
     factor = Factor(np.zeros((N, C, S)), np.zeros((N, C, C)), np.zeros((N + 1, S, S)))
     slacks = Slacks(np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many))

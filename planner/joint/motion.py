@@ -103,6 +103,14 @@ def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple
     return nodes, jerks
 
 
+def _largest_square(v: FloatArray, middle: FloatArray, after: FloatArray, counts: FloatArray) -> FloatArray:
+    """(N,) the largest Bernstein coefficient of the squared speed in the axes that count (A,) on each step (rows.py)."""
+    v, middle, after = v * counts, middle * counts, after * counts
+    square = [(v * v).sum(axis=1), (v * middle).sum(axis=1), (middle * after).sum(axis=1)]
+    square.append((2.0 * (middle * middle).sum(axis=1) + (v * after).sum(axis=1)) / 3.0)
+    return np.asarray(np.maximum(np.max(square, axis=0), 0.0))
+
+
 def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
     """By what factor the motion has to be slowed down to keep all limits; <= 1 if it keeps them."""
     h, v, a, j = steps.h[:, None], steps.velocity, steps.acceleration, steps.jerk
@@ -110,13 +118,12 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
     ordinates = np.concatenate(
         [v, middle]
     )  # both bound the parabola; every step ends where the next one begins
-    # Bernstein coefficients of the squared feed (rows.py)
-    square = [(v * v).sum(axis=1), (v * middle).sum(axis=1), (middle * after).sum(axis=1)]
-    square.append((2.0 * (middle * middle).sum(axis=1) + (v * after).sum(axis=1)) / 3.0)
     leg = guess.leg
+    feed = [_largest_square(v, middle, after, np.ones(len(run.axis))) / run.feed[leg] ** 2]
+    feed += [_largest_square(v, middle, after, run.counts) / one[leg] ** 2 for one in run.word.T]
     ratios = [
         (np.abs(ordinates) / run.velocity).max(),
-        np.sqrt((np.maximum(np.max(square, axis=0), 0.0) / run.feed[leg] ** 2).max()),
+        np.sqrt(np.max(feed)),
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]

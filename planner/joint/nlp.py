@@ -204,6 +204,11 @@ class TubeNLP:
             ca.SX.sym("from_rest"),
             ca.SX.sym("to_rest"),
         )  # 0 in the first and in the last step
+        word = ca.SX.sym("word")
+        if run.word.shape[1]:
+            w0, w1, w2 = (ca.DM(run.counts) * one for one in (v, ordinate, v1))
+            inner = ca.dot(w0, w1), (2 * ca.sumsqr(w1) + ca.dot(w0, w2)) / 3, ca.dot(w1, w2)
+            rows.append((ca.vertcat(ca.sumsqr(w0), *inner, ca.sumsqr(w2)) / word**2, -np.inf, 1.0))
         for kind in state:
             bound = run.state[kind] / acc
             ordinates = formula(ca, kind, (v, ordinate, v1), (a, a1), run.linear, REST * pace)
@@ -217,14 +222,15 @@ class TubeNLP:
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
         numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
         numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, mean_next)
-        numbers = ca.vertcat(numbers, from_rest, to_rest)
+        numbers = ca.vertcat(numbers, from_rest, to_rest, word)
         of_step = ca.Function(
             "step", [*of_stage, numbers], [following, ca.vertcat(*(row for row, _, _ in rows))]
         )
+        words = run.word[leg, 0] / speed if run.word.shape[1] else np.ones(steps)
         moving = np.arange(steps) > 0, np.arange(steps) < steps - 1  # at both ends of a step
         data = step_numbers(run, guess, mean_step[:-1], length, speed, acc)
         reached, limited = of_step.map(steps)(
-            node, step, ca.DM(np.column_stack([data, mean_step[1:] / length, *moving]).T)
+            node, step, ca.DM(np.column_stack([data, mean_step[1:] / length, *moving, words]).T)
         )
         constraints = ca.vec(ca.vertcat(after - reached, limited))
         low, high = (np.concatenate([np.full(row[0].numel(), row[k]) for row in rows]) for k in (1, 2))

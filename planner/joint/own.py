@@ -175,6 +175,7 @@ class _Search:
         shares = (
             (np.abs(beside) / run.velocity).max(axis=(0, 2)),
             np.linalg.norm(beside, axis=2).max(axis=0) / feed,
+            *(np.maximum(run.word_share(leg[at], one), run.word_share(leg[at - 1], one)) for one in beside),
             np.sqrt(np.maximum((np.abs(a) / run.acceleration).max(axis=1), pushed)),
         )
         by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
@@ -303,6 +304,8 @@ def keeps_of(run: TubeRun) -> Keeps:
         normal=run.across_max,
         state=run.state,
         linear=run.linear,
+        word=run.word,
+        counts=run.counts,
         budget=run.budget,
         curvature=run.curvature,
         vertex_budget=run.vertex_budget,
@@ -318,6 +321,7 @@ def _strain(run: TubeRun, guess: Guess) -> FloatArray:
         far,
         (np.abs(v) / run.velocity).max(axis=1),
         np.linalg.norm(v, axis=1) / run.feed[leg],
+        run.word_share(leg, v),
         (np.abs(a) / run.acceleration).max(axis=1),
         *state_shares(run.state, run.linear, v, a).T,
     )

@@ -43,14 +43,15 @@ def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
     box, more = z[:, : 8 * axes].reshape(-1, 4, 2, axes).sum(axis=2), z[:, 8 * axes :]
     at_vertex = window.limits.at_vertex
     node = more[:, rows.TUBE_NODE]
-    state = more[:, rows.STATE_ROWS :].reshape(len(z), -1, ROWS).sum(axis=2)
+    last = rows.STATE_ROWS + ROWS * window.limits.state.shape[1]
+    state = more[:, rows.STATE_ROWS : last].reshape(len(z), -1, ROWS).sum(axis=2)
     state = state if state.shape[1] else np.zeros((len(z), KINDS))
     price = np.column_stack(
         [
             box[:, 0],
             box[:, 1],
             box[:, 2] + box[:, 3],
-            more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1),
+            more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1) + more[:, last:].sum(axis=1),
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_MID],
             state,
             more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, 0.0, node),

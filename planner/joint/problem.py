@@ -14,7 +14,7 @@ from planner.joint.nlp import LONGER, LONGER_WATCHED
 from planner.joint.numbers import ROUNDING, pace
 from planner.joint.rows import StepLimits
 from planner.joint.run import TubeRun
-from planner.joint.state_limits import ROWS
+from planner.joint.state_limits import ROWS, WORD_ROWS
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks stay inside them.
 NARROWED = 2.0
@@ -116,8 +116,9 @@ def _limits(
     ):  # where a run begins or ends, the middle ordinate of the velocity is 0 for every motion
         if node in (0, len(guess)):
             on[step, 8 * len(run.axis) + rows.ORDER_MID] = False
-            for row in range(8 * len(run.axis) + rows.STATE_ROWS, on.shape[1]):
-                on[step, row] &= step == -1 and (row - 8 * len(run.axis) - rows.STATE_ROWS) % 3 == 0
+            first = 8 * len(run.axis) + rows.STATE_ROWS
+            for row in range(first, first + ROWS * len(run.state)):
+                on[step, row] &= step == -1 and (row - first) % 3 == 0
     return StepLimits(
         leg=leg,
         at_vertex=at_vertex,
@@ -131,6 +132,8 @@ def _limits(
         normal_node=np.minimum(normal, np.append(normal[0], normal[:-1])) * inside / acc,
         state=state,
         state_node=np.minimum(state, np.concatenate([state[:1], state[:-1]])),
+        word=run.word[leg] * inside / speed,
+        counts=run.counts,
         linear=run.linear,
         step_max=STEP_SHARE * np.where(curved, np.minimum(run.step_max[leg], run.offset[-1]), 1.0) / length,
         pace=pace(guess.state[lo : hi + 1, 1]) / speed,
@@ -145,7 +148,8 @@ def _limits(
 def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray:
     """(N, R) the rows that there are; those of the first node are not asked for, it stays."""
     axes = len(run.axis)
-    on = np.ones((len(leg), rows.count(axes) + ROWS * len(run.state)), dtype=bool)
+    words = run.word.shape[1]
+    on = np.ones((len(leg), rows.count(axes) + ROWS * len(run.state) + WORD_ROWS * words), dtype=bool)
     more = on[:, 8 * axes :]
     velocity = (run.feed[leg] > run.velocity.min()).any()
     on[:, 4 * axes : 8 * axes] = velocity
@@ -153,10 +157,14 @@ def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray
     more[at_vertex, rows.ORDER_NODE] = False
     limited = np.isfinite(run.across_max[leg])
     more[~limited, rows.NORMAL_NODE] = more[~limited, rows.NORMAL_MID] = False
-    more[:, rows.STATE_ROWS :] = np.repeat(np.isfinite(run.state), ROWS)
+    last = more.shape[1] - WORD_ROWS * words
+    more[:, rows.STATE_ROWS : last] = np.repeat(np.isfinite(run.state), ROWS)
+    if words:
+        more[:, last:] = np.isfinite(run.word[leg])
+        more[~at_vertex, last] = more[0, last] = more[-1, -1] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
     more[:, rows.SWITCH] = at_vertex & (run.switch[leg] != 0.0)
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False
     more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE, rows.SWITCH]] = False
-    more[0, rows.STATE_ROWS :: 3] = False
+    more[0, rows.STATE_ROWS : last : 3] = False
     return on

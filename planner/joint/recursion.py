@@ -85,7 +85,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
         model_of_rows(W, G, legs, limits, lin, i, barrier, of)
-        if limits.state.shape[1]:
+        if lin.state.shape[1]:
             add_state_curvature(W, limits, i, x[i], u[i], barrier.z[i, 8 * axes + STATE_ROWS :])
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
         for k in range(axes):

@@ -79,6 +79,8 @@ class StepLimits(NamedTuple):
     normal_node: FloatArray  # (N,)
     state: FloatArray  # (N, K) of the state's limits
     state_node: FloatArray  # (N, K)
+    word: FloatArray  # (N, W) feed in the axes that F goes by, if others move with them: W is 1 or 0
+    counts: FloatArray  # (A,) 1 for those axes, else 0
     linear: FloatArray  # (A,) 1 for x, y and z, else 0
     step_max: FloatArray  # (N,)
     pace: FloatArray  # (N,) a speed like that of the step
@@ -100,7 +102,7 @@ class Linear(NamedTuple):
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
-    state: FloatArray  # (N, 6 K, 4 A + 1) derivatives of the rows of the state's limits
+    state: FloatArray  # (N, 6 K + 5 W, 4 A + 1) derivatives of the rows of the state's limits
 
 
 @njit(cache=True, error_model="numpy")

@@ -31,16 +31,17 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
 from planner.feedrate.constraints.limits import Limits
-from planner.geometry.build import path_per_length
+from planner.geometry.build import feed_groups, path_per_length
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.word_feed import ROTARY, goes_by
 from planner.joint.state_limits import bounds_of
 from planner.machine import LINEAR_AXES, Machine
 
 # Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
 # turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
-ROUNDING = 1e-9  # of the length in all axes over that of F [-]
+ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
 class Budgets(NamedTuple):
@@ -70,6 +71,8 @@ class TubeRun:
     state                        : (K,) other limits of velocity and acceleration (state_limits.py)
     linear                       : (A,) 1 for x, y and z, else 0
     reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
+    word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with them, else 0
+    counts                       : (A,) 1 for those axes, else 0
     left                         : why the search cannot look for a motion here, "" if it can
     """
 
@@ -94,6 +97,8 @@ class TubeRun:
     state: FloatArray
     linear: FloatArray
     reserved: FloatArray
+    word: FloatArray
+    counts: FloatArray
     left: str = ""
 
     def __post_init__(self) -> None:
@@ -108,9 +113,10 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
-        for name in ("velocity", "acceleration", "jerk", "linear"):
+        for name in ("velocity", "acceleration", "jerk", "linear", "counts"):
             freeze(self, name, np.float64, (axes,))
         freeze(self, "state", np.float64, (None,), finite=False)
+        freeze(self, "word", np.float64, (legs, None), finite=False)
 
     def __len__(self) -> int:
         return len(self.length)
@@ -132,7 +138,15 @@ class TubeRun:
     def switch(self) -> FloatArray:
         """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no motion is so fast."""
         feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
-        return -np.sign(np.diff(feed, prepend=feed[0]))
+        change = np.sign(np.diff(feed, prepend=feed[0]))
+        return -np.where(change != 0.0, change, _word_change(self.word))
+
+    def word_share(self, leg: Array, velocity: FloatArray) -> FloatArray:
+        """(n,) share of the feed in the axes that F goes by that velocities (n, A) on the legs `leg` (n,) use; 0 where
+        those are all [-]."""
+        if not self.word.shape[1]:
+            return np.zeros(len(leg))
+        return np.asarray(np.linalg.norm(velocity * self.counts, axis=1) / self.word[leg, 0])
 
     @property
     def offset(self) -> FloatArray:
@@ -179,9 +193,12 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0)
         held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
+        word, counts, differs = _words(toolpath, row)
         yield TubeRun(
             axis=np.flatnonzero(moves),
-            left=_left(toolpath, slice(first[0], first[-1])),
+            left="G61 asks for the exact path" if toolpath.exact[first[0] : first[-1]].any() else differs,
+            word=word,
+            counts=counts[moves],
             first=first,
             curvature=toolpath.curvature[row],
             budget=budgets.leg,
@@ -199,15 +216,32 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
         )
 
 
-def _left(toolpath: Toolpath, part: slice) -> str:
-    """Why segments are left as they are. On a leg the feed is that along all axes: inside the tolerance x, y and z might take what the
-    rotary axes need not, and F with them be exceeded."""
-    if toolpath.exact[part].any():
-        return "G61 asks for the exact path"
-    per = path_per_length(toolpath.axes, toolpath.radius, toolpath)[part]
-    if (np.isfinite(toolpath.feed[part]) & (per > 1.0 + ROUNDING)).any():
-        return "F goes by some of the axes that move"
-    return ""
+def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:
+    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why no motion
+    can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so that F is a limit of
+    its own; it has to be of the same axes everywhere, and to change with the feed in all of them."""
+    groups, by = feed_groups(toolpath.axes), goes_by(toolpath)[row]
+    share = np.where(by == ROTARY, toolpath.radius, 1.0)
+    share = share / path_per_length(toolpath.axes, toolpath.radius, toolpath)[row]
+    feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
+    every = np.ones(len(groups))
+    if not (finite & (share < 1.0 - ROUNDING)).any():
+        return np.empty((len(row), 0)), every, ""
+    word = (feed * share)[:, None]
+    if len(np.unique(by[finite])) > 1:
+        return word, every, "F goes by other axes from block to block"
+    if (np.sign(np.diff(feed, prepend=feed[0])) * _word_change(word) < 0.0).any():
+        return word, every, "F rises where the feed in all axes falls"
+    return word, (groups == by[finite][0]).astype(np.float64), ""
+
+
+def _word_change(word: FloatArray) -> FloatArray:
+    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for rounding of it."""
+    if not word.shape[1]:
+        return np.zeros(len(word))
+    known = np.where(np.isfinite(word[:, 0]), word[:, 0], np.finfo(np.float64).max)
+    change = np.diff(known, prepend=known[0])
+    return np.where(np.abs(change) > ROUNDING * known, np.sign(change), 0.0)
 
 
 def budgets_of(

@@ -42,7 +42,7 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
             np.abs(j) / run.jerk,
             np.abs(push) / run.acceleration,
             np.abs(speed) / run.velocity,
-            np.sqrt(square) / run.feed[leg],
+            np.maximum(np.sqrt(square) / run.feed[leg], run.word_share(leg, speed)),
             np.linalg.norm(across, axis=1) / run.across_max[leg],
             state if len(run.state) else np.zeros((len(h), len(STATE_LIMITS))),
             used,

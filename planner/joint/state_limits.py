@@ -16,7 +16,12 @@ no rows.
 A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the model
 has what is positive of that of the products b.w: without it windows take many more iterations, or do not converge.
 
-Another limit of this kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of `_ordinates`, `used`
+The feed in the axes that F goes by, where others move with them: |v| <= F in x, y and z (or u, v and w, or the rotary
+axes alone), beside that in all axes of the rows of the feed (rows.py). It has the ordinates of |v|^2 as rows,
+
+    w0.w0 where a leg begins,   w0.w1,   (2 w1.w1 + w0.w2)/3,   w1.w2,   w2.w2,        over F^2, half of it, less 1/2.
+
+Another limit of the first kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of `_ordinates`, `used`
 and `formula`.
 """
 
@@ -34,6 +39,18 @@ from planner.machine import LINEAR_AXES
 
 STATE_LIMITS: tuple[Limit, ...] = (TANGENTIAL,)
 ROWS = 6  # of a limit: three ordinates, upper before lower
+WORD_ROWS = 5  # of the feed in the axes that F goes by
+# Of the curvature of those: weight, and the shares of w0, w1 and w2 in the vector that it is of.
+_CURVED = np.array(
+    [
+        (0, 1.0, 1.0, 0.0, 0.0),
+        (1, 1.0, 0.5, 0.5, 0.0),
+        (2, 2.0 / 3.0, 0.0, 1.0, 0.0),
+        (2, 1.0 / 3.0, 0.5, 0.0, 0.5),
+        (3, 1.0, 0.0, 0.5, 0.5),
+        (4, 1.0, 0.0, 0.0, 1.0),
+    ]
+)
 REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
 
 
@@ -120,10 +137,34 @@ def _ordinates(x, u, linear, rest, work, value, slope):
 
 
 @njit(cache=True, error_model="numpy")
+def _put_word_rows(limits, i, x, u, g, out):
+    """The rows of the feed in the axes that F goes by of step i, as `put_state_rows`."""
+    axes, per = len(u) - 1, 0.5 / limits.word[i, 0] ** 2
+    h = u[axes]
+    g[:], out[:] = -0.5, 0.0
+    for k in range(axes):
+        a, j, counts = x[2 * axes + k], u[k], limits.counts[k]
+        w0, w1 = x[axes + k], x[axes + k] + 0.5 * h * a
+        w2 = w0 + h * (a + 0.5 * h * j)
+        for r in range(WORD_ROWS):
+            n0 = 2.0 * w0 if r == 0 else w1 if r == 1 else w2 / 3.0 if r == 2 else 0.0
+            n1 = w0 if r == 1 else 4.0 / 3.0 * w1 if r == 2 else w2 if r == 3 else 0.0
+            n2 = w0 / 3.0 if r == 2 else w1 if r == 3 else 2.0 * w2 if r == 4 else 0.0
+            g[r] += 0.5 * per * counts * (n0 * w0 + n1 * w1 + n2 * w2)
+            out[r, axes + k] = per * counts * (n0 + n1 + n2)
+            out[r, 2 * axes + k] = per * counts * h * (0.5 * n1 + n2)
+            out[r, 3 * axes + k] = per * counts * 0.5 * h * h * n2
+            out[r, 4 * axes] += per * counts * (0.5 * n1 * a + n2 * (a + h * j))
+
+
+@njit(cache=True, error_model="numpy")
 def put_state_rows(limits, i, x, u, g, out):
-    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g (6 K,), and their derivatives by p, v, a, j and h into
-    out (6 K, 4 A + 1)."""
+    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g (6 K + 5 W,), and their derivatives by p, v, a, j and
+    h into out (6 K + 5 W, 4 A + 1)."""
     axes = len(u) - 1
+    if limits.word.shape[1]:
+        first = ROWS * limits.state.shape[1]
+        _put_word_rows(limits, i, x, u, g[first:], out[first:])
     work, value, slope = np.empty((5, axes)), np.empty((2, 3)), np.empty((2, 3, 4 * axes + 1))
     for kind in range(limits.state.shape[1]):
         rest = REST * limits.pace[i]
@@ -144,6 +185,29 @@ def add_state_curvature(W, limits, i, x, u, z):
     motion: of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,): multipliers."""
     axes = len(u) - 1
     h, w, square = u[axes], np.empty((3, axes)), np.zeros(3)
+    first = ROWS * limits.state.shape[1]
+    for m in range(len(_CURVED) if limits.word.shape[1] else 0):
+        row, share, c0, c1, c2 = _CURVED[m]
+        by, of_v, of_a, of_j = (
+            z[first + int(row)] * share / limits.word[i, 0] ** 2,
+            c0 + c1 + c2,
+            h * (0.5 * c1 + c2),
+            0.5 * h * h * c2,
+        )
+        for k in range(axes):
+            weight, a = by * limits.counts[k], x[2 * axes + k]
+            of_h = 0.5 * c1 * a + c2 * (a + h * u[k])
+            v, b, j, last = axes + k, 2 * axes + k, 3 * axes + k, 4 * axes
+            W[v, v] += weight * of_v * of_v
+            W[b, v] += weight * of_a * of_v
+            W[b, b] += weight * of_a * of_a
+            W[j, v] += weight * of_j * of_v
+            W[j, b] += weight * of_j * of_a
+            W[j, j] += weight * of_j * of_j
+            W[last, v] += weight * of_h * of_v
+            W[last, b] += weight * of_h * of_a
+            W[last, j] += weight * of_h * of_j
+            W[last, last] += weight * of_h * of_h
     alpha, e, across = np.zeros(4), np.empty(axes), np.empty((axes, axes))
     for k in range(axes):
         v, a = limits.linear[k] * x[axes + k], limits.linear[k] * x[2 * axes + k]

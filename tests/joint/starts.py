@@ -11,20 +11,25 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.run import TubeRun, tube_runs_of
-from planner.machine import Machine
+from planner.machine import Axis, Machine
 from planner.motion.vertex_times import passing_times
 from planner.nc.program import Program
-from planner.nc.reader import parse_program
+from planner.nc.reader import parse_program, read_program
 from planner.planning.methods.optimal import OptimalMethod
 
 MACHINE = problems.machine()
+TURNING = Axis(velocity=90.0, acceleration=1500.0, jerk=1e5)
+MACHINES = {
+    "pushed": MACHINE.model_copy(update={"tangential_acceleration": 300.0}),
+    "turned": MACHINE.model_copy(update={"axes": MACHINE.axes | {"a": TURNING}}),
+}
 PROGRAMS = {
     "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
     "arcs": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
     "pentagon": problems.pentagon(side=6.0),
+    "turned": read_program(text="G21 G90 F2400\nG1 X4 A3\nG1 X7 Y5 A8\nM2\n", machine=MACHINES["turned"]),
     "pushed": problems.polyline([[0, 0], [4, 0], [4, 4]]),  # along which a tangential acceleration holds
 }
-MACHINES = {"pushed": MACHINE.model_copy(update={"tangential_acceleration": 300.0})}
 
 
 @cache

@@ -52,6 +52,7 @@ FAILED_MOST = 0.5
 SEARCHES = (1.0, 1.2, 2.3)
 # Share of the time without prices from which that is said, and from which there are none [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
+OF_THE_START = "what limits cost is told of the motion before geometry and feed were found together"
 
 Report = Callable[[float], None]
 
@@ -123,7 +124,7 @@ def joint_plan(
     tables, notes = tabled(job, held, made.delivered, found, left, alone_held)
     if tables.prices is None and stays and priced(planned, job.machine):
         tables = dataclasses.replace(tables, priced=planned)
-        notes = ("what limits cost is told of the motion before geometry and feed were found together",)
+        notes = (OF_THE_START,)
     plan = job.plan(
         made.delivered,
         method=settings.method,

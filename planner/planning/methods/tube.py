@@ -8,7 +8,7 @@ window by window (joint/parts.py): the plan is never slower. `optimal` searches 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from planner.nc.program import Program
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
-from planner.planning.joint_search import said, search_run, tabled
+from planner.planning.joint_search import OF_THE_START, said, search_run, tabled
 from planner.planning.joint_start import Start
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.page import Method, within_tolerance
@@ -59,6 +59,9 @@ class TubeMethod(Method):
         status, sentence = said(job, start, found, stays, why, f"{first.method}{corner}")
         grid_points = sum(len(one.steps.h) + 1 for one in found if one.steps) or first.grid_points
         tables, notes = tabled(job, first.grid, made, found, stays)
+        if tables.prices is None and (first.prices is not None or first.making.priced is not None):
+            tables = replace(tables, prices=first.prices, priced=first.making.priced)
+            notes = (OF_THE_START,)
         return self._plan(job, made, status, sentence, grid_points, tables, notes)
 
     def _plan(

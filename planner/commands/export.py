@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class For(StrEnum):
-    """What the files are for."""
+    """The purpose of the files."""
 
     stream = "linuxcnc-stream"
     pvt = "pvt"

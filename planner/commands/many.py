@@ -44,7 +44,7 @@ ENDING = 5.0  # that processes get to remove what they have half written [s]
 
 @dataclass(frozen=True, kw_only=True)
 class Done:
-    """What came of a program: exit code, the content of `summary.json` if there is any, and what the process said."""
+    """The outcome of a program: exit code, the content of `summary.json` if there is any, and what the process said."""
 
     job: Path
     code: int

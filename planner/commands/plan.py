@@ -168,7 +168,7 @@ def plan_command(
 
 
 def _trace(steps: Trace, plan: Plan) -> dict[str, Any]:
-    """What planning tried, for a file: times in s; `kept` says whether a step was taken over."""
+    """The trace of planning, for a file: times in s; `kept` says whether a step was taken over."""
     return {
         "program": plan.program.source,
         "method": plan.method,

@@ -1,4 +1,4 @@
-"""What `what-if` and `sweep` share: the options of a job that is planned many times, and how such a command ends."""
+"""Common to `what-if` and `sweep`: the options of a job that is planned many times, and how such a command ends."""
 
 from __future__ import annotations
 

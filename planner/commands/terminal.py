@@ -43,7 +43,7 @@ def prepare_streams() -> None:
 
 
 def _plain_text(fault: UnicodeError) -> tuple[str, int]:
-    """What an encoding lacks: plain letters for units, escapes for the rest, file names that are no UTF-8 among them."""
+    """Substitutes for what an encoding lacks: plain letters for units, escapes for the rest, file names that are no UTF-8 among them."""
     if not isinstance(fault, UnicodeEncodeError):
         raise fault
     lacking = fault.object[fault.start : fault.end]

@@ -1,4 +1,4 @@
-"""What a feedrate solver returns: a status with a sentence, and a profile or NaN, never a plausible number."""
+"""The result of a feedrate solver: a status with a sentence, and a profile or NaN, never a plausible number."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prices:
-    """What the limits cost: derivatives of the cycle time with respect to them, never positive, on the solved grid.
+    """The prices of the limits: derivatives of the cycle time with respect to them, never positive, on the solved grid.
 
     velocity, acceleration, jerk : (A,) dT/d(axis limit) [s per mm/s, mm/s2, mm/s3]
     feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity or the

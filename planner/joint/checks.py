@@ -26,7 +26,7 @@ PIECES = 4
 
 
 class Keeps(NamedTuple):
-    """What steps on R legs with A axes have to keep."""
+    """The limits of steps on R legs with A axes."""
 
     legs: LegFormulas
     velocity: FloatArray  # (A,)

@@ -1,4 +1,4 @@
-"""What the free optimum (nlp.py) needs to know of its steps, in numbers: their legs and limits, and how fast they are about."""
+"""The numbers of the free optimum's steps (nlp.py): their legs and limits, and how fast they are about."""
 
 from __future__ import annotations
 

@@ -293,7 +293,7 @@ class _Search:
 
 
 def keeps_of(run: TubeRun) -> Keeps:
-    """What the run has to keep, for the kernel."""
+    """The limits of the run, for the kernel."""
     names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
     return Keeps(
         legs=LegFormulas(**{name: getattr(run, name) for name in names}),

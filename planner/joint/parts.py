@@ -1,4 +1,4 @@
-"""What was found along a run as parts of a motion: steps of constant jerk, and between them the start's motion where it stays."""
+"""The solution along a run as parts of a motion: steps of constant jerk, and between them the start's motion where it stays."""
 
 from __future__ import annotations
 

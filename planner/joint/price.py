@@ -1,4 +1,4 @@
-"""What limits and tolerance cost along the free optimum: the multipliers of the search, sorted by what they price.
+"""The prices of limits and tolerance along the free optimum: the multipliers of the search, sorted by what they price.
 
 At its end the Lagrangian T + sum z g is stationary in everything but the limits, so that dT/d(ln limit) = sum of z dg/d(ln limit).
 The rows (rows.py) are shares of limits, g = y/limit - 1 of one axis and g = (|y|^2/limit^2 - 1)/2 of a ball. Where z > 0 both are

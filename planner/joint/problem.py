@@ -87,7 +87,7 @@ def _limits(
     units: tuple[float, float],
     narrow: tuple[float, FloatArray | None],
 ) -> StepLimits:
-    """What the steps lo .. hi - 1 keep, in the units of time [s] and length [mm]; narrowed as in `window_of`."""
+    """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed as in `window_of`."""
     second, length = units
     speed, acc, jerk = length / second, length / second**2, length / second**3
     leg = guess.leg[lo:hi]

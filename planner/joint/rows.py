@@ -65,7 +65,7 @@ VECTOR_OF_BOX = (J, A, MID, V)
 
 
 class StepLimits(NamedTuple):
-    """What N steps have to keep, in the units of the problem."""
+    """The limits of N steps, in the units of the problem."""
 
     leg: Array  # (N,)
     at_vertex: Array  # (N,) whether the step's node is where its leg begins

@@ -1,4 +1,4 @@
-"""What the free optimum has to follow: a run, the legs of the programmed path between two full stops, with their budgets and limits.
+"""The data of the free optimum: a run, the legs of the programmed path between two full stops, with their budgets and limits.
 
 A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length] on it both are
 
@@ -45,7 +45,7 @@ ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
 class Budgets(NamedTuple):
-    """What R legs and the R+1 vertices around them may use of the tolerance, eps_ap, and what the rest of it allows."""
+    """The parts of the tolerance that R legs and the R+1 vertices around them may use, eps_ap, and what the rest of it allows."""
 
     leg: FloatArray  # (R,) [mm]
     vertex: FloatArray  # (R+1,) 0 at both ends [mm]
@@ -247,7 +247,7 @@ def _word_change(word: FloatArray) -> FloatArray:
 def budgets_of(
     toolpath: Toolpath, machine: Machine, first: Array, reserved: FloatArray | None = None
 ) -> Budgets:
-    """What eq. (18)-(20) leave for the legs that hold the segments first[r] : first[r+1], first (R+1,).
+    """The budgets by eq. (18)-(20) for the legs that hold the segments first[r] : first[r+1], first (R+1,).
 
     reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest that the axes can give
     """

@@ -20,7 +20,7 @@ SAME_TIME = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplicedRun:
-    """What a motion does from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If it is `moving`
+    """A motion from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If it is `moving`
     at its end, the next one begins with the same position, velocity and acceleration."""
 
     motion: MotionInTime

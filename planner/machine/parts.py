@@ -120,7 +120,7 @@ class ToolData(Record):
 
 
 class Times(Record):
-    """What takes time while the axes stand still, beside dwells [s]; None where it is not known, and left out of totals.
+    """The times of events while the axes stand still, beside dwells [s]; None where it is not known, and left out of totals.
 
     tool_change   : M6, with stopping the spindle, and of plotters another pen
     spindle_start : M3 and M4, until the spindle turns as it should
@@ -159,7 +159,7 @@ class DialectData(Record):
 
 
 class ControlData(Record):
-    """What is set in the control's own planner, for predictions of how long it takes (controls/export/models.py); None for its default.
+    """The settings of the control's own planner, for predictions of how long it takes (controls/export/models.py); None for its default.
 
     name                   : of the control; the other keys count for programs that are written for it
     acceleration           : largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204

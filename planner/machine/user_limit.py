@@ -66,7 +66,7 @@ class Place:
 
 
 class OwnLimit(Protocol):
-    """What planner and judge ask of a limit.
+    """The protocol of a limit, for planner and judge.
 
     name  : what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
     unit  : of q

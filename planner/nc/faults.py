@@ -1,4 +1,4 @@
-"""What is found while a program is read: constructs that are not read, and assumptions about it.
+"""Findings while a program is read: constructs that are not read, and assumptions about it.
 
 Words that, as far as the program tells, move nothing are counted and said once each:
 

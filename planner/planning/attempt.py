@@ -15,7 +15,7 @@ from planner.planning.optimal.on_path import OnPath
 
 @dataclass(frozen=True, kw_only=True)
 class Tried:
-    """What the attempts so far have left.
+    """The outcome of the attempts so far.
 
     best  : the fastest plan; None before there is one
     path  : the time-optimal motion on a path, and in time with its limits kept between grid points, not delivered yet; None before

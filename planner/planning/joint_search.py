@@ -176,7 +176,7 @@ def _of_whole(report: Report, begin: float, end: float, share: float) -> None:
 def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun] | None:
-    """What is found on each run; None where more than `FAILED_MOST` of the steps are on runs that are not found as a whole, unless the
+    """The solution on each run; None where more than `FAILED_MOST` of the steps are on runs that are not found as a whole, unless the
     start `stays` there."""
     size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
     found: list[FoundRun | None] = [None for _ in runs]
@@ -215,7 +215,7 @@ def searched_runs(
 def search_run(
     k: int, run: TubeRun, start: Start, solver: TubeSolver | InTwo, within: float = np.inf
 ) -> FoundRun:
-    """What the search along run k leads to from its start; of no use if it takes as long as `within` [s]."""
+    """The solution of the search along run k from its start; of no use if it takes as long as `within` [s]."""
     if run.left:
         return FoundRun(run, Status.ACCEPTABLE, run.left)
     guess = start.guess(k, run)
@@ -259,7 +259,7 @@ def tabled(
     stays: list[int],
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> tuple[Tables, tuple[str, ...]]:
-    """What holds the motion that was delivered, and what limits and tolerance cost (sensitivity/found_*.py), of the search where it
+    """The active limits of the delivered motion, and the prices of limits and tolerance (sensitivity/found_*.py), of the search where it
     tells: not on the runs in `stays`, of which a note speaks, and not behind filters.
 
     start : what holds the motion that stays there

@@ -1,1 +1,1 @@
-"""What a plan tells: tables, figures, and files of trajectories, pulses and programs."""
+"""The output of a plan: tables, figures, and files of trajectories, pulses and programs."""

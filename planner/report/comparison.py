@@ -120,7 +120,7 @@ def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:
-    """What all rows have in common. `tolerance` [mm] is None if the program or the machine sets it."""
+    """The values that all rows have in common. `tolerance` [mm] is None if the program or the machine sets it."""
     return {
         "program": source,
         "machine": machine.model_dump(mode="json", exclude_none=True),

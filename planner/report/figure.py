@@ -1,4 +1,4 @@
-"""What the figures of a motion show, described once: matplotlib draws it on paper (profiles_figure.py,
+"""The figures of a motion, described once: matplotlib draws it on paper (profiles_figure.py,
 plots.py), plotly in notebooks (report/interactive/page.py) and in pages (html/), for which
 plotly_figure.py puts it into plotly's words.
 

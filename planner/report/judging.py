@@ -74,7 +74,7 @@ def judge(
 
 @dataclass(frozen=True, kw_only=True)
 class FileSays:
-    """What a trajectory file says about itself. It is used where nobody says otherwise, always reported, and never a
+    """The metadata of a trajectory file. It is used where nobody says otherwise, always reported, and never a
     reason to pass.
 
     machine     : its machine, as in a machine file, or None
@@ -123,7 +123,7 @@ class FileSays:
         return found
 
     def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
-        """What the file says, and whether it was used."""
+        """The metadata in words, and whether they were used."""
         settings = ", ".join(f"{name} {value}" for name, value in self.reading.changed().items())
         said = []
         for what, taken, instead in (

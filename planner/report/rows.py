@@ -1,4 +1,4 @@
-"""What is said of a plan and of a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under `told`,
+"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under `told`,
 and the report and the card of a notebook show. Nothing else puts these figures into words.
 
 What a plan says beside its motion: the active limits, what more of them would save, and the corners where tolerance saves most.
@@ -136,7 +136,7 @@ def held_by_text(grid: GridHistory) -> str:
 
 
 def held_by_rows(grid: GridHistory, prices: PriceList | None) -> list[tuple[str, int, str]]:
-    """What is active, for how many per cent of the time, and what more of it saves: "" where that is not known or nothing."""
+    """The active limits, for how many per cent of the time, and what more of it saves: "" where that is not known or nothing."""
     return [(name, percent, _saves(prices, name)) for name, percent in grid.percents()]
 
 
@@ -182,7 +182,7 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
 
 
 def _by_line(corners: DearCorners) -> str:
-    """What more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop passes again are added up."""
+    """The time that more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop passes again are added up."""
     passed: dict[int, list[float]] = {}
     for line, saved in zip(corners.line.tolist(), corners.saved.tolist(), strict=True):
         passed.setdefault(line, []).append(saved / MILLISECOND)
@@ -194,7 +194,7 @@ def _by_line(corners: DearCorners) -> str:
 
 
 def _seconds(prices: PriceList, name: str) -> str:
-    """What more of a limit saves: a number, or a range where a number would say too much."""
+    """The time that more of a limit saves: a number, or a range where a number would say too much."""
     if name not in prices.hints:
         return f"{prices.saved[name]:.3g} s"
     least, most = prices.ranges[name]
@@ -266,7 +266,7 @@ def _counted(it: Beside) -> str:
 
 
 def beside_summary(plan: Plan) -> dict[str, Any]:
-    """What takes time beside the motion: how often, how long each, the sum, and the total with the motion [s]; None where
+    """The auxiliary time: how often, how long each, the sum, and the total with the motion [s]; None where
     a time is not known. `dwell_s` is part of the cycle time."""
     beside = plan.beside
     seconds = sum(it.seconds for it in beside)

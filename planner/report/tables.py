@@ -55,7 +55,7 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
 
 
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
-    """What was assumed of a program and may change geometry or time: the first lines of what a command prints; at most so many."""
+    """The assumptions about a program that may change geometry or time: the first lines of what a command prints; at most so many."""
     return [Text(f"assumed: {text}", style="yellow") for text in first_of(assumptions, most)]
 
 
@@ -103,7 +103,7 @@ def corners_table(corners: CornerCheck) -> Table | None:
 
 
 def info_table(info: ProgramInfo) -> Group:
-    """What the reader assumed, what a program contains, and every construct that is not supported."""
+    """The reader's assumptions, what a program contains, and every construct that is not supported."""
     blocks = sum(info.blocks.values())
     title = f"{info.source}: {info.lines:,} lines, {blocks:,} blocks"
     table = _pairs()
@@ -153,7 +153,7 @@ def info_table(info: ProgramInfo) -> Group:
 
 
 def _expanded(expansion: Expansion) -> str:
-    """What was expanded, most called subprograms first."""
+    """The subprograms that were expanded, most called first."""
     calls = sorted(expansion.calls, key=lambda call: -call[1])
     shown = ", ".join(f"{name} {times:,} times" for name, times in calls[:CALLS_SHOWN])
     more = f" and {len(calls) - CALLS_SHOWN:,} more" if len(calls) > CALLS_SHOWN else ""

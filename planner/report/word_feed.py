@@ -115,7 +115,7 @@ RUN_PERIODS = 20
 
 @dataclass(frozen=True, eq=False)
 class PlannedBlocks:
-    """What the M segments of a path are planned to take: (M,) time [s], dwells not included, and (M,) highest feed [mm/s]."""
+    """The planned times and feeds of the M segments of a path: (M,) time [s], dwells not included, and (M,) highest feed [mm/s]."""
 
     duration: FloatArray
     highest: FloatArray
@@ -209,7 +209,7 @@ class BlockWatch:
         self._last = part.rows(np.array([len(part) - 1]))
 
     def planned(self, trajectory: Trajectory) -> PlannedBlocks:
-        """What was found, all samples of the trajectory taken."""
+        """The result, all samples of the trajectory taken."""
         toolpath, joint, passed, last = self._toolpath, self._joint, self._passed, self._last
         assert last is not None
         joint[-1], passed[-1] = last.t[-1], last.feed[-1]

@@ -1,1 +1,1 @@
-"""What limits cost and which of them are active; the closed-form speed at corners."""
+"""The prices of limits, and which of them are active; the closed-form speed at corners."""

@@ -1,4 +1,4 @@
-"""What corners cost: how much of the cycle time hangs on the size of each rounded corner, and on its error budget.
+"""The prices of corners: how much of the cycle time hangs on the size of each rounded corner, and on its error budget.
 
 1. Every corner is grown to scale by a little, its legs giving way, and the Lagrangian on the corresponding grid tells what that does
    to the time: dT/d(size) of each corner, from one evaluation of the path, or two where it has arcs;
@@ -54,7 +54,7 @@ BUDGETS = (
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerPrices:
-    """What the R+1 corners of a path do to the cycle time T.
+    """The prices of the R+1 corners of a path, by the cycle time T.
 
     size    : (R+1,) dT/d(d), d the tangent length [s/mm]
     budget  : (R+1,) dT/d(ln budget) of the chord and filter errors [s]

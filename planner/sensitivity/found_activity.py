@@ -1,4 +1,4 @@
-"""What a motion is at where geometry and feed were found together: step by step, from the search's steps (joint/shares.py).
+"""The active limits where geometry and feed were found together: step by step, from the search's steps (joint/shares.py).
 
 A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each. Shown is the one that has the
 largest price there. Where the motion of the start stays, it is what held that.
@@ -63,7 +63,7 @@ def found_history(
     start: GridHistory | None,
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> GridHistory | None:
-    """What holds a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
+    """The active limits of a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
     in it does not tell.
 
     motion : as it is delivered

@@ -1,4 +1,4 @@
-"""What the limits cost: by how much the cycle time of a time-optimal plan changes with each of them, and
+"""The prices of the limits: by how much the cycle time of a time-optimal plan changes with each of them, and
 which corners are dear.
 
 The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed
@@ -55,7 +55,7 @@ CHORDS = 0.2  # what chords between samples may use of the tolerance before what
 
 
 class SitePrices(NamedTuple):
-    """What the corridor of splines costs at J sites.
+    """The prices of the corridor of splines at J sites.
 
     place : (J,) along the legs [mm]
     price : (J,) dT/d(tolerance) there [s/mm]

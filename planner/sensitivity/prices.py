@@ -76,7 +76,7 @@ class Priced(NamedTuple):
     ratio: float
 
     def saved(self) -> float:
-        """What the power law of its kind foretells [s]."""
+        """The saving by the power law of its kind [s]."""
         n = POWER[self.kind]
         return -self.slope / n * (1.0 - self.ratio**-n)
 

@@ -116,7 +116,7 @@ class DearCorners:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlacePrices:
-    """What more costs and saves by place: at the M segments of the programmed path and the M+1 joints between them.
+    """The prices by place: at the M segments of the programmed path and the M+1 joints between them.
 
     feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
     limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
@@ -137,7 +137,7 @@ class PlacePrices:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PriceList:
-    """What limits and tolerance cost: derivatives of the cycle time T, negative where more of a limit saves time.
+    """The prices of limits and tolerance: derivatives of the cycle time T, negative where more of a limit saves time.
 
     limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of one's own
                 dT/d(least bound on the path), in their own units, with the bound elsewhere in proportion
@@ -160,7 +160,7 @@ class PriceList:
     places: PlacePrices | None = None
 
     def __repr__(self) -> str:
-        """What would save most, in a line."""
+        """The largest savings, in a line."""
         most = ", ".join(f"{name} {saved:.3g} s" for name, saved in self.ranked()[:PRICES_SHOWN])
         return f"<PriceList: more would save {most or 'nothing'}>"
 

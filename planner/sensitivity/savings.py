@@ -1,4 +1,4 @@
-"""What a tenth more of a limit saves where corners are rounded: the problem solved again with it.
+"""The saving by a tenth more of a limit where corners are rounded: the problem solved again with it.
 
 A price is a slope, and ten per cent of a limit are a long way down a curve that flattens: soon another limit
 holds, a feed that an axis cannot follow, a corner's normal acceleration. On a given path of rounded corners

@@ -20,7 +20,7 @@ HELD = 0.8  # of the programmed feed: from there on the feed is held [-]
 
 @njit(cache=True, error_model="numpy")
 def sideways(places, p):
-    """What a square of the velocity across the path costs at a place [s3/mm2] (combined.py): where the feed is held."""
+    """The cost of a square of the velocity across the path at a place [s3/mm2] (combined.py): where the feed is held."""
     axes = places.jet.shape[2]
     share = places.share[p, 3 * axes]
     return places.weight[p] / (share * places.limit[p, 3 * axes]) ** 2 if share > HELD else 0.0

@@ -107,7 +107,7 @@ def _put_row(places, p, kind, factor):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_moves(span, basis, along, y, moves):
-    """What the step y (n, A+1) does at the places (P,) of `Rows`, into moves (P, K + 3): all kinds of rows, and theta with its
+    """The step y (n, A+1) at the places (P,) of `Rows`, into moves (P, K + 3): all kinds of rows, and theta with its
     derivatives."""
     axes = along.shape[2]
     at = 3 * axes
@@ -213,7 +213,7 @@ def weigh(rows, state, lengths, balls, band, residual, push):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def predict(rows, state, step, barrier, bent, seen):
-    """What the predictor's `step` (n, A+1) does: into `barrier` and `bent` (n, A+1) the forces of a barrier of 1 and of the terms of
+    """The predictor's `step` (n, A+1): into `barrier` and `bent` (n, A+1) the forces of a barrier of 1 and of the terms of
     second order, into seen (5,) of all constraints the smallest and the largest share of a slack that the step adds, the sums of s z,
     of it times the share, and times its square."""
     first, span, basis, along, kinds_of, factor = rows[:6]
@@ -252,7 +252,7 @@ def predict(rows, state, step, barrier, bent, seen):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def move(rows, state, step, aim):
-    """What the corrector's `step` (n, A+1) to s z = aim does to slacks and multipliers, into the state; the largest share of slacks,
+    """The corrector's `step` (n, A+1) to s z = aim for slacks and multipliers, into the state; the largest share of slacks,
     and of multipliers, that it takes away."""
     first, span, basis, along, kinds_of, factor = rows[:6]
     sides, moves, _, _ = state

@@ -253,7 +253,7 @@ def _nearer(a: _Reading, b: _Reading) -> _Reading:
 
 
 def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machine) -> _Reading:
-    """What the motion does at its samples `rows` (C,)."""
+    """The motion at its samples `rows` (C,)."""
     linear = _linear(motion.axes)
     velocity, acceleration = motion.velocity[rows][:, linear], motion.acceleration[rows][:, linear]
     feed = np.linalg.norm(velocity, axis=1)

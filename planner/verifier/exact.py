@@ -46,7 +46,7 @@ from planner.verifier.worst import Limits
 def exact_faults(
     trajectory: Trajectory, readings: list[Observed], toolpath: Toolpath, limits: Limits
 ) -> list[Fault]:
-    """What is wrong with a motion where the path is to be followed exactly; empty if nothing is."""
+    """The faults of a motion where the path is to be followed exactly; empty if nothing is."""
     if not toolpath.exact.any():
         return []
     digits = float(np.linalg.norm(limits.rounding))

@@ -1,4 +1,4 @@
-"""What is wrong with a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for who made it."""
+"""The faults of a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for who made it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from planner.verifier.pieces import RATIO_ROUNDING
 
 
 class Kind(StrEnum):
-    """What a fault is about."""
+    """The subject of a fault."""
 
     SAMPLES = "samples"  # periods, columns, rest at both ends
     DIGITS = "digits"  # too few to judge a quantity

@@ -41,7 +41,7 @@ CARRIED = 4  # samples that a chunk shares with the one before
 
 @dataclass(frozen=True, eq=False)
 class ExtruderSeen:
-    """What the extruder did: checks of its limits by name, faults of its place, and notes."""
+    """The extruder's checks: those of its limits by name, faults of its place, and notes."""
 
     checks: dict[str, LimitCheck] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
@@ -56,7 +56,7 @@ def extruder_seen(
     given: Given,
     not_limited: tuple[str, ...],
 ) -> ExtruderSeen:
-    """What the extruder of a delivered motion did; nothing where the program has none."""
+    """The checks of the extruder of a delivered motion; nothing where the program has none."""
     if toolpath.extrusion is None:
         return ExtruderSeen()
     watch = _Watch(toolpath, joint_times(readings[0], pieces), given)

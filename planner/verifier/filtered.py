@@ -1,4 +1,4 @@
-"""What the machine's own filters make of the delivered setpoints: `[fir]`, moving averages in the drive or the control behind them.
+"""The delivered setpoints behind the machine's own filters: `[fir]`, moving averages in the drive or the control behind them.
 
 Between the setpoints the machine moves as its file says (`Signal`). A moving average of length T makes of that signal x(t) the mean
 of the last T seconds,
@@ -115,7 +115,7 @@ def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray,
 def after_filters(
     trajectory: Trajectory, toolpath: Toolpath, machine: Machine, pieces: ProgramPieces
 ) -> AfterFilters | None:
-    """What the machine's filters leave of the tolerance; None for a machine without."""
+    """The errors behind the machine's filters; None for a machine without."""
     if machine.fir is None:
         return None
     lengths = machine.fir.time_constants

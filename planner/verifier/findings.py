@@ -192,7 +192,7 @@ def _order(found: str, line: int) -> Fault:
 
 
 def out_of_order(readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
-    """What is wrong with a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
+    """The fault of a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
     been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
     for reading in readings:
         at = int(reading.match.tally[STUCK_AT])

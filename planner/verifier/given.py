@@ -1,4 +1,4 @@
-"""What is known about the numbers of a trajectory: which of them were delivered, and to how many digits."""
+"""The state of knowledge about the numbers of a trajectory: which of them were delivered, and to how many digits."""
 
 from __future__ import annotations
 

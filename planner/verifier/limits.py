@@ -61,7 +61,7 @@ ROWS_ALONE = 4
 
 
 def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
-    """What a delivered motion is measured against on a machine."""
+    """The limits of a delivered motion on a machine."""
     axes = trajectory.axes
     per_axis = np.array([machine.limits(name, axes) for name in DERIVATIVES])  # type: ignore[arg-type]
     return Limits(

@@ -76,7 +76,7 @@ class Reader:
     def read(
         self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
     ) -> list[Observed]:
-        """What both show beside a path; `progress` is called with the fraction done."""
+        """The findings of both beside a path; `progress` is called with the fraction done."""
         self.delivered = self._delivered()
         parts, cubic = self._way
         seen = Watch(pieces, self.limits, parts=parts, cubic=cubic)
@@ -185,7 +185,7 @@ class Comparison:
         self._sample_t, self._sample = t[left].copy(), self._sample[left].copy()
 
     def faults(self, limits: Limits, readings: list[Observed]) -> list[Fault]:
-        """What differs."""
+        """The differences."""
         said = []
         if abs(self.first) > PERIOD_ROUNDING or abs(self.end - self.last) > PERIOD_ROUNDING:
             found = (

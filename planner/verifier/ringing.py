@@ -40,7 +40,7 @@ STATE = 3  # numbers of a state
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ringing:
-    """What one mode does on every axis.
+    """The ringing of one mode on every axis.
 
     frequency, damping : the mode's [Hz], [-]
     axes               : their letters

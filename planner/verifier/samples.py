@@ -1,4 +1,4 @@
-"""What the samples themselves must be: at the machine's period (of a motion known by samples alone: not far above it), dense enough,
+"""The demands on the samples themselves: at the machine's period (of a motion known by samples alone: not far above it), dense enough,
 with enough digits, in seconds, from rest to rest.
 
 Density. Where the motion cannot be asked, nothing is known of it between two samples h apart but that it keeps the machine's limits,
@@ -69,7 +69,7 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
 
 
 class Delivered:
-    """What is kept of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run [mm].
+    """A summary of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run [mm].
 
     longest : periods up to `JITTER` times it are right [s], of a motion that is known by its samples alone and judged at their own
               times; None where every period has to be dt

@@ -1,4 +1,4 @@
-"""What samples show of a full stop: whether the motion can rest at its vertex, and for how long.
+"""A full stop as samples show it: whether the motion can rest at its vertex, and for how long.
 
 A motion that rests at the vertex at some time within a period h has, with |acceleration| <= a, over the period a chord of at most
 a h^2 / 2, and the nearer end of the period is at most a (h/2)^2 / 2 away; where jerk is limited to j, at rest the acceleration is zero
@@ -43,7 +43,7 @@ def watch_stop(
     parts: int,
     at_stop: AtStop,
 ) -> None:
-    """What the chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i, into `passed`."""
+    """The chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i, into `passed`."""
     acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
     slow, away_sq = 0.0, 0.0
     for axis in range(len(point)):

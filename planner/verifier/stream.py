@@ -32,7 +32,7 @@ COLUMNS = ("t", "position", *DERIVATIVES)
 
 @dataclass(eq=False, kw_only=True)
 class Observed:
-    """What a motion showed.
+    """The findings on a motion.
 
     note        : of which reading: "" for the delivered samples
     match       : the state of the matching
@@ -67,7 +67,7 @@ class Observed:
 
 
 class Watch:
-    """What a motion shows, chunk by chunk in order. Samples not later than those already read (overlap) are left
+    """The findings on a motion, chunk by chunk in order. Samples not later than those already read (overlap) are left
     out.
 
     parts : into how many a period is divided to be matched

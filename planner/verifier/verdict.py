@@ -50,7 +50,7 @@ class LimitCheck:
         return self.fault(Kind.LIMIT, axes).sentence
 
     def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
-        """What is wrong where the limit does not hold."""
+        """The fault where the limit does not hold."""
         where = placed(axes, self.position)
         found = f"{self.value:.7g} {self.unit}, {self.ratio:.6g} of the limit {self.limit:.6g} {self.unit}"
         found = f"{found} at t = {self.time:.6g} s, {where}, line {self.line}"
@@ -162,7 +162,7 @@ class Verdict:
 
     @property
     def kinds(self) -> frozenset[Kind]:
-        """What the faults are about."""
+        """The subjects of the faults."""
         return frozenset(fault.kind for fault in self.faults)
 
     @property

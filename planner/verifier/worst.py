@@ -131,7 +131,7 @@ def less_error(difference: tuple[FloatArray, FloatArray]) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Limits:
-    """What the motion is measured against: (3, A) velocity, acceleration, jerk; and the rest.
+    """The limits of the motion: (3, A) velocity, acceleration, jerk; and the rest.
 
     linear        : (A,) True on x, y and z, of which the normal acceleration is
     judged        : (3,) True for the columns velocity, acceleration, jerk that were delivered

@@ -143,7 +143,7 @@ def digest(job: StudiedJob) -> dict[str, str]:
 
 
 def _changed(before: dict[str, Any] | None, now: dict[str, Any]) -> list[str]:
-    """What is different of the inputs of two sweeps."""
+    """The differences between the inputs of two sweeps."""
     old = (before or {}).get("digest")
     if not isinstance(old, dict):
         return ["description, which cannot be read"]

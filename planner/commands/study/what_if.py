@@ -1,4 +1,4 @@
-"""What if: a job as it is, with each of some settings changed alone, and with all of them, planned again; beside what the prices of the
+"""A job as it is, with each of some settings changed alone, and with all of them, planned again; beside what the prices of the
 first plan foretold (commands/study/what_if.py).
 
 What the prices of a plan (sensitivity/prices.py) say of other values of its settings, without planning again.
@@ -123,7 +123,7 @@ class Forecast(NamedTuple):
 def forecast(
     prices: PriceList | None, settings: Sequence[Setting], machine: Machine, tolerance: float
 ) -> Forecast | None:
-    """What a change of all `settings` at once does to the cycle time; None where one of them has no price.
+    """The change of the cycle time by all `settings` at once; None where one of them has no price.
 
     tolerance : the present one [mm], NaN if there are several
     """

@@ -1,4 +1,4 @@
-"""What a control might be given of a plan: the program as it is, its own moves in the control's words, the planned path as chords.
+"""The candidates that a control may be given of a plan: the program as it is, its own moves in the control's words, the planned path as chords.
 
 The program as it is is the input, byte for byte; where the control cannot read it so (source.py), its lines are written in the
 control's words (translate.py). Chords replace only lines whose place the program's own words tell (rows.py).
@@ -106,7 +106,7 @@ class Candidates:
 
     @cached_property
     def used(self) -> float:
-        """What the plan takes of the tolerance [mm]. Raises InputError if the motion leaves the program."""
+        """The part of the tolerance that the plan uses [mm]. Raises InputError if the motion leaves the program."""
         verdict = self.plan.verdict
         assert verdict is not None
         if verdict.contour_error_mm is None or verdict.vertex_error_mm is None:
@@ -222,7 +222,7 @@ PATH_MODE = re.compile(rb"G\s*6\s*[14]", re.IGNORECASE)
 
 
 def linuxcnc_candidates(job: Candidates) -> list[Candidate]:
-    """What LinuxCNC might be given, the program's own path first."""
+    """The candidates for LinuxCNC, the program's own path first."""
     tolerance, room = job.tolerance, job.room or 0.0
     (own,) = job.own(OWN_CHORDS * tolerance)
     text = text_of(job.plan.program)

@@ -1,4 +1,4 @@
-"""What grbl, Klipper, Marlin and LinuxCNC know: the words of each, and how each is told what it has no word for.
+"""The tables of grbl, Klipper, Marlin and LinuxCNC: the words of each, and how each is told what it has no word for.
 
 A word that stands in no table is refused with its line. Where the tables come from:
 

@@ -1,4 +1,4 @@
-"""What has been written of a program for a control, and what it has in force there.
+"""The program written for a control so far, and what it has in force there.
 
 G90, G91, the motion code and F are said again wherever straight moves have changed them. S waits for the line that it belongs to: grbl
 empties its buffer at an S on a line of its own.
@@ -179,7 +179,7 @@ def head_of(source: Source, control: Control, plan: Plan, tolerance: float, what
 
 
 def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
-    """What holds for coordinates and start, in words; `as_it_is` where all lines are the program's own."""
+    """The assumptions on coordinates and start, in words; `as_it_is` where all lines are the program's own."""
     program = source.program
     used = sorted({code for row in source.rows for code in row.g() if codes.G_GROUP[code] == "work offset"})
     system = " ".join(system_name(code) for code in used) or "the work offset in force"

@@ -44,7 +44,7 @@ NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster t
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """What was written.
+    """The program as written.
 
     file      : its name
     sentence  : what it holds

@@ -63,7 +63,7 @@ def _read(text: bytes, plan: Plan, how: str) -> Source:
 
 
 def _same(text: bytes, plan: Plan, reading: object, how: str) -> Program:
-    """What the text reads as. Raises InputError if that is not the plan's program."""
+    """The program that the text reads as. Raises InputError if that is not the plan's program."""
     program = plan.program
     try:
         read = parse_program(text, plan.machine, reading, source=program.source)  # type: ignore[arg-type]
@@ -195,7 +195,7 @@ def _dwells_otherwise(row: Row, source: Source, control: Control) -> bool:
 
 
 def _line_why_not(row: Row) -> str:
-    """What keeps a line from being one command with the words that are its own."""
+    """The reason why a line is not one command with the words that are its own."""
     commands = [word for word in row.words if word.letter in "GM"] + [other[0] for other in row.others]
     if not row.words and len(commands) <= 1:
         return ""
@@ -219,7 +219,7 @@ def _grbl_why_not(row: Row, source: Source, control: Control) -> str:
 
 
 def _rs274_why_not(row: Row, source: Source) -> str:
-    """What LinuxCNC's interpreter refuses, and the reader takes."""
+    """The reason why LinuxCNC's interpreter refuses what the reader takes."""
     letters = [word.letter for word in row.words if word.letter not in "GM"]
     if len(set(letters)) < len(letters) or any("e" in word.text.lower() for word in row.words):
         return "a letter twice, or a number with an exponent"

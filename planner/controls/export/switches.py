@@ -1,4 +1,4 @@
-"""What a line says beside its move in the words of a control: tool, spindle, coolant, modes, dwells, stops, codes of other kinds."""
+"""The words of a line beside its move, in the words of a control: tool, spindle, coolant, modes, dwells, stops, codes of other kinds."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from planner.nc.writer import FEED_MIN
 
 @dataclass(frozen=True, kw_only=True)
 class Translation:
-    """What was written.
+    """The program as written.
 
     lines : of the file, without its header
     notes : what was left out, or is written another way, each with its first line

@@ -218,7 +218,7 @@ class _Found:
         return found
 
     def _pins(self) -> Settings:
-        """What pins are set to, by name."""
+        """The values of pins, by name."""
         ini = self.ini
         lines = ini.texts("HAL", "HALCMD")
         for name in ini.texts("HAL", "HALFILE") + ini.texts("HAL", "POSTGUI_HALFILE"):

@@ -1,4 +1,4 @@
-"""What a limit is to the planner. Every limit is one object in a file of its own; `limits.py` lists them all.
+"""A limit, as the planner sees it. Every limit is one object in a file of its own; `limits.py` lists them all.
 
 A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j acceleration and jerk along the path:
 

@@ -48,7 +48,7 @@ OF_AXES: tuple[AxisLimit, ...] = (VELOCITY, ACCELERATION, JERK)  # with a limit 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Limits:
-    """What bounds a motion over A axes on a machine, beside its feed and its tolerance.
+    """The bounds of a motion over A axes on a machine, beside its feed and its tolerance.
 
     axes                         : their letters
     velocity, acceleration, jerk : (A,) of the axes, in mm or rad

@@ -1,4 +1,4 @@
-"""What limits look at: a sampled path on a machine, the two sides of its points, and the error budget there.
+"""The input of the limits: a sampled path on a machine, the two sides of its points, and the error budget there.
 
 The budget is what the rounding leaves of the tolerance. Where the filters' error is bounded by its closed form, chords and filters
 share it in proportion to what they cost per unit of normal acceleration, dt^2/8 : sum T^2/24 (docs/papers.md D): on programmed

@@ -83,7 +83,7 @@ def _open_points(problem: FeedrateProblem, known: FeedrateSolution) -> Array:
 
 
 def _merged(first: Array, last: Array) -> list[Range]:
-    """What the ranges first..last (n,) cover together, ascending; those that meet in a point stay apart."""
+    """The union of the ranges first..last (n,), ascending; those that meet in a point stay apart."""
     order = np.argsort(first, kind="stable")
     first, last = first[order], last[order]
     reach = np.maximum.accumulate(last)  # pieces follow each other, so no range reaches into the next one

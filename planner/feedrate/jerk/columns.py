@@ -26,7 +26,7 @@ class ProblemColumns(NamedTuple):
 
 
 def columns_of(problem: FeedrateProblem) -> ProblemColumns:
-    """What the kernel needs to know of a problem."""
+    """The columns of a problem for the kernel."""
     return ProblemColumns(
         unit=float(problem.acceleration[: problem.machine_axes].max()),
         s=problem.s,

@@ -49,7 +49,7 @@ class Part:
 
     @property
     def work(self) -> list[Callable[[Room], None]]:
-        """What can be done side by side, before `finish`."""
+        """The work that can be done in parallel, before `finish`."""
         if self.backward is None:
             return [lambda room: self.forward.run(room, self._until)]
         until = self.last - self._middle - int(NEAR * self.solver.window)

@@ -20,7 +20,7 @@ from planner.feedrate.jerk.slowing import slower_by
 
 
 class Solved(NamedTuple):
-    """What is told of a piece that was solved.
+    """The counts of a piece that was solved.
 
     slower     : by what factor it was slowed down to keep every limit
     stops      : points where the profile rests because nothing better was found
@@ -47,7 +47,7 @@ class Piece:
 
     @property
     def work(self) -> list[tuple[int, Callable[[Room], None]]]:
-        """What can be done side by side, before `finish`, and of how many intervals it is."""
+        """The work that can be done in parallel, before `finish`, and of how many intervals it is."""
         return [(part.last - part.first, task) for part in self._parts for task in part.work]
 
     def finish(self, room: Room) -> Solved:

@@ -1,4 +1,4 @@
-"""What the interior-point method of interior_point.py is set to: one record, the same for every problem.
+"""The settings of the interior-point method of interior_point.py: one record, the same for every problem.
 
 "Iterations" below are those of 156 problems, 150 of benchmarks/solvers/jerk_campaign.py and three jobs, in windows of 1,000
 intervals, with one number changed at a time: 3889 with the numbers as they are. None is critical: of 38 other values that were

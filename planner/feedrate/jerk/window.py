@@ -145,7 +145,7 @@ class ScaledWindow:
         return self._from(self._starts(left, right), tol, iterations)
 
     def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
-        """What the first of these starts that converges leads to, as `solve`."""
+        """The solution from the first of these starts that converges, as `solve`."""
         most = starts = 0
         for starts, (x, u) in enumerate(profiles, start=1):
             put(self.blocks, x, u)

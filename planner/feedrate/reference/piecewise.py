@@ -1,4 +1,4 @@
-"""What the reference solvers share: the jerk-limited problem falls into pieces between prescribed speeds, solved one by one."""
+"""Common to the reference solvers: the jerk-limited problem falls into pieces between prescribed speeds, solved one by one."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def solve_pieces(
 def solution_of(
     problem: FeedrateProblem, found: Found, solver: str, began: float, *, priced: bool
 ) -> FeedrateSolution:
-    """What was found as a solution; `priced` where its jerk is constant on every interval, which prices are made for."""
+    """The values found, as a solution; `priced` where its jerk is constant on every interval, which prices are made for."""
     took = time.perf_counter() - began
     if found.columns is None:
         return FeedrateSolution.failed(problem, found.status, found.sentence, solver, took, found.iterations)

@@ -52,7 +52,7 @@ class Intervals(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """What the path is at the P points of a grid; see `PathSamples`."""
+    """The path at the P points of a grid; see `PathSamples`."""
 
     s: FloatArray
     position: FloatArray
@@ -284,7 +284,7 @@ def _effective_curvature(points):
 
 
 def evaluate(table: ElementTable, grid: Intervals, limits: PathLimits) -> Columns:
-    """What the path is on a grid."""
+    """The path evaluated on a grid."""
     points, axes = len(grid.w0), len(limits.velocity)
     found = Columns(np.zeros(points), *np.empty((6, points, axes)), *np.zeros((3, points)))
 

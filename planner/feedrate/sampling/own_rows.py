@@ -116,7 +116,7 @@ def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Real:
-    """What the machine's axes allow on each interval (n,): feed^2, acceleration along the path, and jerk."""
+    """The bounds by the machine's axes on each interval (n,): feed^2, acceleration along the path, and jerk."""
 
     feed_sq: FloatArray
     acceleration: FloatArray

@@ -42,7 +42,7 @@ ROW = np.dtype(
 
 
 class PathLimits(NamedTuple):
-    """What bounds a motion along the path: programmed feed of each segment, and limits of each axis; inf for none."""
+    """The bounds of a motion along the path: programmed feed of each segment, and limits of each axis; inf for none."""
 
     feed: FloatArray  # (M,) [mm/s]
     velocity: FloatArray  # (A,) [mm/s]
@@ -51,7 +51,7 @@ class PathLimits(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """What the path does at its R+1 joints between legs, and where its M segments are."""
+    """The path at its R+1 joints between legs, and where its M segments are."""
 
     first: Array  # (R+1,) the first segment of each leg, then M (geometry/legs.py)
     place: FloatArray  # (M+1,) where each segment starts, counted along the legs [mm]
@@ -195,7 +195,7 @@ class _Pace(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _pace(limits):
-    """What `_cut_span` needs of the limits."""
+    """The limits that `_cut_span` needs."""
     speed_sq, acceleration_sq = 0.0, 0.0
     for k in range(len(limits.velocity)):
         speed_sq += limits.velocity[k] * limits.velocity[k]

@@ -41,7 +41,7 @@ Vector = tuple[Any, Any, Any]
 
 
 class Kinematics(Protocol):
-    """What planning needs of kinematics.
+    """Kinematics as planning needs them.
 
     axes : letters, x, y, z and the rotary ones; of a path of the tip and of the joints alike
     """

@@ -24,7 +24,7 @@ from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """What delivered setpoints are judged by.
+    """The verifier's view of delivered setpoints.
 
     program, toolpath, machine : as `verify` has them
     given       : which columns were delivered, and with how many digits
@@ -49,7 +49,7 @@ def chain_of(program: Program, machine: Machine) -> Chain | None:
 
 
 def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:
-    """What makes setpoints of the joints of any samples of the plan's trajectory; None where that is one of the axes."""
+    """The function that makes setpoints of the joints of any samples of the plan's trajectory; None where that is one of the axes."""
     chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
     return None if chain is None else lambda samples: joint_setpoints(samples, chain)
 

@@ -1,4 +1,4 @@
-"""What takes time beside the motion: tool changes, the spindle, M codes. Times of the machine file, counted in the program.
+"""Auxiliary time: tool changes, the spindle, M codes. Times of the machine file, counted in the program.
 
 A plan is the motion of the axes; its cycle time holds the dwells of the program (G4) and nothing that the axes do not do. How long a
 tool change or a spindle takes only the machine file can say (`[times]`). With its times
@@ -53,7 +53,7 @@ class Beside:
 
 
 def beside_motion(program: Program, machine: Machine) -> tuple[Beside, ...]:
-    """What happens beside the motion of a program, and how long it takes on a machine."""
+    """The events beside the motion of a program, and how long they take on a machine."""
     times = machine.times or Times()
     code = _m_codes(program)
     starts, stops = (0, 0) if program.pen else _of_spindle(code)

@@ -83,6 +83,6 @@ def not_in_step(plan: Plan, *, shaped: bool) -> str | None:
 
 
 def thread_remedy(method: str, *, shaped: bool) -> str:
-    """What to do about a thread that a method does not keep in step."""
+    """The action for a thread that a method does not keep in step."""
     others = " or ".join(name for name in IN_STEP if name != method)
     return "plan threads without --shaped" if shaped else f"plan threads by method {others}"

@@ -65,7 +65,7 @@ def _worst(verdict: Verdict) -> tuple[int, float] | None:
 
 
 def _said(made: Plan, programmed: Toolpath, planned: Toolpath) -> str:
-    """What the period took from the corners, for the notes."""
+    """The tolerance that the period took from the corners, for the notes."""
     stops = (planned.joint == Joint.STOP) & (programmed.joint != Joint.STOP)
     less = (planned.tolerance < programmed.tolerance) & ~stops
     first = programmed.line[max(int(np.flatnonzero(stops | less)[0]) - 1, 0)]

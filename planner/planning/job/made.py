@@ -1,4 +1,4 @@
-"""What the stages of a plan hand to each other: a motion that was delivered, and what is known of a plan that may not be taken."""
+"""The records between the stages of a plan: a motion that was delivered, and what is known of a plan that may not be taken."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Delivered(NamedTuple):
 
 
 class Making(NamedTuple):
-    """What is known of a plan on its way, which may not be the one that is taken.
+    """A plan in the making, which may not be the one that is taken.
 
     motion, slower, filtered : as in `Delivered`
     priced                   : the solution of which the prices are those of the plan; None where they are there, or not to be had
@@ -48,7 +48,7 @@ class Making(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tables:
-    """What a method can say of its plan besides the motion, as far as it can: fields of `Plan`."""
+    """The tables of a plan besides the motion, as far as it can: fields of `Plan`."""
 
     rounded: CornerTable | None = None
     grid: GridHistory | None = None

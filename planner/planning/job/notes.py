@@ -1,4 +1,4 @@
-"""What a plan assumed and what it gave up: short sentences, each with its first line and a count.
+"""The notes of a plan, on what it assumed and what it gave up: short sentences, each with its first line and a count.
 
 The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the method.
 """

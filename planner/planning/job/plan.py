@@ -77,7 +77,7 @@ class Plan(Shown):
 
     @property
     def setpoints(self) -> Trajectory | None:
-        """What the axes get: the joints' motion where the tool centre point is on, else the trajectory."""
+        """The setpoints of the axes: the joints' motion where the tool centre point is on, else the trajectory."""
         return self.trajectory if self.joints is None else self.joints
 
     @property
@@ -90,7 +90,7 @@ class Plan(Shown):
 
     @property
     def beside(self) -> tuple[Beside, ...]:
-        """What happens while the axes stand still, tool changes for example, and how long it takes; no part of the cycle time."""
+        """The events while the axes stand still, tool changes for example, and how long they take; no part of the cycle time."""
         return beside_motion(self.program, self.machine)
 
     def delivering(self, made: Delivered, **changes: Any) -> Plan:

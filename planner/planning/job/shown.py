@@ -1,4 +1,4 @@
-"""What a plan shows of itself and writes: tables, pictures, files and pages, for Python and notebooks.
+"""The views and files of a plan: tables, pictures, files and pages, for Python and notebooks.
 
 They are made by later stages (report/, report/interactive/), which know plans, and a plan knows none of them: `planner` says in
 `VIEWS` what makes each, and it is imported when a plan is asked for it.

@@ -1,4 +1,4 @@
-"""What a job tries, step by step: lines for a terminal, and JSON.
+"""The trace of a job, step by step: lines for a terminal, and JSON.
 
     trace = Trace()
     planner.plan(program, log=trace)

@@ -82,7 +82,7 @@ def motion_of(guide: LegGuide, motion: Filtered) -> AxisMotion:
 
 
 def _sentence(plan: Schedule) -> str:
-    """What the plan says of its corners and filters."""
+    """The plan's sentence on its corners and filters."""
     waits = int((plan.gap()[plan.guide.inner] > 0).sum())
     turns = int((plan.guide.sin_half > 0).sum())
     longest = plan.T1 + plan.T2

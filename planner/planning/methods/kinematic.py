@@ -139,7 +139,7 @@ class _Chain:
 
 
 def _curve_notes(toolpath: Toolpath, exact: Array) -> list[str]:
-    """What is to be said of splines whose blocks are among the `exact` (M,) ones."""
+    """The notes on splines whose blocks are among the `exact` (M,) ones."""
     found = np.flatnonzero((toolpath.curve >= 0) & exact)
     if not len(found):
         return []
@@ -223,7 +223,7 @@ def _corner_table(chain: _Chain, machine: Machine) -> CornerTable:
 
 
 def _limited_by(chain: _Chain, k: Array) -> Array:
-    """What keeps each of the corners k from being taken faster."""
+    """The limit that holds each of the corners k."""
     V, kind = chain.passage.V[k], chain.passage.kind[k]
     said = np.full(len(k), "look-ahead", dtype=object)
     for free, fitting in zip(chain.free, chain.fitting, strict=True):
@@ -235,7 +235,7 @@ def _limited_by(chain: _Chain, k: Array) -> Array:
 
 
 def _sentence(chain: _Chain) -> str:
-    """What the plan says of its corners."""
+    """The plan's sentence on its corners."""
     turns, kind = chain.turns, chain.passage.kind
     if not turns.any():
         return "there is no corner between full stops; every run takes the shortest time"

@@ -32,7 +32,7 @@ class MethodNames:
         return made
 
     def about(self) -> dict[str, str]:
-        """What each method is, in a sentence, by its name."""
+        """A sentence on each method, by its name."""
         return {
             name: _sentence(entry.home, plain="plain" in entry.settings) for name, entry in METHODS.items()
         }

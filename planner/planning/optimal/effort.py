@@ -71,7 +71,7 @@ THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """What a plan is worth.
+    """The effort of a plan.
 
     work   : grid points, counted over all rounds of reshaping
     rounds : of reshaping at most

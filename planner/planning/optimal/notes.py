@@ -1,4 +1,4 @@
-"""What a motion on a smooth path gave up, in short sentences, each with its first line and a count."""
+"""The notes of a motion on a smooth path, in short sentences, each with its first line and a count."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner.smoothing.spline_path import SplineShape
 
 
 def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
-    """What a motion on a smooth path gave up: what its splines did, corners that are not rounded, full stops of the solver.
+    """The notes of a motion on a smooth path: what its splines did, corners that are not rounded, full stops of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion

@@ -37,7 +37,7 @@ class Order(Protocol):
 
     @property
     def solver(self) -> FeedrateSolver:
-        """What finds the feed along a path."""
+        """The solver of the feed along a path."""
         ...
 
     def solve(

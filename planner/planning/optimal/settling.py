@@ -37,7 +37,7 @@ SHORT_RUN = (
 
 
 class Over(NamedTuple):
-    """What D exceeds, put down to the L pieces of p's law and its G runs."""
+    """The excesses of D, put down to the L pieces of p's law and its G runs."""
 
     factor: FloatArray  # (L,) by what p has to be slower there [-]
     limit: FloatArray  # (G,) by what runs have to be slower to keep their limits [-]
@@ -123,7 +123,7 @@ class Settling:
         return None, first
 
     def _over(self, motion: Motion, delivered: ShapedMotion, begin: FloatArray, end: FloatArray) -> Over:
-        """What has to change for D to keep everything; p's runs begin and end at these times (G,) [s]."""
+        """The changes for D to keep everything; p's runs begin and end at these times (G,) [s]."""
         factor = np.ones(len(motion.law.t))
         peaks = np.add.outer(fastest_inside(motion.law), self.shaper.delay)
         times = np.append(inside_pieces(delivered)[1], peaks)

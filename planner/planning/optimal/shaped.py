@@ -190,7 +190,7 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
 
 
 def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:
-    """What was found, delivered and judged."""
+    """The candidate, delivered and judged."""
     if found is None:
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0,

@@ -1,4 +1,4 @@
-"""What a report shows of a plan: samples of the motion, the NC lines with their times, limits.
+"""The data of a report: samples of the motion, the NC lines with their times, limits.
 
 An hour of motion has millions of samples. A report has `SAMPLES_MAX` of them at most, at equal steps and with the highest feed of each
 step beside its first sample, so that no peak of the feed is lost; `step` says so.

@@ -50,7 +50,7 @@ def page_of(
 
 
 def policy(*scripts: str) -> str:
-    """What a browser lets a page do: run these scripts, known by their SHA-256, and nothing else; show pictures that it has in it or
+    """The policy of a page for browsers: run these scripts, known by their SHA-256, and nothing else; show pictures that it has in it or
     draws itself; load nothing. Styles are free: plotly writes them into the page, and they run nothing."""
     known = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

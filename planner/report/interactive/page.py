@@ -178,7 +178,7 @@ def _rows(plan: Plan) -> Iterable[tuple[str, str]]:
 
 
 def _held(plan: Plan) -> str:
-    """What holds the motion, each with its share of the cycle time as a bar."""
+    """The active limits, each with its share of the cycle time as a bar."""
     if plan.grid is None:
         return ""
     rows = "".join(

@@ -24,8 +24,8 @@
     NotSolvedError           no motion was found; raised by `Plan.require`
     __version__
 
-Units and symbols are in `planner.base.units`, words in docs/glossary.md, names of methods in `planner.base.names`. Everything
-is imported on first use, so that `import planner` costs nothing.
+Units and symbols are in `planner.base.units`, words in docs/glossary.md, names of methods in
+`planner.base.names`. Everything is imported on first use, so that `import planner` costs nothing.
 """
 
 from importlib import import_module

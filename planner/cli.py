@@ -2,7 +2,8 @@
 
 Its exit codes are in `planner.commands.terminal`.
 
-Nothing is imported before Ctrl-C has its handler, so that an interrupt during the imports ends like any other.
+Nothing is imported before Ctrl-C has its handler, so that an interrupt during the imports ends like any
+other.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
-# So many new objects before a collection of garbage; Python's 700 means 155 collections, 0.1 s of a plan of ten lines (now 10, 0.04 s).
+# So many new objects before a collection of garbage; Python's 700 means 155 collections, 0.1 s of a plan of
+# ten lines (now 10, 0.04 s).
 OBJECTS = 10_000
 
 

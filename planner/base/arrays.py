@@ -14,10 +14,11 @@ FloatArray = NDArray[np.float64]
 def freeze(
     record: object, names: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
 ) -> None:
-    """Convert fields of a frozen dataclass to contiguous read-only arrays of a shape such as (3, None), in place.
+    """Convert fields of a frozen dataclass to contiguous read-only arrays of a shape such as (3, None), in
+    place.
 
-    An array that has the type already is not copied (trajectories fill gigabytes): the record then shares memory with the
-    caller's array, which the caller must not change any more.
+    An array that has the type already is not copied (trajectories fill gigabytes): the record then shares
+    memory with the caller's array, which the caller must not change any more.
 
     names  : of the fields, with spaces between them
     shape  : expected shape; None where any length will do

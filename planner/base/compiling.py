@@ -1,13 +1,15 @@
 """How numba compiles a kernel, and finds it on the disk again.
 
-Each kernel is two of numba's dispatchers. The `whole` is what Python calls: it is optimised with everything that it calls, turned into
-machine code and kept on the disk. The `part` is what other kernels call, and is no more than instructions for them: as it comes, numba
-would optimise it by itself, turn it into machine code and make entries for Python and C, none of which would be used, and would compile
-it once more for every number that an argument is somewhere. That would be about half of the time that all takes.
+Each kernel is two of numba's dispatchers. The `whole` is what Python calls: it is optimised with everything
+that it calls, turned into machine code and kept on the disk. The `part` is what other kernels call, and is no
+more than instructions for them: as it comes, numba would optimise it by itself, turn it into machine code and
+make entries for Python and C, none of which would be used, and would compile it once more for every number
+that an argument is somewhere. That would be about half of the time that all takes.
 
-Code is made for a level of the architecture, not for the one processor that is here, so that plans agree on every machine of that level
-to the last bit as far as kernels make them, and kernels that come with an installation are of use elsewhere. Level 3 of x86-64 (AVX2,
-FMA: since 2013) has what the solvers gain by. It is set as numba's own setting, and holds for all that the process compiles.
+Code is made for a level of the architecture, not for the one processor that is here, so that plans agree on
+every machine of that level to the last bit as far as kernels make them, and kernels that come with an
+installation are of use elsewhere. Level 3 of x86-64 (AVX2, FMA: since 2013) has what the solvers gain by. It
+is set as numba's own setting, and holds for all that the process compiles.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ LEVEL = "x86-64-v3"
 # What LLVM calls the features of the level beyond those of every x86-64 (x86-64 psABI, table 3.1).
 FEATURES = "cx16 sahf popcnt sse3 ssse3 sse4.1 sse4.2 avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
 
-# numba tells functions in machine code apart by a number that begins at 1 in every process, and has one name for records of two and of
-# nine axes: a third process would load two functions of one name.
+# numba tells functions in machine code apart by a number that begins at 1 in every process, and has one name
+# for records of two and of nine axes: a third process would load two functions of one name.
 bytecode.FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6)))
 
 
@@ -48,8 +50,8 @@ choose_processor()
 
 
 class _NoEnvironment:
-    """In place of numba's code generator for a part: the Python objects that its code uses, such as the text of an exception, are set
-    in the wholes that it becomes a piece of."""
+    """In place of numba's code generator for a part: the Python objects that its code uses, such as the text
+    of an exception, are set in the wholes that it becomes a piece of."""
 
     @staticmethod
     def set_env(name: str, environment: Any) -> None:
@@ -105,7 +107,8 @@ def whole(function: Callable[..., Any], settings: dict[str, Any], cache: KernelC
 
 
 class KernelCache(caching.NullCache):
-    """numba's cache of a whole, in files with a checksum from folders that nobody else can write (kernel_files.py).
+    """numba's cache of a whole, in files with a checksum from folders that nobody else can write
+    (kernel_files.py).
 
     function : of Python
     content  : `content_of` it; None for one that is not kept
@@ -162,8 +165,9 @@ class KernelCache(caching.NullCache):
 
 
 def _to_keep(made: Any) -> tuple[Any, ...]:
-    """The part of a whole that numba pickles, without what is for being linked into others and for people to read, and without
-    environments that have nothing in them, of numba's own functions, whose modules would be imported for that."""
+    """The part of a whole that numba pickles, without what is for being linked into others and for people to
+    read, and without environments that have nothing in them, of numba's own functions, whose modules would be
+    imported for that."""
     (name, kind, (code, _)), *others, _, reload_init, environments = made._reduce()
     entry = f'define void @"{made.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
     library = name, kind, (code, binding.parse_assembly(entry).as_bitcode())

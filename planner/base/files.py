@@ -1,5 +1,5 @@
-"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer never. And names of files in
-texts that are written."""
+"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer
+never. And names of files in texts that are written."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ STDIN = "-"  # as a file name: the standard input
 
 
 def readable(text: str) -> str:
-    """A text that can be written as UTF-8. Bytes of a file name that Python could not decode, as in names from other systems, become
-    the characters that they are in UTF-8, or such as \\xfc."""
+    """A text that can be written as UTF-8. Bytes of a file name that Python could not decode, as in names
+    from other systems, become the characters that they are in UTF-8, or such as \\xfc."""
     if text.isascii():
         return text
     try:
@@ -28,7 +28,8 @@ def readable(text: str) -> str:
 
 
 def require_ending(path: str | Path) -> None:
-    """Raise InputError if `path` is a device, a socket or a named pipe; the pipes of a shell under `STREAMS` are fine.
+    """Raise InputError if `path` is a device, a socket or a named pipe; the pipes of a shell under `STREAMS`
+    are fine.
 
     Raises OSError where there is no such file.
     """

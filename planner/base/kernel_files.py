@@ -1,15 +1,17 @@
 """Where compiled kernels lie on the disk.
 
-A file is named by a kernel's function, the types of its arguments, the processor and the versions of Python and numba, and holds a
-digest of what the kernel computes (kernels.py). A kernel is compiled again, and takes the place of its file, when it or one that
-it calls in another file computes something else, and not when a comment changes, a file is copied or gets a new date.
+A file is named by a kernel's function, the types of its arguments, the processor and the versions of Python
+and numba, and holds a digest of what the kernel computes (kernels.py). A kernel is compiled again, and takes
+the place of its file, when it or one that it calls in another file computes something else, and not when a
+comment changes, a file is copied or gets a new date.
 
-A file begins with the SHA-256 of what is behind: what a disk, a crash or another program has changed is not there, and is
-compiled anew. It says nothing of who wrote the file: kernels, which are machine code, come only from folders where nobody else
-can put something. Such a folder is named by an absolute path, or it would be one of the folder that a program was downloaded to;
-it and its parents belong to this user, to root, or to the owner of this package, whose code runs already; and no others can write
-them, unless the owner alone can take away what is in them (the sticky bit of /tmp). Symbolic links are followed, and what they
-lie in is looked at as well. Windows has other means than owners and modes, and gives everybody a folder of their own: there the
+A file begins with the SHA-256 of what is behind: what a disk, a crash or another program has changed is not
+there, and is compiled anew. It says nothing of who wrote the file: kernels, which are machine code, come only
+from folders where nobody else can put something. Such a folder is named by an absolute path, or it would be
+one of the folder that a program was downloaded to; it and its parents belong to this user, to root, or to the
+owner of this package, whose code runs already; and no others can write them, unless the owner alone can take
+away what is in them (the sticky bit of /tmp). Symbolic links are followed, and what they lie in is looked at
+as well. Windows has other means than owners and modes, and gives everybody a folder of their own: there the
 path alone is looked at.
 """
 
@@ -28,7 +30,8 @@ from typing import NamedTuple
 
 
 def fault_of(folder: str) -> str:
-    """Why files of this folder must not be run, in words after its name; empty if they may. It need not be there yet."""
+    """Why files of this folder must not be run, in words after its name; empty if they may. It need not be
+    there yet."""
     if not os.path.isabs(folder):
         return "is not an absolute path"
     if not hasattr(os, "geteuid"):
@@ -71,7 +74,8 @@ def _owner_of_package() -> int:
 
 @cache
 def _private_group() -> int | None:
-    """The group that is this user's alone, as many systems give everybody one of their own name; None without one."""
+    """The group that is this user's alone, as many systems give everybody one of their own name; None without
+    one."""
     import grp
     import pwd
 
@@ -108,7 +112,8 @@ def place(function: FunctionType, content: bytes, types_and_tools: str) -> Kerne
 
 
 def read(file: KernelFile) -> bytes | None:
-    """The kernel that was written to it, or None: what is damaged, of another content, or may be somebody else's, is not there."""
+    """The kernel that was written to it, or None: what is damaged, of another content, or may be somebody
+    else's, is not there."""
     for folder in (*folders(), *([] if fault_of(installed()) else [installed()])):
         path = os.path.join(folder, file.name)
         try:
@@ -126,7 +131,8 @@ def read(file: KernelFile) -> bytes | None:
 
 
 def write(file: KernelFile, kernel: bytes) -> str:
-    """Keep a kernel, in place of what had its name; returns the path. Raises OSError if it can be written nowhere."""
+    """Keep a kernel, in place of what had its name; returns the path. Raises OSError if it can be written
+    nowhere."""
     faults: list[OSError] = []
     rest = file.content + kernel
     for folder in folders():
@@ -158,8 +164,9 @@ def used() -> list[str]:
 
 
 def folders() -> list[str]:
-    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the sources of a checkout, or
-    the user's cache directory. An installation gets no further files: who removes it removes all of it.
+    """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the
+    sources of a checkout, or the user's cache directory. An installation gets no further files: who removes
+    it removes all of it.
 
     Folders that others can write are left out; one that NUMBA_CACHE_DIR names with a warning.
     """
@@ -178,7 +185,8 @@ def folders() -> list[str]:
 
 
 def _of_user() -> str:
-    """The user's cache directory. A relative one in XDG_CACHE_HOME counts as none, as its specification says."""
+    """The user's cache directory. A relative one in XDG_CACHE_HOME counts as none, as its specification
+    says."""
     if sys.platform == "win32":
         return os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
     if sys.platform == "darwin":

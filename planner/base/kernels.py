@@ -1,10 +1,12 @@
-"""numba's `njit` for the planner's kernels: `from planner.base.kernels import njit` instead of `from numba import njit`.
+"""numba's `njit` for the planner's kernels: `from planner.base.kernels import njit` instead of `from numba
+import njit`.
 
-A kernel is a function that is compiled when it is first called with arguments of some types (compiling.py), and kept on the disk
-(kernel_files.py), with a digest of what it computes. numba is imported when the first kernel is called.
+A kernel is a function that is compiled when it is first called with arguments of some types (compiling.py),
+and kept on the disk (kernel_files.py), with a digest of what it computes. numba is imported when the first
+kernel is called.
 
-A kernel that cannot be kept, because no directory can be written or the disk is full, is compiled again by the next run, which takes a
-minute for all of them, and is nothing to fail for: one warning says so.
+A kernel that cannot be kept, because no directory can be written or the disk is full, is compiled again by
+the next run, which takes a minute for all of them, and is nothing to fail for: one warning says so.
 """
 
 from __future__ import annotations
@@ -26,8 +28,8 @@ _TOLD_BY_REPR = (bool, int, float, complex, str, bytes, range, type(None), type(
 
 
 def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
-    """A digest of what the kernel of a function computes: its bytecode, settings and the values that it uses, and those of every kernel
-    that it calls."""
+    """A digest of what the kernel of a function computes: its bytecode, settings and the values that it uses,
+    and those of every kernel that it calls."""
     seen = {id(function)}
 
     def of(value: Any) -> str:
@@ -77,7 +79,8 @@ _one_at_a_time = threading.RLock()
 
 
 class Compilation:
-    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and `ends`."""
+    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and
+    `ends`."""
 
     def begins(self, is_kept: bool) -> None:
         """A kernel is about to be compiled."""
@@ -101,7 +104,8 @@ def compilation() -> Compilation:
 
 
 def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is possible."""
+    """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is
+    possible."""
 
     def made(function: Callable[..., Any]) -> Any:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):

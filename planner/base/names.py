@@ -1,8 +1,9 @@
-"""The registry of every name that a user may type: methods, geometries, corner shapes, solvers, and the aliases of each.
+"""The registry of every name that a user may type: methods, geometries, corner shapes, solvers, and the
+aliases of each.
 
-The command line makes its choices from these tables, `planner.planning.methods.registry` makes the methods, and the messages name
-them. Nothing heavy is imported here: a method is named by its module and class, which `planner.planning.methods.registry` imports
-when it is asked for.
+The command line makes its choices from these tables, `planner.planning.methods.registry` makes the methods,
+and the messages name them. Nothing heavy is imported here: a method is named by its module and class, which
+`planner.planning.methods.registry` imports when it is asked for.
 
 To add a method: its module in `planner/planning/methods/` and a row of `METHODS`.
 """
@@ -23,7 +24,8 @@ GEOMETRIES = (AUTO, SPLINE, SINGLE_CORNERS)
 # The shapes of single corners.
 BEZIER, FIR, KINEMATIC = "bezier", "fir", "kinematic"
 CORNER_SHAPES = (BEZIER, FIR, KINEMATIC)
-# Every way to smooth a path, as `corner` of a method takes it: a geometry of splines, or the shape of single corners.
+# Every way to smooth a path, as `corner` of a method takes it: a geometry of splines, or the shape of single
+# corners.
 SMOOTHINGS = (AUTO, SPLINE, *CORNER_SHAPES)
 # How much work a plan is worth (planning/optimal/effort.py).
 QUICK, NORMAL, BEST = "quick", "normal", "best"
@@ -102,8 +104,8 @@ def effort_name(name: str) -> str:
 
 
 def corner_name(name: str) -> str:
-    """The name of a corner shape, or `auto` or `spline`, which are geometries and were corners in earlier versions. Raises InputError
-    for another name."""
+    """The name of a corner shape, or `auto` or `spline`, which are geometries and were corners in earlier
+    versions. Raises InputError for another name."""
     return name if name in (AUTO, SPLINE) else known_name("corner shape", name, CORNER_SHAPES)
 
 
@@ -116,10 +118,11 @@ def users_of(setting: str) -> tuple[str, ...]:
 
 
 def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None]:
-    """The geometry, and the shape of single corners where it is `corners`; each argument is None where nothing was asked for.
+    """The geometry, and the shape of single corners where it is `corners`; each argument is None where
+    nothing was asked for.
 
-    A corner shape alone means single corners of that shape, and `corners` alone means Bezier corners. The names `auto` and `spline` are
-    taken as corners too.
+    A corner shape alone means single corners of that shape, and `corners` alone means Bezier corners. The
+    names `auto` and `spline` are taken as corners too.
 
     Raises InputError for unknown names, and for a corner shape beside splines.
     """
@@ -140,7 +143,8 @@ def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None
 
 
 def known_name(kind: str, name: str, names: Iterable[str], aliases: Iterable[str] = ()) -> str:
-    """The name, as it is. Raises InputError if it is none of `names`, with one that is near among them and their aliases."""
+    """The name, as it is. Raises InputError if it is none of `names`, with one that is near among them and
+    their aliases."""
     if name in (known := tuple(names)):
         return name
     near = difflib.get_close_matches(str(name), (*known, *aliases), n=1)

@@ -5,8 +5,8 @@ It is symmetric. Over a length L
     peak speed p = min(v, p_L),   p_L from   p^2/a + p a/j = L   (a is reached),   or   (j L^2 / 4)^(1/3)   (it is not: p_L < a^2/j)
     T = L/p + p/a + a/j   for p >= a^2/j,      L/p + 2 sqrt(p/j)   below:
 
-jerk j for A/j, none for p/A - A/j and -j for A/j with the largest acceleration A = min(a, sqrt(p j)), the cruise, and the same
-backwards. The tests compare it with ruckig.
+jerk j for A/j, none for p/A - A/j and -j for A/j with the largest acceleration A = min(a, sqrt(p j)), the
+cruise, and the same backwards. The tests compare it with ruckig.
 """
 
 from __future__ import annotations

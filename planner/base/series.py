@@ -1,8 +1,10 @@
-"""Arithmetic with functions of one variable to third order: a function of the position becomes its derivatives along a motion.
+"""Arithmetic with functions of one variable to third order: a function of the position becomes its
+derivatives along a motion.
 
-A `Series` holds a value and its first three derivatives with respect to the same variable (arc length or time), for n places at once.
-What numpy computes with it has the derivatives of the result, exact but for rounding: sums, products, quotients, powers, and the
-functions of `FUNCTIONS`. For f(c) with c = c(s), ' for d/ds on c and for d/dc on f (Faa di Bruno):
+A `Series` holds a value and its first three derivatives with respect to the same variable (arc length or
+time), for n places at once. What numpy computes with it has the derivatives of the result, exact but for
+rounding: sums, products, quotients, powers, and the functions of `FUNCTIONS`. For f(c) with c = c(s), ' for
+d/ds on c and for d/dc on f (Faa di Bruno):
 
     f(c)'   = f' c'
     f(c)''  = f' c'' + f'' c'^2

@@ -1,14 +1,16 @@
-"""The sizes at which the code changes its way: long jobs go in parts, on other routes, or with less effort than short ones.
+"""The sizes at which the code changes its way: long jobs go in parts, on other routes, or with less effort
+than short ones.
 
-What only long jobs go through only long jobs would try. So all these sizes are settings, with two values each: the usual one and a
-small one, with which nearly every job goes the large way. The environment variable PLANNER_SIZES says which are small: `small` for all,
-or kinds of them, `parts,routes,effort,shown`. It is for the tests (tests/base/test_sizes.py plans both ways;
-`PLANNER_SIZES=small python -m pytest -m "not slow"`; `python -m benchmarks campaign --sizes small`); whoever plans gains nothing by it.
-It is read once, when this module is imported, and holds for the processes that are started from there.
+What only long jobs go through only long jobs would try. So all these sizes are settings, with two values
+each: the usual one and a small one, with which nearly every job goes the large way. The environment variable
+PLANNER_SIZES says which are small: `small` for all, or kinds of them, `parts,routes,effort,shown`. It is for
+the tests (tests/base/test_sizes.py plans both ways; `PLANNER_SIZES=small python -m pytest -m "not slow"`;
+`python -m benchmarks campaign --sizes small`); whoever plans gains nothing by it. It is read once, when this
+module is imported, and holds for the processes that are started from there.
 
     parts  : the same computation, cut otherwise or on other threads: the same result to rounding
-    routes : other windows and ranges of the same optimisation: another way to the same optimum
-    effort : what is not tried, or less finely, because the job is large: a slower motion by what is written beside the size
+    routes : other windows and ranges of the same optimisation: another way to the same optimum effort : what
+    is not tried, or less finely, because the job is large: a slower motion by what is written beside the size
     shown  : what a page or a table has no room for
 
 A size beyond which something is refused is no setting: there is no large way behind it.
@@ -47,7 +49,8 @@ class Sizes:
     idle_rows: int = _size(PARTS, 2_000, 20)  # the same at first, and as long as nothing moves
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
 
-    # Threads: they take 1 ms to begin. A point takes 2 us on a grid and some us to solve; a span 20 us to relax, 100 us to improve.
+    # Threads: they take 1 ms to begin. A point takes 2 us on a grid and some us to solve; a span 20 us to
+    # relax, 100 us to improve.
     grid_shared: int = _size(PARTS, 5_000, 10)  # points of a grid that are worth a thread
     intervals_shared: int = _size(PARTS, 5_000, 10)  # of its intervals, to be sampled
     points_shared: int = _size(PARTS, 3_000, 0)  # fewer are solved by one thread
@@ -82,7 +85,8 @@ class Sizes:
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time
     # in longer parts both ends are solved; the joining window needs six
     solved_windows: int = _size(ROUTES, 10, 7)
-    # steps of a window, which is half as long at least: joins that are searched once more must not touch one another
+    # steps of a window, which is half as long at least: joins that are searched once more must not touch one
+    # another
     searched_window: int = _size(ROUTES, 1_500, 200)
     searched_overlap: int = _size(ROUTES, 120, 30)  # steps on each side of a join that is searched once more
     # steps between a join and where it would be: it is where the motion uses least of its limits
@@ -122,8 +126,8 @@ USUAL = Sizes()
 
 
 def chosen(said: str) -> Sizes:
-    """The sizes that `said` asks for: "" for the usual ones, `small`, or kinds with commas between them. Raises InputError for another
-    word."""
+    """The sizes that `said` asks for: "" for the usual ones, `small`, or kinds with commas between them.
+    Raises InputError for another word."""
     kinds = {word.strip() for word in said.split(",") if word.strip()}
     unknown = sorted(kinds - {SMALL, *KINDS})
     if unknown:

@@ -41,7 +41,8 @@ def side_by_side(
 ) -> None:
     """Run all of `work` in as many threads as there may be, in this order; returns when all is done.
 
-    stop    : called after an error or an interrupt, which is then raised: makes what is still running end soon
+    stop    : called after an error or an interrupt, which is then raised: makes what is still running end
+              soon
     waiting : called in this thread, about once in `PERIOD`
     """
     # not loaded by commands that solve nothing
@@ -64,8 +65,8 @@ def side_by_side(
 
 
 def in_parts(count: int, least: int, work: Callable[[int, int], None]) -> None:
-    """Call `work` for parts first, beyond of 0..count, side by side; all at once where there is one thread, or less than two parts of
-    `least`. What is worked on may not depend on the parts."""
+    """Call `work` for parts first, beyond of 0..count, side by side; all at once where there is one thread,
+    or less than two parts of `least`. What is worked on may not depend on the parts."""
     parts = max(min(threads(), count // least), 1)
     if parts == 1:
         work(0, count)
@@ -76,8 +77,9 @@ def in_parts(count: int, least: int, work: Callable[[int, int], None]) -> None:
 
 
 def beside(here: Callable[[], Here], there: Callable[[], There]) -> tuple[Here, There]:
-    """The results of `here`, which runs in this thread, and of `there`, which runs in another one meanwhile; without another thread,
-    one after the other. What is raised here is raised at once, what is raised there when `here` has ended."""
+    """The results of `here`, which runs in this thread, and of `there`, which runs in another one meanwhile;
+    without another thread, one after the other. What is raised here is raised at once, what is raised there
+    when `here` has ended."""
     if threads() == 1:
         return here(), there()
     found: list[There] = []

@@ -2,12 +2,14 @@
 
     python -m planner.commands.ahead [corners]
 
-plans two programs with the usual method, which compiles what is not kept yet, and prints the files of all kernels that the plans have
-used. What another method, a curve of another kind or a longer job needs is compiled when it is first used.
+plans two programs with the usual method, which compiles what is not kept yet, and prints the files of all
+kernels that the plans have used. What another method, a curve of another kind or a longer job needs is
+compiled when it is first used.
 
-Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by side, the second time with
-`corners`: three moves that need not be read, on corners that need no splines. That comes to geometry, path, feedrate, samples and
-verdict while the first compiles the reading and the splines. Both keep their kernels in the same place, and each loads what it finds.
+Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by
+side, the second time with `corners`: three moves that need not be read, on corners that need no splines. That
+comes to geometry, path, feedrate, samples and verdict while the first compiles the reading and the splines.
+Both keep their kernels in the same place, and each loads what it finds.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ from planner.base import kernel_files
 from planner.base.names import OPTIMAL, SINGLE_CORNERS
 
 MACHINE = "mill"
-# Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so short that other corners
-# might be faster, which are planned beside it.
+# Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so
+# short that other corners might be faster, which are planned beside it.
 PROGRAMS = (
     """G21 G90 G17 G64 P0.02
 G1 X20 F3000

@@ -1,8 +1,8 @@
 """The command line: every command under its name, and faults of its use in plain words.
 
-typer's messages are for programmers, and lack the one hint that helps. A file where a command belongs (`planner part.nc`)
-is answered with the command; a misspelt option with the one that is near, not with every option that resembles it; what
-is missing with what its help says.
+typer's messages are for programmers, and lack the one hint that helps. A file where a command belongs
+(`planner part.nc`) is answered with the command; a misspelt option with the one that is near, not with every
+option that resembles it; what is missing with what its help says.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from planner.commands.plan import plan_command
 from planner.commands.studied import sweep_command, what_if_command
 from planner.commands.verify import verify_command
 
-# typer has a click of its own from 0.2x on, under another name: its base class of usage faults is the one of BadParameter.
+# typer has a click of its own from 0.2x on, under another name: its base class of usage faults is the one of
+# BadParameter.
 UsageError: Any = typer.BadParameter.__mro__[1]
 _NUMBER = re.compile(r"Input should be a valid (number|integer).*|'.*' is not a valid (float|integer)\.?")
 _LEAST = re.compile(r"Input should be greater than or equal to (\S+)")

@@ -64,7 +64,8 @@ def compare_command(
 ) -> None:
     """Plan a program with several methods and compare cycle times, limits, errors and verdicts.
 
-    The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused the job.
+    The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused
+    the job.
     """
     if force and output is None and report is None:
         raise InputError(
@@ -133,7 +134,8 @@ def parse_methods(text: str) -> list[str]:
 def _run(
     method: str, program: Program, machine: Machine, tolerance: float | None, quiet: bool, shown: bool
 ) -> Row:
-    """Plan with one method and say on standard error how it went; keep samples of the motion if they are `shown` on a page."""
+    """Plan with one method and say on standard error how it went; keep samples of the motion if they are
+    `shown` on a page."""
     from planner.report.compare import Row, row_of
     from planner.report.html.comparison_page import SAMPLES_MAX
 

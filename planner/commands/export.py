@@ -109,7 +109,8 @@ def export_command(
 
 @contextmanager
 def _new_directory(output: Path) -> Iterator[Path]:
-    """A directory to fill, which becomes `output` at the end. Raises InputError if that exists or cannot be written."""
+    """A directory to fill, which becomes `output` at the end. Raises InputError if that exists or cannot be
+    written."""
     if os.path.lexists(output):
         raise InputError("exists already and is not overwritten; give another name", source=str(output))
     new = output.with_name(f".{output.name}.{os.getpid()}")
@@ -191,7 +192,8 @@ def pulses_command(
 ) -> None:
     """Make step and direction pulses of a trajectory, at every instant within one pulse of it.
 
-    If the pulses follow each other faster than the drives can take, nothing is written and the exit code is 1.
+    If the pulses follow each other faster than the drives can take, nothing is written and the exit code is
+    1.
     """
     from planner.motion.pulses import Drive, overrun, pulses_of
     from planner.report.replace import check_file

@@ -1,9 +1,11 @@
 """Ctrl-C ends the command at once, with exit code 130 and without half-written files.
 
-The handler does not raise KeyboardInterrupt: numba's dispatcher turns an exception that arrives while a kernel returns into a
-SystemError, and callbacks of C libraries and destructors swallow one. Leaving at once is safe, since a file takes its place only
-when it is written completely (report/replace.py); the temporaries are removed first. Python runs the handler between two of its
-instructions, so a running kernel is waited for, but nothing after it happens.
+The handler does not raise KeyboardInterrupt: numba's dispatcher turns an exception that arrives while a
+                                              kernel returns into a
+SystemError, and callbacks of C libraries and destructors swallow one. Leaving at once is safe, since a file
+takes its place only when it is written completely (report/replace.py); the temporaries are removed first.
+Python runs the handler between two of its instructions, so a running kernel is waited for, but nothing after
+it happens.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ CLEAR_LINE_AND_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # of a terminal, where a pro
 
 
 def end_at_interrupts() -> None:
-    """Let Ctrl-C end the process, unless interrupts are ignored (jobs in a shell's background) or taken care of already."""
+    """Let Ctrl-C end the process, unless interrupts are ignored (jobs in a shell's background) or taken care
+    of already."""
     if (
         threading.current_thread() is threading.main_thread()
         and signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -32,7 +35,8 @@ def end_at_interrupts() -> None:
 
 @contextmanager
 def interrupts_raise() -> Iterator[None]:
-    """Within, Ctrl-C raises KeyboardInterrupt: for a process that only waits for others, and runs no kernel."""
+    """Within, Ctrl-C raises KeyboardInterrupt: for a process that only waits for others, and runs no
+    kernel."""
     if (
         threading.current_thread() is not threading.main_thread()
         or signal.getsignal(signal.SIGINT) is not _end
@@ -47,7 +51,8 @@ def interrupts_raise() -> Iterator[None]:
 
 
 def no_more_interrupts() -> None:
-    """Let the command, whose work is done, end with its own exit code: Python takes handlers away before it leaves."""
+    """Let the command, whose work is done, end with its own exit code: Python takes handlers away before it
+    leaves."""
     if signal.getsignal(signal.SIGINT) is _end:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 

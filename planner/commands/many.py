@@ -1,8 +1,8 @@
 """`planner plan` with several programs: each in a process of its own, as many at a time as there are cores.
 
-A process each, because a program that uses the memory up, or finds a bug, then ends alone. Its command line is that of one program,
-with `--json` and its share of the threads. What it writes stands in DIR/NAME, all of it or nothing, so that Ctrl-C loses only what was
-not finished.
+A process each, because a program that uses the memory up, or finds a bug, then ends alone. Its command line
+is that of one program, with `--json` and its share of the threads. What it writes stands in DIR/NAME, all of
+it or nothing, so that Ctrl-C loses only what was not finished.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ OUTCOMES = {
     INTERRUPTED: "interrupted",
 }
 CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
-# Signals that no fault of a process raises: of a system whose memory is used up, of a batch system, of `kill`.
+# Signals that no fault of a process raises: of a system whose memory is used up, of a batch system, of
+# `kill`.
 FROM_OUTSIDE = (signal.SIGTERM, 9)  # 9 is SIGKILL, which Windows does not have
 PERHAPS_MEMORY = "perhaps because the memory is used up; plan it alone, or with fewer --threads"
 ENDING = 5.0  # that processes get to remove what they have half written [s]
@@ -44,7 +45,8 @@ ENDING = 5.0  # that processes get to remove what they have half written [s]
 
 @dataclass(frozen=True, kw_only=True)
 class Done:
-    """The outcome of a program: exit code, the content of `summary.json` if there is any, and what the process said."""
+    """The outcome of a program: exit code, the content of `summary.json` if there is any, and what the
+    process said."""
 
     job: Path
     code: int
@@ -58,7 +60,8 @@ class Done:
 
 
 def folders_of(jobs: Sequence[Path], output: Path) -> list[Path]:
-    """Where the files of each program go: DIR/NAME without the suffix, with it where another program has the same name otherwise.
+    """Where the files of each program go: DIR/NAME without the suffix, with it where another program has the
+    same name otherwise.
 
     Raises InputError if two programs have the same name, or one is there twice.
     """

@@ -1,4 +1,5 @@
-"""Arguments and options that several commands share; the names they may take come from `planner.base.names`."""
+"""Arguments and options that several commands share; the names they may take come from
+`planner.base.names`."""
 
 from __future__ import annotations
 
@@ -138,7 +139,8 @@ ForceOption = Annotated[bool, typer.Option("--force", help="also overwrite files
 
 
 def given_options(context: typer.Context, without: Container[str]) -> list[str]:
-    """The options of a command line as they are to be written for another one, all but those of the names in `without`."""
+    """The options of a command line as they are to be written for another one, all but those of the names in
+    `without`."""
     words: list[str] = []
     for option in context.command.params:
         if option.name is None or option.name in without or option.param_type_name != "option":
@@ -307,8 +309,8 @@ _PLANNING: dict[str, tuple[Any, Any]] = {
 
 
 def takes_planning(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of planning; it gets those that are given as one argument, `how`, as `planner.plan` takes
-    them."""
+    """Give a command the options of planning; it gets those that are given as one argument, `how`, as
+    `planner.plan` takes them."""
     usual = dict.fromkeys(_PLANNING, None) | {"method": names.OPTIMAL}
     return taking(
         command,

@@ -89,7 +89,8 @@ def plan_command(
     how: dict[str, Any],
     reading: Reading,
 ) -> None:
-    """Plan the motion of a program, sample it and verify it; of several ones side by side, each into DIR/NAME."""
+    """Plan the motion of a program, sample it and verify it; of several ones side by side, each into
+    DIR/NAME."""
     nowhere = output is None
     for wrong, why in (
         (plot and nowhere, f"--plot writes its pictures {INTO_OUTPUT}"),

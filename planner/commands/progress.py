@@ -1,7 +1,8 @@
-"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then elsewhere.
+"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then
+elsewhere.
 
-The share is what a stage tells of itself, and the time left is what rich makes of that: of the stage, not of the job, and nothing where
-the stage tells none.
+The share is what a stage tells of itself, and the time left is what rich makes of that: of the stage, not of
+the job, and nothing where the stage tells none.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from planner.base import kernels
 from planner.commands.terminal import printable, say
 
 PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
-# Between lines of progress where there is no terminal: so long at least [s], and so much of the time since the start [-], so that an
-# hour has about 30 of them and not 360.
+# Between lines of progress where there is no terminal: so long at least [s], and so much of the time since
+# the start [-], so that an hour has about 30 of them and not 360.
 LINE_EVERY, LINE_SHARE = 10.0, 0.15
 COMPILING = "compiling, once"
 KEPT = "kept for the next run"

@@ -1,4 +1,5 @@
-"""Common to `what-if` and `sweep`: the options of a job that is planned many times, and how such a command ends."""
+"""Common to `what-if` and `sweep`: the options of a job that is planned many times, and how such a command
+ends."""
 
 from __future__ import annotations
 
@@ -44,7 +45,8 @@ _JOB: dict[str, Any] = {
 
 
 def takes_studied_job(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of a job, of planning and of the reader; it gets them as one argument, `studied`."""
+    """Give a command the options of a job, of planning and of the reader; it gets them as one argument,
+    `studied`."""
     usual = dict.fromkeys(_JOB, None) | {"job": inspect.Parameter.empty}
     of_job = taking(command, "studied", _JOB, usual, lambda given: _studied_job(**given))
     return takes_reading(takes_planning(of_job))
@@ -73,7 +75,8 @@ def title_of(studied: StudiedJob) -> str:
 
 
 def end_with(outcomes: Collection[str]) -> None:
-    """End the command with exit code 0 if all plans passed, 1 if one failed its verdict, 3 if one has no motion."""
+    """End the command with exit code 0 if all plans passed, 1 if one failed its verdict, 3 if one has no
+    motion."""
     if set(outcomes) != {"passed"}:
         raise typer.Exit(FAILED if set(outcomes) <= {"passed", "failed"} else NOT_SOLVED)
 
@@ -147,7 +150,8 @@ def sweep_command(
     *,
     studied: StudiedJob,
 ) -> None:
-    """Plan a program with every combination of values; what is done is kept, and the same command goes on with it.
+    """Plan a program with every combination of values; what is done is kept, and the same command goes on
+    with it.
 
     The exit code is 0 if all plans passed, 1 if one failed its verdict, 3 if one has no motion.
     """

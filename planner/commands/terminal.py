@@ -1,9 +1,11 @@
 """How a command reports: messages, tables on standard output, progress on standard error.
 
-Does a failure come of too little memory? Libraries say so in many ways, and some only that they cannot be loaded.
+Does a failure come of too little memory? Libraries say so in many ways, and some only that they cannot be
+loaded.
 
-Under a limit of the address space (`ulimit -v`, batch systems) the first that does not fit is often a shared library: the loader then
-reports a segment that cannot be mapped, and llvmlite only a library that cannot be found.
+Under a limit of the address space (`ulimit -v`, batch systems) the first that does not fit is often a shared
+library: the loader then reports a segment that cannot be mapped, and llvmlite only a library that cannot be
+found.
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ def prepare_streams() -> None:
 
 
 def _plain_text(fault: UnicodeError) -> tuple[str, int]:
-    """Substitutes for what an encoding lacks: plain letters for units, escapes for the rest, file names that are no UTF-8 among them."""
+    """Substitutes for what an encoding lacks: plain letters for units, escapes for the rest, file names that
+    are no UTF-8 among them."""
     if not isinstance(fault, UnicodeEncodeError):
         raise fault
     lacking = fault.object[fault.start : fault.end]
@@ -98,7 +101,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def memory_used_up(fault: MemoryError, judging: bool = False) -> str:
-    """The message for a job that needs more memory than there is, and what to do about it; `judging` a file that was planned."""
+    """The message for a job that needs more memory than there is, and what to do about it; `judging` a file
+    that was planned."""
     said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
     if judging:
         return f"{said}; verify a part of the motion at a time"

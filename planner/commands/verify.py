@@ -1,9 +1,10 @@
 """`planner verify`: judge a trajectory file.
 
-The command line says what to judge it against. Without -m and --tolerance a file that `plan` wrote is judged with its own machine and
-tolerance, and its program is read as it was for the plan, unless the command line has settings of the reader; the output says so. With
--m the tolerance is that of the machine, unless the program (G64 P) or --tolerance sets another.
-Limits that a file declares as not kept are reported, and judged all the same.
+The command line says what to judge it against. Without -m and --tolerance a file that `plan` wrote is judged
+with its own machine and tolerance, and its program is read as it was for the plan, unless the command line
+has settings of the reader; the output says so. With -m the tolerance is that of the machine, unless the
+program (G64 P) or --tolerance sets another. Limits that a file declares as not kept are reported, and judged
+all the same.
 """
 
 from __future__ import annotations
@@ -126,7 +127,8 @@ def verify_command(
 
 
 def _machine(machine: str | None, trajectory: Path, says: FileSays) -> tuple[Machine, bool]:
-    """The machine of the command line, else the one that the file brings, else the default; True if it is the file's."""
+    """The machine of the command line, else the one that the file brings, else the default; True if it is the
+    file's."""
     from planner.machine import load_machine, machine_from_dict
 
     if machine is None and says.machine is not None:

@@ -1,6 +1,7 @@
 """The Bezier-pair corner of paper 002.
 
-Two mirrored rational cubics, control points P - d u1, P - d/2 u1, P - d/4 u1, joint, ... ; two numbers describe all weights:
+Two mirrored rational cubics, control points P - d u1, P - d/2 u1, P - d/4 u1, joint, ... ; two numbers
+describe all weights:
 
     sigma1 = w0 w2 / w1^2,   sigma2 = w1 w3 / w2^2            (eq. (2), (3))
 
@@ -9,9 +10,10 @@ With w0 = w3 = 1: w1 = (sigma1^2 sigma2)^(-1/3), w2 = (sigma1 sigma2^2)^(-1/3).
     eps       = (d/4) sin(theta/2)                            (eq. (15), beta = theta/2)
     kappa_max = sigma2 * 8 sin(theta/2) / (3 d cos^2(theta/2))    at the joint   (eq. (17))
 
-The pair is G3 at the joint iff sigma1 = 4 - 3/sigma2 (docs/papers.md C.G3). sigma = (2/3, 0.9) has 10 % less curvature and a smaller
-curvature slope than the polynomial pair sigma = (1, 1) for all turning angles, so it is the default. The maximum is at the joint
-for every theta in (0, pi) if sigma2 >= 0.83; below, shallow corners have it beside the joint, at most 0.3 % higher (tested).
+The pair is G3 at the joint iff sigma1 = 4 - 3/sigma2 (docs/papers.md C.G3). sigma = (2/3, 0.9) has 10 % less
+curvature and a smaller curvature slope than the polynomial pair sigma = (1, 1) for all turning angles, so it
+is the default. The maximum is at the joint for every theta in (0, pi) if sigma2 >= 0.83; below, shallow
+corners have it beside the joint, at most 0.3 % higher (tested).
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.corners.blend import ScaledShape, Shape
 
-# Up to here retreat times advance is largest at the middle of the corner, which the error bound needs (tested).
+# Up to here retreat times advance is largest at the middle of the corner, which the error bound needs
+# (tested).
 SIGMA2_MAX = 1.5
 PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 
@@ -33,8 +36,8 @@ PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 class BezierCorner(ScaledShape):
     """Paper 002's corner with shape numbers sigma1, sigma2; sigma1 is fixed by the G3 condition unless given.
 
-    Raises InputError for shape numbers outside the ranges in which the error bound of corners/blend.py holds, and, of sigma2, the G3
-    condition has a solution.
+    Raises InputError for shape numbers outside the ranges in which the error bound of corners/blend.py holds,
+    and, of sigma2, the G3 condition has a solution.
     """
 
     sigma2: float = 0.9

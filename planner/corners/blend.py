@@ -1,30 +1,33 @@
 """One construction for every corner: two legs superposed.
 
-Let p1(-x) be the point on the incoming leg a distance x before the vertex P, and p2(y) the point on the outgoing leg a distance
-y after it. A corner is the curve
+Let p1(-x) be the point on the incoming leg a distance x before the vertex P, and p2(y) the point on the
+outgoing leg a distance y after it. A corner is the curve
 
     B(w) = p1(-X(w)) + p2(Y(w)) - P,        w in [0, 1],
 
-where the *retreat* X falls from d to 0 and the *advance* Y rises from 0 to d. Between straight legs (u1, u2) this is
-P - X u1 + Y u2: the Bezier pair of paper 002 has X = d (1-w)^3, Y = d w^3 (or their rational relatives), the FIR corner of
-paper 000 has X = V R(Tk-tau), Y = V R(tau). On arcs the same two functions bend with the legs, and since Y, Y', Y'' vanish at
-w = 0 (and X, X', X'' at w = 1) the corner leaves every leg, straight or circular, with its tangent *and* its curvature: G2.
+where the *retreat* X falls from d to 0 and the *advance* Y rises from 0 to d. Between straight legs (u1, u2)
+this is P - X u1 + Y u2: the Bezier pair of paper 002 has X = d (1-w)^3, Y = d w^3 (or their rational
+relatives), the FIR corner of paper 000 has X = V R(Tk-tau), Y = V R(tau). On arcs the same two functions bend
+with the legs, and since Y, Y', Y'' vanish at w = 0 (and X, X', X'' at w = 1) the corner leaves every leg,
+straight or circular, with its tangent *and* its curvature: G2.
 
-**Error (proof).** Let theta be the turning angle at P, kappa1, kappa2 bounds of the legs' curvature, s = sin(theta/2), and
-m = X = Y the common value at the middle. Let both shapes obey X Y <= m^2 (it holds for every shape here and is tested). Match
-B(w) to the programmed point p1(-(X-Y)) while X >= Y, to p2(Y-X) afterwards; this matching is in order. In the first half
+**Error (proof).** Let theta be the turning angle at P, kappa1, kappa2 bounds of the legs' curvature, s =
+sin(theta/2), and m = X = Y the common value at the middle. Let both shapes obey X Y <= m^2 (it holds for
+every shape here and is tested). Match B(w) to the programmed point p1(-(X-Y)) while X >= Y, to p2(Y-X)
+afterwards; this matching is in order. In the first half
 
     |B - p1(-X+Y)| = | int_0^Y  t2(y) - t1(-X+y)  dy |  <=  int_0^Y  |u2-u1| + kappa2 y + kappa1 (X-y)  dy
                    <= 2 s Y + kappa2 Y^2/2 + kappa1 X Y   <=   2 s m + (kappa1 + kappa2) m^2  =:  E(m),
 
-because unit tangents turn by at most kappa per mm; the second half is the mirror image. So B and the programmed path are within
-E(m) of each other *in both directions and in order* (Frechet distance), and the vertex is met within E(m). Between straight legs
-E(m) = 2 s m is the exact vertex distance of papers 000 and 002 (d = 8 m gives eps = (d/4) s, eq. (15)). Solved for m:
+because unit tangents turn by at most kappa per mm; the second half is the mirror image. So B and the
+programmed path are within E(m) of each other *in both directions and in order* (Frechet distance), and the
+vertex is met within E(m). Between straight legs E(m) = 2 s m is the exact vertex distance of papers 000 and
+002 (d = 8 m gives eps = (d/4) s, eq. (15)). Solved for m:
 
     m = eps / (s + sqrt(s^2 + (kappa1 + kappa2) eps)).
 
-**Regularity.** B' = -X' t1 + Y' t2 with -X', Y' >= 0 vanishes only where the tangents oppose each other, so the corner is kept
-short enough that theta plus what the legs bend by stays below `BEND_MAX`.
+**Regularity.** B' = -X' t1 + Y' t2 with -X', Y' >= 0 vanishes only where the tangents oppose each other, so
+the corner is kept short enough that theta plus what the legs bend by stays below `BEND_MAX`.
 """
 
 from __future__ import annotations
@@ -72,15 +75,16 @@ class ScaledShape:
         return reach * self.share
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """The middle, where the matched side changes or two curves of a pair meet, whatever the `params` (4,)."""
+        """The middle, where the matched side changes or two curves of a pair meet, whatever the `params`
+        (4,)."""
         return (0.5,)
 
 
 SHAPE_BEZIER, SHAPE_OWN = int(Shape.BEZIER), int(Shape.OWN)  # numba reads plain integers
 OWN_TERMS = 10  # coefficients of a shape of one's own
 
-# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y (`SmoothPath.scale`). Scaling X
-# and Y is an affine map, which keeps every geometric continuity.
+# What the kernels know of a corner: its shape, the shape's parameters, and factors on X and Y
+# (`SmoothPath.scale`). Scaling X and Y is an affine map, which keeps every geometric continuity.
 CORNER_DTYPE = np.dtype(
     [
         ("shape", np.int64),
@@ -141,7 +145,8 @@ def _scaled(v, scale, rate):
 
 @njit(cache=True, error_model="numpy")
 def _bezier_shape(d, w1, w2, w, w_ref):
-    """Paper 002: the halves have control values (1, 1/2, 1/4, 1/8) on the near leg, (0, 0, 0, 1/8) on the far one."""
+    """Paper 002: the halves have control values (1, 1/2, 1/4, 1/8) on the near leg, (0, 0, 0, 1/8) on the far
+    one."""
     first = w_ref <= 0.5
     t = 2.0 * w if first else 2.0 - 2.0 * w
     weight = _cubic(1.0, w1, w2, 1.0, t)
@@ -154,7 +159,8 @@ def _bezier_shape(d, w1, w2, w, w_ref):
 
 @njit(cache=True, error_model="numpy")
 def _ramp(t, t_ref, T1, T2):
-    """Ramp response R of two FIR filters and its three derivatives (S, h, h'), on the branch of t_ref (docs/papers.md 0)."""
+    """Ramp response R of two FIR filters and its three derivatives (S, h, h'), on the branch of t_ref
+    (docs/papers.md 0)."""
     if t_ref <= T2:
         q = 1.0 / (T1 * T2)
         return q * t * t * t / 6.0, q * t * t / 2.0, q * t, q
@@ -197,9 +203,11 @@ def _own_shape(d, c, w):
 
 @njit(cache=True, error_model="numpy")
 def shape_at(corner, w, w_ref):
-    """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y, ...)).
+    """Retreat X and advance Y of a corner record at w, each with three derivatives: ((X, X', X'', X'''), (Y,
+    ...)).
 
-    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner meet
+    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner
+            meet
     """
     p = corner.params
     if corner.shape == SHAPE_BEZIER:

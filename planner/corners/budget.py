@@ -1,16 +1,19 @@
-"""The error budget of a corner: how much of it the path may use, and how fast that lets the corner be taken (paper 002, eq. 18-20).
+"""The error budget of a corner: how much of it the path may use, and how fast that lets the corner be taken
+(paper 002, eq. 18-20).
 
-The budget is shared by the rounding, the chord error of the interpolation period and, where FIR filters follow, their error; with
-X = kappa feed^2 the normal acceleration at the apex (docs/papers.md D, three sources):
+The budget is shared by the rounding, the chord error of the interpolation period and, where FIR filters
+follow, their error; with X = kappa feed^2 the normal acceleration at the apex (docs/papers.md D, three
+sources):
 
     eps_ap + c X <= eps,     c = dt^2/8 + sum_i T_i^2/24,     X <= A.
 
-A is the machine's normal acceleration (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes give in
-the direction n of the path's normal: sum_k a_k |n_k|, the support function of the box of axis accelerations. With it the closed-form
-speed is a true upper bound: no motion within the axis limits passes the apex faster, whatever it does along the path.
+A is the machine's normal acceleration (`Machine.normal_acceleration`, inf if it names none), and never more
+than what its axes give in the direction n of the path's normal: sum_k a_k |n_k|, the support function of the
+box of axis accelerations. With it the closed-form speed is a true upper bound: no motion within the axis
+limits passes the apex faster, whatever it does along the path.
 
-The corner speed sqrt(X eps_ap / K), K = eps_ap kappa_max, grows with X and with eps_ap, so the constraint is tight; X (eps - c X)
-is a parabola with its top at eps/(2c), hence
+The corner speed sqrt(X eps_ap / K), K = eps_ap kappa_max, grows with X and with eps_ap, so the constraint is
+tight; X (eps - c X) is a parabola with its top at eps/(2c), hence
 
     X* = min(A, eps / (2c)),   eps_ap = eps - c X*                                   (eq. (20); independent of the angle)
 
@@ -85,8 +88,8 @@ def normal_at_corners(
 ) -> FloatArray:
     """(n,) A at corners with unit tangents u1, u2 (n, A) [mm/s2].
 
-    curvature : (n,) of their legs. Between arcs the normal at the apex is not the bisector at the vertex: the largest over all
-                directions bounds it.
+    curvature : (n,) of their legs. Between arcs the normal at the apex is not the bisector at the vertex: the
+                largest over all directions bounds it.
     """
     limits = machine.limits("acceleration", axes)
     reachable = normal_of_axes(limits, u1, u2)

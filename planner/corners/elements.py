@@ -1,8 +1,9 @@
-"""Elements: the smooth path as a sequence of curves, what is free of a leg, a corner or a span, each over its own parameter w.
+"""Elements: the smooth path as a sequence of curves, what is free of a leg, a corner or a span, each over its
+own parameter w.
 
-Of a path with R legs an element is numbered r in [0, R) for what is free of leg r (w is the leg's x [mm]), ~k < 0 for the corner at
-joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]).
-This file is the one place where an element's geometry is turned from w to arc length:
+Of a path with R legs an element is numbered r in [0, R) for what is free of leg r (w is the leg's x [mm]), ~k
+< 0 for the corner at joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]). This file is
+the one place where an element's geometry is turned from w to arc length:
 
     r'   = T = B'/|B'|
     r''  = (B'' - T (T.B'')) / |B'|^2
@@ -25,8 +26,8 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.legs import leg_point, leg_tangent
 from planner.geometry.spline import span_point, span_tangent
 
-# Eight-point Gauss-Legendre rule on [0, 1]: on the widest grid interval, a quarter of a corner, good to 1e-10 of the length (four
-# points leave 4e-6, which shows as feed when positions are differenced).
+# Eight-point Gauss-Legendre rule on [0, 1]: on the widest grid interval, a quarter of a corner, good to 1e-10
+# of the length (four points leave 4e-6, which shows as feed when positions are differenced).
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 GAUSS_NODES, GAUSS_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 
@@ -40,7 +41,8 @@ class ElementTable(NamedTuple):
 
 
 class ElementIntervals(NamedTuple):
-    """P intervals on the elements of a smooth path, for kernels that evaluate it there; the first three are its `ElementTable`."""
+    """P intervals on the elements of a smooth path, for kernels that evaluate it there; the first three are
+    its `ElementTable`."""
 
     legs: Array
     corners: Array
@@ -70,7 +72,8 @@ def is_straight(legs, element):
 def element_point(legs, corners, spans, element, w, w_ref, work, out):
     """Point [mm] and three w-derivatives of an element at w, into out (4, A).
 
-    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner meet
+    w_ref : a parameter inside the interval that is meant; it chooses the branch where two curves of a corner
+            meet
     work  : (2, 4, A) scratch
     """
     if element >= len(legs):
@@ -83,7 +86,8 @@ def element_point(legs, corners, spans, element, w, w_ref, work, out):
 
 @njit(cache=True, error_model="numpy")
 def to_arc_length(out):
-    """Turn the w-derivatives in out (4, A) into arc-length derivatives, in place (module text); returns |dB/dw| [mm]."""
+    """Turn the w-derivatives in out (4, A) into arc-length derivatives, in place (module text); returns
+    |dB/dw| [mm]."""
     axes = out.shape[1]
     speed_sq = 0.0
     along2 = 0.0  # T . B''
@@ -129,7 +133,8 @@ def _element_speed(legs, corners, spans, element, w, w_ref, out):
 
 @njit(cache=True, error_model="numpy")
 def element_length(legs, corners, spans, element, w0, w1, w_ref, out):
-    """Arc length of an element between w0 and w1 [mm], by eight Gauss points; `w_ref` as of `element_point`, out (4, A) is scratch."""
+    """Arc length of an element between w0 and w1 [mm], by eight Gauss points; `w_ref` as of `element_point`,
+    out (4, A) is scratch."""
     if is_straight(legs, element):
         return w1 - w0
     total = 0.0

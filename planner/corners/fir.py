@@ -1,17 +1,17 @@
 """The FIR overlap corner of paper 000, as geometry.
 
-Two velocity pulses of feed V through two moving averages of lengths T1 >= T2, the second pulse started Tk before the first has
-died out: X = V R(Tk - tau), Y = V R(tau), tau in [0, Tk], with the ramp response R of docs/papers.md 0. With s = sin(theta/2), delay
-Td = T1 + T2 (eq. (14), (15), the branch chosen on eps):
+Two velocity pulses of feed V through two moving averages of lengths T1 >= T2, the second pulse started Tk
+before the first has died out: X = V R(Tk - tau), Y = V R(tau), tau in [0, Tk], with the ramp response R of
+docs/papers.md 0. With s = sin(theta/2), delay Td = T1 + T2 (eq. (14), (15), the branch chosen on eps):
 
     eps = 2 V s R(Tk/2)
     Tk  = (24 T1 T2 eps / (V s))^(1/3)                    eps <= V s T2^2 / (3 T1)
           T2 + sqrt(4 T1 eps / (V s) - T2^2 / 3)          eps <= V s (3 T1^2 + T2^2) / (12 T1)
           Td                                              beyond: the largest error there is
 
-The tangent length is d = V R(Tk); for Tk <= T2 the corner *is* the polynomial Bezier pair with this d, parameter included
-(docs/papers.md B1). Corners of neighbouring joints stay apart iff d_i + d_{i+1} <= L, which implies paper 000's condition
-Tk_i + Tk_{i+1} <= Tv + Td because R(Tk) >= Tk - Td/2.
+The tangent length is d = V R(Tk); for Tk <= T2 the corner *is* the polynomial Bezier pair with this d,
+parameter included (docs/papers.md B1). Corners of neighbouring joints stay apart iff d_i + d_{i+1} <= L,
+which implies paper 000's condition Tk_i + Tk_{i+1} <= Tv + Td because R(Tk) >= Tk - Td/2.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from planner.machine import Machine
 
 @dataclass(frozen=True, kw_only=True)
 class FirCorner:
-    """Paper 000's corner for filters T1 >= T2 [s]; V is the joint's programmed feed, at most `feed_max` [mm/s].
+    """Paper 000's corner for filters T1 >= T2 [s]; V is the joint's programmed feed, at most `feed_max`
+    [mm/s].
 
     Raises InputError unless all are positive and finite and T2 <= T1.
     """
@@ -63,7 +64,8 @@ class FirCorner:
         return self
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m = V R(Tk/2) [mm] for tangent lengths d = V R(Tk) = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
+        """(n,) middle values m = V R(Tk/2) [mm] for tangent lengths d = V R(Tk) = `reach` (n,) [mm] at feeds
+        `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         return V * self.ramp(self.overlap_from_ramp(reach / V) / 2)
 
@@ -76,7 +78,8 @@ class FirCorner:
         return V * self.ramp(np.minimum(2.0 * self.overlap_from_ramp(middle / V), self.T1 + self.T2))
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n, 4) parameters V [mm/s], T1, T2, Tk [s] for tangent lengths d = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
+        """(n, 4) parameters V [mm/s], T1, T2, Tk [s] for tangent lengths d = `reach` (n,) [mm] at feeds
+        `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         rows = np.empty((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = V, self.T1, self.T2
@@ -96,7 +99,8 @@ class FirCorner:
         return np.where(t <= T2, early, np.where(t <= T1, middle, late))
 
     def overlap_from_ramp(self, value: FloatArray) -> FloatArray:
-        """(n,) times t in [0, Td] with R(t) = `value` (n,) [s]; Td where the value is larger than R(Td) = Td/2."""
+        """(n,) times t in [0, Td] with R(t) = `value` (n,) [s]; Td where the value is larger than R(Td) =
+        Td/2."""
         T1, T2 = self.T1, self.T2
         early = np.cbrt(6 * T1 * T2 * value)
         middle = T2 / 2 + np.sqrt(np.maximum(2 * T1 * value - T2**2 / 12, 0.0))
@@ -107,7 +111,8 @@ class FirCorner:
         return t
 
     def _late_overlap(self, value: FloatArray) -> FloatArray:
-        """The last branch, by Newton on the convex R from the right: t - Td/2 + (Td-t)^3/(6 T1 T2) = value."""
+        """The last branch, by Newton on the convex R from the right: t - Td/2 + (Td-t)^3/(6 T1 T2) =
+        value."""
         T1, T2 = self.T1, self.T2
         delay = T1 + T2
         t = np.full(value.shape, delay)

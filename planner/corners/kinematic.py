@@ -1,29 +1,35 @@
 """The kinematic corner of paper 003: geometry and timing at once, within the limits of every axis.
 
-Directions u1 before and u2 after the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp response R as in docs/papers.md 0.
+Directions u1 before and u2 after the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp response R as in
+docs/papers.md 0.
 
-**Zero entry acceleration** (eq. (1)-(8)). All axes run jerk +j, 0, -j for Tj, Ta, Tj; with T1 = Tj + Ta >= T2 = Tj
+**Zero entry acceleration** (eq. (1)-(8)). All axes run jerk +j, 0, -j for Tj, Ta, Tj; with T1 = Tj + Ta >= T2
+= Tj
 
     p(t) = P - l u1 + Vc u1 t + Vc du R(t),     t in [0, T1 + T2],     l = Vc (T1 + T2) / 2,     j = Vc du / (T1 T2).
 
-The vertex is missed by eps = 2 s m with the middle value m = Vc R((T1+T2)/2) = Vc (3 T1^2 + T2^2) / (24 T1). With the axes' limits
-A_k, J_k, alpha = min_k A_k/|du_k| and eta = min_k J_k/|du_k| (two axes, in general) the shortest times at a speed Vc are
+The vertex is missed by eps = 2 s m with the middle value m = Vc R((T1+T2)/2) = Vc (3 T1^2 + T2^2) / (24 T1).
+With the axes' limits A_k, J_k, alpha = min_k A_k/|du_k| and eta = min_k J_k/|du_k| (two axes, in general) the
+shortest times at a speed Vc are
 
     T1 = max(Vc/alpha, sqrt(Vc/eta)),     T2 = Vc / (eta T1),
 
-the first where acceleration is reached, Vc >= alpha^2/eta. Solved for Vc, with m* = alpha^3 / (6 eta^2), l* = alpha^3/eta^2:
+the first where acceleration is reached, Vc >= alpha^2/eta. Solved for Vc, with m* = alpha^3 / (6 eta^2), l* =
+alpha^3/eta^2:
 
     Vc = sqrt(8 alpha m - alpha^4/(3 eta^2))                       m >= m*    (V_gw1)
          (36 eta m^2)^(1/3)                                        m <= m*    (V_gw2)
     Vc = [sqrt(alpha^4/eta^2 + 8 alpha l) - alpha^2/eta] / 2       l >= l*
          (eta l^2)^(1/3)                                           l <= l*
 
-The branch is chosen on the error. The paper's rule min(V_gw1, V_gw2) is wrong: V_gw1 <= V_gw2 always (3x^2 + 1 >= 4x^(3/2)), and
-V_gw1 is imaginary below m*/4. The curve is the FIR corner with complete overlap and filters T1, T2 (docs/papers.md F1).
+The branch is chosen on the error. The paper's rule min(V_gw1, V_gw2) is wrong: V_gw1 <= V_gw2 always (3x^2 +
+1 >= 4x^(3/2)), and V_gw1 is imaginary below m*/4. The curve is the FIR corner with complete overlap and
+filters T1, T2 (docs/papers.md F1).
 
-**Entry deceleration** ("the same Vc and Ac"): the corner is entered with the deceleration Ac along u1, left with the acceleration
-Ac along u2, and has one phase of jerk Ac (u1 + u2)/Tc. It is the cubic of docs/papers.md B1 with d = Ac Tc^2 / 6, Vc = Ac Tc / 2 and
-eps = d s / 4. With a = min_k A_k / max(|u1_k|, |u2_k|) and J = min_k J_k / |u1_k + u2_k|:
+**Entry deceleration** ("the same Vc and Ac"): the corner is entered with the deceleration Ac along u1, left
+with the acceleration Ac along u2, and has one phase of jerk Ac (u1 + u2)/Tc. It is the cubic of
+docs/papers.md B1 with d = Ac Tc^2 / 6, Vc = Ac Tc / 2 and eps = d s / 4. With a = min_k A_k / max(|u1_k|,
+|u2_k|) and J = min_k J_k / |u1_k + u2_k|:
 
     Ac = min(a, (24 J^2 eps/s)^(1/3)),  Vc = sqrt(6 eps Ac/s)                           for a given error,
     Ac = min(a, sqrt(2 J Vc)),          Vc = min(sqrt(1.5 a d), (4.5 J d^2)^(1/3))      for a given length d.
@@ -42,7 +48,8 @@ from planner.corners.blend import Shape
 from planner.corners.fir import fir_breaks
 from planner.machine import Machine
 
-# A direction that changes by less is taken to change by so much [-]: below the rounding of unit vectors, and all ratios stay finite.
+# A direction that changes by less is taken to change by so much [-]: below the rounding of unit vectors, and
+# all ratios stay finite.
 CHANGE_MIN = 1e-12
 
 
@@ -55,7 +62,8 @@ def ratio_min(limits: FloatArray, change: FloatArray) -> FloatArray:
     return (limits / np.maximum(np.abs(change), CHANGE_MIN)).min(axis=-1)
 
 
-# ---- zero entry acceleration -----------------------------------------------------------------------------------------------------
+# ---- zero entry acceleration
+# -----------------------------------------------------------------------------------------------------
 
 
 def phase_times(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +94,8 @@ def middle(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
 
 
 def speed_from_middle(m: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """(n,) largest speed Vc [mm/s] with the middle value m = eps / (2 sin(theta/2)) (n,) [mm] (eq. (7), (8), the branch chosen on m).
+    """(n,) largest speed Vc [mm/s] with the middle value m = eps / (2 sin(theta/2)) (n,) [mm] (eq. (7), (8),
+    the branch chosen on m).
 
     alpha, eta : (n,) as of `phase_times`
     """
@@ -96,14 +105,16 @@ def speed_from_middle(m: FloatArray, alpha: FloatArray, eta: FloatArray) -> Floa
 
 
 def speed_from_approach(length: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """(n,) largest speed Vc [mm/s] with the approach length l (n,) [mm]; alpha, eta (n,) as of `phase_times`."""
+    """(n,) largest speed Vc [mm/s] with the approach length l (n,) [mm]; alpha, eta (n,) as of
+    `phase_times`."""
     threshold = alpha**2 / eta
     # [sqrt(x^2 + y) - x]/2 without cancellation
     accelerating = 4 * alpha * length / (threshold + np.sqrt(threshold**2 + 8 * alpha * length))
     return np.where(length >= alpha * threshold / eta, accelerating, np.cbrt(length**2 * eta))
 
 
-# ---- entry deceleration ----------------------------------------------------------------------------------------------------------
+# ---- entry deceleration
+# ----------------------------------------------------------------------------------------------------------
 
 
 def entry_limits(
@@ -118,17 +129,20 @@ def entry_limits(
 
 
 def entry_acceleration(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """(n,) entry deceleration Ac [mm/s2] of the shortest corner at the speeds V (n,) [mm/s]; a, J (n,) from `entry_limits`."""
+    """(n,) entry deceleration Ac [mm/s2] of the shortest corner at the speeds V (n,) [mm/s]; a, J (n,) from
+    `entry_limits`."""
     return np.minimum(a, np.sqrt(2 * J * V))
 
 
 def entry_length(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """(n,) tangent length d = Vc Tc / 3 [mm] at the speeds V (n,) > 0 [mm/s]; the corner takes Tc = 2 Vc / Ac. a, J as before."""
+    """(n,) tangent length d = Vc Tc / 3 [mm] at the speeds V (n,) > 0 [mm/s]; the corner takes Tc = 2 Vc /
+    Ac. a, J as before."""
     return 2 * V**2 / (3 * entry_acceleration(V, a, J))
 
 
 def entry_speed_from_middle(m: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """(n,) largest speed Vc [mm/s] with the middle value m = d/8 = eps / (2 sin(theta/2)) (n,) [mm]; a, J (n,) from `entry_limits`."""
+    """(n,) largest speed Vc [mm/s] with the middle value m = d/8 = eps / (2 sin(theta/2)) (n,) [mm]; a, J
+    (n,) from `entry_limits`."""
     return entry_speed_from_length(8 * m, a, J)
 
 
@@ -137,7 +151,8 @@ def entry_speed_from_length(d: FloatArray, a: FloatArray, J: FloatArray) -> Floa
     return np.minimum(np.sqrt(1.5 * a * d), np.cbrt(4.5 * J * d**2))
 
 
-# ---- as geometry alone -----------------------------------------------------------------------------------------------------------
+# ---- as geometry alone
+# -----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -159,8 +174,8 @@ class KinematicFamily:
         return approach(speed_from_middle(middle, self.alpha, self.eta), self.alpha, self.eta)
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n, 4) parameters of the FIR shape with complete overlap, V [mm/s], T1, T2, T1 + T2 [s], for approach lengths `reach` (n,)
-        [mm], at any feed (n,)."""
+        """(n, 4) parameters of the FIR shape with complete overlap, V [mm/s], T1, T2, T1 + T2 [s], for
+        approach lengths `reach` (n,) [mm], at any feed (n,)."""
         V = speed_from_approach(reach, self.alpha, self.eta)
         T1, T2 = phase_times(V, self.alpha, self.eta)
         return np.stack([V, T1, T2, T1 + T2], axis=1)
@@ -181,7 +196,8 @@ class KinematicCorner:
 
     @classmethod
     def from_machine(cls, machine: Machine, axes: tuple[str, ...]) -> KinematicCorner:
-        """The shape for the machine's limits of acceleration and jerk of `axes`. Raises InputError for an axis that it lacks."""
+        """The shape for the machine's limits of acceleration and jerk of `axes`. Raises InputError for an
+        axis that it lacks."""
         return cls(acceleration=machine.limits("acceleration", axes), jerk=machine.limits("jerk", axes))
 
     def at(self, change: FloatArray) -> KinematicFamily:

@@ -1,4 +1,5 @@
-"""A corner shape of one's own: the retreat X = d f(w) as a polynomial, the advance Y = d f(1 - w) its mirror image.
+"""A corner shape of one's own: the retreat X = d f(w) as a polynomial, the advance Y = d f(1 - w) its mirror
+image.
 
     class Wide(PolynomialCorner):
         name = "wide"
@@ -6,9 +7,9 @@
         def retreat(self, w):
             return (1 - w) ** 3 * (1 + w)
 
-f falls from 1 to 0 on [0, 1] and ends with f = f' = f'' = 0, so that the corner leaves every leg with its tangent and its curvature
-(corners/blend.py, where the error bound asks for f(w) f(1 - w) <= f(1/2)^2 as well). All of that is checked. The kernels know f by the
-coefficients of z^3 ... z^12 with z = 1 - w.
+f falls from 1 to 0 on [0, 1] and ends with f = f' = f'' = 0, so that the corner leaves every leg with its
+tangent and its curvature (corners/blend.py, where the error bound asks for f(w) f(1 - w) <= f(1/2)^2 as
+well). All of that is checked. The kernels know f by the coefficients of z^3 ... z^12 with z = 1 - w.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class PolynomialCorner(ScaledShape, ABC):
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """(K,) coefficients of z^3, z^4 ... [-], K = `OWN_TERMS`. Raises InputError unless f is as the module's text says."""
+        """(K,) coefficients of z^3, z^4 ... [-], K = `OWN_TERMS`. Raises InputError unless f is as the
+        module's text says."""
         z = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PLACES))
         f = np.broadcast_to(np.asarray(self.retreat(1.0 - z), dtype=np.float64), z.shape)
         if not np.isfinite(f).all() or abs(f[-1] - 1.0) > POLYNOMIAL or abs(f[0]) > POLYNOMIAL:

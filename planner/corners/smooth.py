@@ -1,7 +1,8 @@
 """The smooth path: the legs of a toolpath with each corner rounded within its tolerance.
 
-Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner reaches back (d), the
-parameters of its shape, what it uses of the tolerance, and the normal acceleration that is left for the motion.
+Corners are data, not objects. For each of the R+1 joints between legs the record holds how far the corner
+reaches back (d), the parameters of its shape, what it uses of the tolerance, and the normal acceleration that
+is left for the motion.
 """
 
 from __future__ import annotations
@@ -25,18 +26,22 @@ from planner.machine import Machine
 
 
 class CornerFamily(Protocol):
-    """Corners at n given joints: how tangent length d and middle value m depend on each other (corners/blend.py)."""
+    """Corners at n given joints: how tangent length d and middle value m depend on each other
+    (corners/blend.py)."""
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,)
+        [mm/s]."""
         ...
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,)
+        [mm/s]."""
         ...
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n, 4) parameters of the shape for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,) [mm/s]."""
+        """(n, 4) parameters of the shape for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed`
+        (n,) [mm/s]."""
         ...
 
 
@@ -55,10 +60,11 @@ class CornerShape(Protocol):
         ...
 
 
-# A leg whose free part is shorter than this fraction of it is closed by scaling up one of its corners [-]; grid intervals of the
-# size of rounding would otherwise be left between corners that share a leg.
+# A leg whose free part is shorter than this fraction of it is closed by scaling up one of its corners [-];
+# grid intervals of the size of rounding would otherwise be left between corners that share a leg.
 CLOSE = 1e-4
-# Curvatures are the same below this fraction of the larger one [-]: printed arc centres are good to 1e-4 of a small radius.
+# Curvatures are the same below this fraction of the larger one [-]: printed arc centres are good to 1e-4 of a
+# small radius.
 SAME_CURVATURE = 1e-6
 
 
@@ -69,7 +75,8 @@ class SmoothPath:
     joint       : (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
     d           : (R+1,) tangent length of the corner [mm]; 0 where there is none
     params      : (R+1, 4) parameters of the corner's shape
-    scale     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more (`CLOSE`)
+    scale     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more
+                (`CLOSE`)
     tol         : (R+1,) contour error budget eps [mm]
     tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
     normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
@@ -126,7 +133,8 @@ class SmoothPath:
 
     @cached_property
     def passed(self) -> FloatArray:
-        """(M+1,) where the path passes the start of each segment, counted like `Legs.place` [mm]; it differs from that on splines."""
+        """(M+1,) where the path passes the start of each segment, counted like `Legs.place` [mm]; it differs
+        from that on splines."""
         return passed_places(self.toolpath, self.legs, self.spline)
 
     @property
@@ -160,10 +168,11 @@ def round_corners(
 ) -> SmoothPath:
     """Blend every corner of the toolpath within its budget.
 
-    blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it; such a corner has
-                     theta = 0, bends off both legs within the tolerance, and has no jump left. Where the path is to be followed
-                     exactly (G61) it is a full stop
-    free           : fraction of every leg that its corners leave free [-], for motions that change their speed between corners only
+    blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it;
+                     such a corner has theta = 0, bends off both legs within the tolerance, and has no jump
+                     left. Where the path is to be followed exactly (G61) it is a full stop
+    free           : fraction of every leg that its corners leave free [-], for motions that change their
+                     speed between corners only
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """
@@ -221,7 +230,8 @@ def round_corners(
 
 
 def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
-    """(R+1, 2) factors on tangent lengths that close legs with next to nothing between their corners; the larger corner takes it."""
+    """(R+1, 2) factors on tangent lengths that close legs with next to nothing between their corners; the
+    larger corner takes it."""
     scale = np.ones((len(d), 2))
     free = length - d[:-1] - d[1:]
     leg = np.flatnonzero(free < CLOSE * length)
@@ -259,8 +269,8 @@ def _exact(toolpath: Toolpath, at: Array) -> Array:
 
 
 def exact_stops(toolpath: Toolpath) -> Array:
-    """(n,) joints that are full stops for motions with limited jerk alone: tangent ones where the curvature jumps and the path is to
-    be followed exactly."""
+    """(n,) joints that are full stops for motions with limited jerk alone: tangent ones where the curvature
+    jumps and the path is to be followed exactly."""
     at = np.arange(len(toolpath) + 1)
     found: Array = np.flatnonzero(
         (toolpath.joint == Joint.SMOOTH) & _exact(toolpath, at) & curvature_jumps(toolpath, at)

@@ -1,7 +1,8 @@
 """The motion behind the filters of a machine that is given the setpoints of a motion, for planning.
 
-Between setpoints dt apart the machine moves as its file says. In periods, with one setpoint at 0 that is 1 and all others 0, it makes
-of that the shape (k and m are places and powers of truncated powers x^m/m! for x > 0, c their factors)
+Between setpoints dt apart the machine moves as its file says. In periods, with one setpoint at 0 that is 1
+and all others 0, it makes of that the shape (k and m are places and powers of truncated powers x^m/m! for x >
+0, c their factors)
 
     linear      (k, m, c) = (-1, 1, 1), (0, 1, -2), (1, 1, 1)                                     a hat
     hold        (0, 0, 1), (1, 0, -1)                                                             a box behind the setpoint
@@ -12,11 +13,12 @@ and moving averages T_i in series make of x^m/m! the sum over all subsets s of t
 
     sum_s (-1)^|s| (x - T_s)_+^(m + n) / (m + n)!  /  (T_1 ... T_n),
 
-so that the motion behind them is a convolution of the setpoints with a shape that ends: exact at any time, without an error that grows
-along the motion. A shape is even or odd about its middle, and its later half is taken from its earlier one, where little cancels.
+so that the motion behind them is a convolution of the setpoints with a shape that ends: exact at any time,
+without an error that grows along the motion. A shape is even or odd about its middle, and its later half is
+taken from its earlier one, where little cancels.
 
-The last period of a motion may be shorter than dt; here it is not. A motion comes to rest there with limited jerk or acceleration: what
-changes is when it is at its end, not where it passes.
+The last period of a motion may be shorter than dt; here it is not. A motion comes to rest there with limited
+jerk or acceleration: what changes is when it is at its end, not where it passes.
 """
 
 from __future__ import annotations
@@ -31,11 +33,13 @@ from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.timing import MotionInTime, sample_motion
 
-# Places of the filtered motion in a period, and in the shortest filter: more where every setpoint makes a kink.
+# Places of the filtered motion in a period, and in the shortest filter: more where every setpoint makes a
+# kink.
 PER_PERIOD, PER_FILTER, PER_FILTER_HELD = 4, 8, 32
 AT_ONCE = SIZES.convolved_at_once
 Terms = tuple[tuple[int, int, float], ...]
-# Of each kind the shape of the position, and that of the velocity times dt if it counts; where the middle of both is [periods].
+# Of each kind the shape of the position, and that of the velocity times dt if it counts; where the middle of
+# both is [periods].
 SHAPES: dict[str, tuple[float, Terms, Terms]] = {
     "linear": (0.0, ((-1, 1, 1.0), (0, 1, -2.0), (1, 1, 1.0)), ()),
     "hold": (0.5, ((0, 0, 1.0), (1, 0, -1.0)), ()),
@@ -84,7 +88,8 @@ class FilteredSetpoints:
         return total if even else np.where(age > self.middle, -total, total)
 
     def of(self, motion: MotionInTime) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Times (T,) [s] and positions (T, A) [mm] behind the filters, part by part, from the start until the filters are empty."""
+        """Times (T,) [s] and positions (T, A) [mm] behind the filters, part by part, from the start until the
+        filters are empty."""
         first, kept = 0, None
         for places in self._setpoints(motion):
             seen = places if kept is None else np.concatenate([kept, places])
@@ -95,7 +100,8 @@ class FilteredSetpoints:
             first, kept = first + count, seen[count:]
 
     def _setpoints(self, motion: MotionInTime) -> Iterator[FloatArray]:
-        """(n, 2, A) positions and velocities of the setpoints, some at a time, at rest before and behind while that counts."""
+        """(n, 2, A) positions and velocities of the setpoints, some at a time, at rest before and behind
+        while that counts."""
         still: FloatArray | None = None
         for chunk in sample_motion(motion, self.dt).chunks():
             both = np.stack([chunk.position, chunk.velocity], axis=1)

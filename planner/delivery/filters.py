@@ -1,18 +1,20 @@
 """Motions that stay within the tolerance behind the machine's own filters (`[fir]`).
 
-A filter of kernel h on [0, Td] makes of the motion p the mean of its last Td. About p(t - Td/2) that is off by at most
-max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a time Td after a motion comes to rest
-the filtered one has come to rest at the same point. So there are two ways to leave less of an error, and both always end:
+A filter of kernel h on [0, Td] makes of the motion p the mean of its last Td. About p(t - Td/2) that is off
+by at most max|p''| (sum T^2/12) / 2, in whatever direction the acceleration acts (docs/papers.md D), and a
+time Td after a motion comes to rest the filtered one has come to rest at the same point. So there are two
+ways to leave less of an error, and both always end:
 
   slower   a run between full stops slowed down by f has 1/f^2 of the error; what a path that rounds its corners within less than the
            tolerance leaves, it leaves again
   rest     two runs that are Td apart do not know of each other: the stop between them is reached. The shortest rest with which the
            filtered motion comes near enough is found for the motion as it is (rests.py)
 
-Measured is what the machine makes of the setpoints of the motion (filtered_setpoints.py): at long periods chords filtered are not the
-motion filtered. The errors are put down to runs and stops, and those are slowed down and lengthened until nothing is left. With every
-change the setpoints fall elsewhere, and so the last motion measured is the one that is delivered, with the standstills that its samples
-need (periods.py). Behind the last run nothing is added: the filtered motion ends Td after the setpoints do.
+Measured is what the machine makes of the setpoints of the motion (filtered_setpoints.py): at long periods
+chords filtered are not the motion filtered. The errors are put down to runs and stops, and those are slowed
+down and lengthened until nothing is left. With every change the setpoints fall elsewhere, and so the last
+motion measured is the one that is delivered, with the standstills that its samples need (periods.py). Behind
+the last run nothing is added: the filtered motion ends Td after the setpoints do.
 """
 
 from __future__ import annotations
@@ -34,11 +36,12 @@ from planner.motion.filters import Filters
 from planner.motion.timing import MotionInTime, in_chunks
 
 STOPS_AT_ONCE = SIZES.stops_at_once
-# At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors, at most by the second [-]:
-# together by up to 240, which leaves 1/57,600 of any filter's error.
+# At most so many rounds of slowing down; the n-th at least by the n-th power of the first of these factors,
+# at most by the second [-]: together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
 FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
-# What the path leaves of the tolerance for filters counts as this fraction at least [-], or the first step would be too large.
+# What the path leaves of the tolerance for filters counts as this fraction at least [-], or the first step
+# would be too large.
 ROOM_LEAST = 0.1
 
 
@@ -86,7 +89,8 @@ class Behind:
         self._setpoints = FilteredSetpoints(machine.interpolation, lengths, machine.dt)
 
     def errors(self, motion: MotionInTime) -> Errors:
-        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion itself."""
+        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion
+        itself."""
         return (
             self.path_errors(motion) if self._setpoints is None else self.path.of(self._setpoints.of(motion))
         )
@@ -115,13 +119,15 @@ class Behind:
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
-        """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a longer rest is enough."""
+        """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a
+        longer rest is enough."""
         runs = runs_of(motion)
         early, late = runs_within(runs.begin, runs.end, time, self.filters.delay)
         return early < late
 
     def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
-        """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0 behind the last run."""
+        """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0
+        behind the last run."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
             stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))
@@ -150,7 +156,8 @@ class Behind:
 
 
 def runs_within(begin: FloatArray, end: FloatArray, time: FloatArray, delay: float) -> tuple[Array, Array]:
-    """First and last (n,) of the runs from `begin` to `end` (G,) that have a share in what is delivered at `time` (n,) [s]."""
+    """First and last (n,) of the runs from `begin` to `end` (G,) that have a share in what is delivered at
+    `time` (n,) [s]."""
     early = np.searchsorted(end, time - delay, side="right")
     late = np.maximum(np.searchsorted(begin, time) - 1, 0)
     return np.minimum(early, late), late
@@ -165,7 +172,8 @@ def stops_between(early: Array, late: Array, count: int) -> Array:
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:
-    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the tolerance, no run slowed down.
+    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the
+    tolerance, no run slowed down.
 
     It has the standstills that its samples need.
     """
@@ -176,8 +184,8 @@ def rested(behind: Behind, motion: TimedT) -> TimedT:
 
 
 def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
-    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance, and with the standstills
-    that its samples need.
+    """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance,
+    and with the standstills that its samples need.
 
     Returns the motion itself for a machine without filters.
     """

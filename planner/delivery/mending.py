@@ -1,12 +1,13 @@
-"""Faults that a verdict finds are mended where they are: the motion is run slower there, and as it was everywhere else.
+"""Faults that a verdict finds are mended where they are: the motion is run slower there, and as it was
+everywhere else.
 
-A limit that is exceeded, a feed, a corner passed too fast, and an error of the chords between samples or of filters all get less where
-the motion is slower (verifier/excess.py says by what power), so that each says by how much it has to be. What does not get less, a path
-that leaves the tolerance by itself, is not mended here; nor is a motion that takes more than `MOST_SLOWER` times as long anywhere,
-which is a mistake to be seen.
+A limit that is exceeded, a feed, a corner passed too fast, and an error of the chords between samples or of
+filters all get less where the motion is slower (verifier/excess.py says by what power), so that each says by
+how much it has to be. What does not get less, a path that leaves the tolerance by itself, is not mended here;
+nor is a motion that takes more than `MOST_SLOWER` times as long anywhere, which is a mistake to be seen.
 
-All of the motion is judged again in each round: behind the first place that is slower everything comes later by no whole number of
-periods, so that other setpoints are delivered there.
+All of the motion is judged again in each round: behind the first place that is slower everything comes later
+by no whole number of periods, so that other setpoints are delivered there.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ from planner.motion.slowed import FAR, Place, Slowed, reach, without_stands
 from planner.motion.timing import MotionInTime
 from planner.verifier import OF_CHORDS, Kind, Verdict
 
-# So often a motion is mended and judged again, at other times each time: an excess may be larger between the places looked at before.
+# So often a motion is mended and judged again, at other times each time: an excess may be larger between the
+# places looked at before.
 ROUNDS = 6
 MOST_SLOWER = 2.0  # [-]
 # What is slowed down is slowed down by this much more [-], and so many times that each time again.
 MORE, MORE_AGAIN = 1e-5, 4.0
-# Of an error of which it is not known how much the path itself has the share is taken to be none at first; it is slowed down by so
-# many times that in each further round [-].
+# Of an error of which it is not known how much the path itself has the share is taken to be none at first; it
+# is slowed down by so many times that in each further round [-].
 AGAIN = 2.0
 # A place reaches so many periods to both sides: that far what is judged is made of [-].
 PERIODS = 3.0
@@ -72,8 +74,8 @@ def mended(
 def _slowed(
     motion: MotionInTime, edges: FloatArray, by: FloatArray, w: float, pad: float, jerk_limited: bool
 ) -> Slowed:
-    """The motion slower by `by` (n,) [-] between `edges` (n, 2) [s] and `pad` [s] around them, as far as the rests there; one place for
-    those that cost less together."""
+    """The motion slower by `by` (n,) [-] between `edges` (n, 2) [s] and `pad` [s] around them, as far as the
+    rests there; one place for those that cost less together."""
     slowed = motion if isinstance(motion, Slowed) else Slowed(motion=motion, places=())
     edges = slowed.was_at_any(np.clip(edges, 0.0, motion.end))
     order = np.argsort(edges[:, 0], kind="stable")
@@ -95,7 +97,8 @@ def _slowed(
 def _rests(
     motion: MotionInTime, begin: float, end: float, within: float, jerk_limited: bool
 ) -> tuple[float, float]:
-    """The last rest of the motion up to `begin` and the first from `end` on, as far as `within` [s]; its own ends beyond that."""
+    """The last rest of the motion up to `begin` and the first from `end` on, as far as `within` [s]; its own
+    ends beyond that."""
     edges = np.append(motion.t, motion.end)
     k, n = np.searchsorted(edges, [begin + AT_REST, end + AT_REST])  # jumps are of what is behind the rest
     low, high = np.searchsorted(edges, begin - within), np.searchsorted(edges, end + within, side="right")
@@ -125,7 +128,8 @@ def _rests(
 
 
 def _reach(verdict: Verdict) -> float:
-    """How far before and behind a place a motion has to be slower [s], by what its verdict saw (motion/slowed.py)."""
+    """How far before and behind a place a motion has to be slower [s], by what its verdict saw
+    (motion/slowed.py)."""
     groups = {name.partition(".")[2] for name, check in verdict.limits.items() if check.limited} - {""}
     found = [0.0]
     for name in groups:

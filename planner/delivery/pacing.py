@@ -1,7 +1,8 @@
 """Runs of a motion between full stops: slowed down as a whole, or followed by a longer standstill.
 
-Slowing down by f divides speeds by f, accelerations by f^2 and jerks by f^3: every limit still holds, and the path is the same. A
-longer standstill changes nothing else. A motion can stand only where its velocity is zero, and its acceleration too if jerk is limited.
+Slowing down by f divides speeds by f, accelerations by f^2 and jerks by f^3: every limit still holds, and the
+path is the same. A longer standstill changes nothing else. A motion can stand only where its velocity is
+zero, and its acceleration too if jerk is limited.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.motion.axis_motion import AxisMotion
 from planner.motion.timing import Motion
 
-# Velocities and accelerations below this fraction of the motion's largest are none [-]: rounding of long sums of pulses is 1e-12 of
-# them.
+# Velocities and accelerations below this fraction of the motion's largest are none [-]: rounding of long sums
+# of pulses is 1e-12 of them.
 STANDING = 1e-7
 
 Timed = Motion | AxisMotion
@@ -29,7 +30,8 @@ class MotionRuns:
     """G runs of a motion between its standstills.
 
     first : (G,) index of the first piece of the run
-    last  : (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the number of pieces
+    last  : (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the
+            number of pieces
     begin : (G,) [s]
     end   : (G,) [s]
     """
@@ -48,7 +50,8 @@ class MotionRuns:
         return dataclasses.replace(self, begin=edges[self.first], end=edges[self.last])
 
     def behind(self, by: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(G,) begins and ends of the runs [s], each but the last followed by a longer standstill, `by` (G,) [s]."""
+        """(G,) begins and ends of the runs [s], each but the last followed by a longer standstill, `by` (G,)
+        [s]."""
         later = np.append(0.0, np.cumsum(by[:-1]))
         return self.begin + later, self.end + later
 
@@ -72,7 +75,8 @@ def runs_of(motion: Timed) -> MotionRuns:
 
 
 def _rests(motion: AxisMotion) -> Array:
-    """(L,) True where nothing moves at the start of a piece, nor begins to with a jump of the acceleration."""
+    """(L,) True where nothing moves at the start of a piece, nor begins to with a jump of the
+    acceleration."""
     lasting = np.diff(np.append(motion.t, motion.end))[:, None]
     after = motion.acceleration + lasting * motion.jerk
     before = np.vstack([np.zeros_like(after[:1]), after[:-1]])

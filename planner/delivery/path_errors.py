@@ -1,12 +1,14 @@
-"""How far a motion is from the programmed path: what planning measures, by the planner's own matching (geometry/point_matching.py).
+"""How far a motion is from the programmed path: what planning measures, by the planner's own matching
+(geometry/point_matching.py).
 
-The path is cut into pieces, arcs and curves at most every `PIECE_ANGLE`. Each place of the motion is put down to the link of the path
-that the best assignment in order gives it, where a block left out and a feed cost nothing; its distance is that from the line, arc or
-curve itself. A vertex between two pieces is compared with the chords of the motion that run along the halves of the pieces beside it.
+The path is cut into pieces, arcs and curves at most every `PIECE_ANGLE`. Each place of the motion is put down
+to the link of the path that the best assignment in order gives it, where a block left out and a feed cost
+nothing; its distance is that from the line, arc or curve itself. A vertex between two pieces is compared with
+the chords of the motion that run along the halves of the pieces beside it.
 
-A motion that leaves the tolerance is matched again with budgets `WIDER` times as large: what exceeds them is then measured, where a
-motion matched closely would run past a vertex and be far off from all that follows. Where another way along the path fits these, what
-was found first counts.
+A motion that leaves the tolerance is matched again with budgets `WIDER` times as large: what exceeds them is
+then measured, where a motion matched closely would run past a vertex and be far off from all that follows.
+Where another way along the path fits these, what was found first counts.
 """
 
 from __future__ import annotations
@@ -26,14 +28,16 @@ SPARE = 2e-3  # of the tolerance, what measuring at other times may find more [-
 PIECE_ANGLE = np.pi / 8.0  # by which a piece of an arc turns at most [rad]
 WIDER = 16.0
 NOT_PASSED = 2.0 * WIDER  # budgets that a vertex counts as missed by which the motion does not come to [-]
-# Steps of Newton's method without the curvature's share, from the foot on a chord that is CHORD_FRACTION of a budget off.
+# Steps of Newton's method without the curvature's share, from the foot on a chord that is CHORD_FRACTION of a
+# budget off.
 NEAREST_STEPS = 3
 
 Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions (T, A) [mm], in parts
 
 
 class Errors(NamedTuple):
-    """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of places.
+    """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of
+    places.
 
     time      : (n,) of places where the contour leaves the tolerance [s]
     ratio     : (n,) there
@@ -131,7 +135,8 @@ class PathErrors:
 
 @njit(cache=True, error_model="numpy")
 def _from_link(chain, pieces, legs, i, q, out):
-    """Distance of the point q (A,) from the segment of link i near that link [mm], and where on the link its foot is, 0 to 1.
+    """Distance of the point q (A,) from the segment of link i near that link [mm], and where on the link its
+    foot is, 0 to 1.
 
     out : (4, A) for the leg's point and derivatives
     """
@@ -155,7 +160,8 @@ def _from_link(chain, pieces, legs, i, q, out):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _measure(chain, pieces, legs, t, point, link, near, near_time, worst, ratio):
-    """The errors of n places at times `t` (n,) [s] and points (n, A) [mm], which are at the links `link` (n,).
+    """The errors of n places at times `t` (n,) [s] and points (n, A) [mm], which are at the links `link`
+    (n,).
 
     near, near_time : (N+1,) of the vertices [mm] [s], written where the motion passes them
     worst           : (N,) of the pieces [-], raised

@@ -1,23 +1,29 @@
 """The share of the interpolation period in the contour error, and what is done about it.
 
-The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the motion by
+The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the
+motion by
 
     |e(t)| <= dt^2/8 max |q''|,     whatever the direction of the acceleration q'',
 
-so if the motion q misses a vertex by m, the chords miss it by m + dt^2/8 max |q''| at most. Error allocation (eq. 18-20) uses the
-normal acceleration in place of |q''|. Along a smooth path that is right, because the acceleration along the path shifts the chord
-along itself. It is not right at full stops, and at corners that are passed within a few periods: there the motion brakes along one leg
-and speeds up along another.
+so if the motion q misses a vertex by m, the chords miss it by m + dt^2/8 max |q''| at most. Error allocation
+(eq. 18-20) uses the normal acceleration in place of |q''|. Along a smooth path that is right, because the
+acceleration along the path shifts the chord along itself. It is not right at full stops, and at corners that
+are passed within a few periods: there the motion brakes along one leg and speeds up along another.
 
-1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2 at most. If that is more
-   than the tolerance, `standing` lets the motion stand until the next sample, or for a shorter time that is enough: less than dt per
-   stop.
-2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is more than the tolerance,
-   `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs beside it only where this was
-   not enough. Where the chords alone would use nearly all of the tolerance, the corner becomes a full stop.
-3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error after all. If the verdict
-   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the tolerance of the block;
-   where that is not enough, it takes what the worst phase of the samples shows at the vertices inside.
+1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2
+               at most. If that is more
+   than the tolerance, `standing` lets the motion stand until the next sample, or for a shorter time that is
+   enough: less than dt per stop.
+2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is
+            more than the tolerance,
+   `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs
+   beside it only where this was not enough. Where the chords alone would use nearly all of the tolerance, the
+   corner becomes a full stop.
+3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error
+           after all. If the verdict
+   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the
+   tolerance of the block; where that is not enough, it takes what the worst phase of the samples shows at the
+   vertices inside.
 """
 
 from __future__ import annotations
@@ -35,23 +41,26 @@ from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import STANDING, passing_times_of
 
-# Phases of the samples that are looked at, and places of a period at which motions near their rests are tabulated. Halving the step
-# changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20 ms).
+# Phases of the samples that are looked at, and places of a period at which motions near their rests are
+# tabulated. Halving the step changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20
+# ms).
 PHASES, PLACES = 16, 64
 # A motion is looked at so many times in a period to find its vertices.
 PER_PERIOD = 8
-# Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of the motion of its own, and
-# who looks at the pieces, at whatever times, sees it.
+# Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of
+# the motion of its own, and who looks at the pieces, at whatever times, sees it.
 LEAST_REST = 1e-6
-# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases and places above.
+# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases
+# and places above.
 USED = 0.99
-# Above that by so little they need no other round [-]: what is left of an excess gets less with every one, and another place, where it
-# is the verdict that finds too much, waits until there is none.
+# Above that by so little they need no other round [-]: what is left of an excess gets less with every one,
+# and another place, where it is the verdict that finds too much, waits until there is none.
 ABOVE = 2e-3
-# Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the rounding has half where dt is
-# long, eq. (20).
+# Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the
+# rounding has half where dt is long, eq. (20).
 REDUCED_BY = 1.5
-# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some methods use it in steps.
+# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some
+# methods use it in steps.
 REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
@@ -67,8 +76,8 @@ WaitingT = TypeVar("WaitingT", bound=_Waiting)
 
 
 class Standing(NamedTuple):
-    """Standstills that samples need: a motion that comes to rest at the times `at` (n,), ascending, stands longer there `by` (n,)
-    [s]."""
+    """Standstills that samples need: a motion that comes to rest at the times `at` (n,), ascending, stands
+    longer there `by` (n,) [s]."""
 
     at: FloatArray
     by: FloatArray
@@ -77,10 +86,11 @@ class Standing(NamedTuple):
 def standing(
     motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool = False
 ) -> Standing:
-    """How much longer a motion has to stand where the chords between samples would cut off a full stop by more than the tolerance.
+    """How much longer a motion has to stand where the chords between samples would cut off a full stop by
+    more than the tolerance.
 
-    jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full acceleration at once: then it need
-                   not be looked at where that is enough
+    jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full
+                   acceleration at once: then it need not be looked at where that is enough
     """
     half = machine.dt / 2
     acceleration, jerk = (
@@ -105,7 +115,8 @@ def with_standstills(motion: WaitingT, stands: Standing) -> WaitingT:
 
 
 def _rests(motion: MotionInTime, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, Array]:
-    """When the motion comes to rest between its ends, when it leaves (n,) [s], where (n, A) [mm], and the block there."""
+    """When the motion comes to rest between its ends, when it leaves (n,) [s], where (n, A) [mm], and the
+    block there."""
     seen = joined(list(in_chunks(motion, dt, np.append(motion.t, motion.end))))
     still = seen.feed <= STANDING * seen.feed.max()
     begin = np.flatnonzero(still & ~np.append(False, still[:-1]))
@@ -179,8 +190,8 @@ def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatAr
 
     dt : sample period [s]
 
-    Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the chords miss it in the worst
-    phase of the samples; 0 where the motion rests.
+    Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the
+    chords miss it in the worst phase of the samples; 0 where the motion rests.
     """
     fastest = 0.0
 
@@ -228,16 +239,18 @@ def with_less_tolerance(
     times: float = 1.0,
     beside: bool = False,
 ) -> Toolpath | None:
-    """The path to be planned so that the chords stay within the tolerance of the programmed path; None if they do already.
+    """The path to be planned so that the chords stay within the tolerance of the programmed path; None if
+    they do already.
 
     planned   : the path that the motion was planned on
     near, far : by how much motion and chords miss the vertices (M+1,) [mm], from `missed`
-    times     : how often what is too much is subtracted [-]: more than once where that changed nothing before, because the motion did
-                not use what was taken from it
+    times     : how often what is too much is subtracted [-]: more than once where that changed nothing
+                before, because the motion did not use what was taken from it
     beside    : take from the arcs beside the corners too, whose chords may be what misses them
     """
     allowed = USED * programmed.tolerance
-    # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the verdict says
+    # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the
+    # verdict says
     over = (far > allowed + ABOVE * programmed.tolerance) & (programmed.joint != Joint.SMOOTH)
     if not over.any():
         return None
@@ -255,11 +268,12 @@ def with_less_tolerance(
 def with_less_inside(
     planned: Toolpath, programmed: Toolpath, line: int, ratio: float, far: FloatArray, times: float
 ) -> Toolpath | None:
-    """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are `ratio` times the
-    tolerance off while they keep it at the corners for all that `missed` sees; None where next to nothing would be left.
+    """The path to be planned with less of the tolerance on the blocks of an NC line, on which the chords are
+    `ratio` times the tolerance off while they keep it at the corners for all that `missed` sees; None where
+    next to nothing would be left.
 
-    far   : by how much chords miss the vertices (M+1,) in the worst phase of the samples [mm]: where the path turns slowly, that counts
-            if more than once is subtracted
+    far   : by how much chords miss the vertices (M+1,) in the worst phase of the samples [mm]: where the path
+            turns slowly, that counts if more than once is subtracted
     times : how often what is too much is subtracted [-], as in `with_less_tolerance`
     """
     segment = np.flatnonzero(planned.line == line)

@@ -1,13 +1,15 @@
 """The shortest rest at a stop with which a mean of the last Td of a motion still comes near enough to it.
 
-The mean is what moving averages or delayed copies make of the motion p. Two runs that are Td apart do not know of each other: the stop
-between them is reached. Paper 000's dwell is Td - Tk, the shortest rest with which the mean comes near enough: here it is found for the
-motion as it is. With what runs into the stop, a(t) = p(arrival - t), and what runs out of it, b(t) = p(departure + t), both seen from
-the stop, the mean is, at the time t after the arrival,
+The mean is what moving averages or delayed copies make of the motion p. Two runs that are Td apart do not
+know of each other: the stop between them is reached. Paper 000's dwell is Td - Tk, the shortest rest with
+which the mean comes near enough: here it is found for the motion as it is. With what runs into the stop, a(t)
+= p(arrival - t), and what runs out of it, b(t) = p(departure + t), both seen from the stop, the mean is, at
+the time t after the arrival,
 
     A(t) + B(t - rest),     A(t) = E a(delay - t),     B(t) = E b(t - delay),
 
-E the mean over the delays, a and b being 0 at negative times. A and B are taken at equal steps of Td, with straight lines between them.
+E the mean over the delays, a and b being 0 at negative times. A and B are taken at equal steps of Td, with
+straight lines between them.
 """
 
 from __future__ import annotations
@@ -21,8 +23,8 @@ from planner.base.kernels import njit
 from planner.motion.filters import Filters
 from planner.motion.shaping import Shaper
 
-# Steps of Td: with one vibration mode each is less than 3 degrees of it, and straight lines between them miss 4e-4 of the amplitude.
-# Rests are found to 2^-HALVINGS of Td: 40 us of 40 ms.
+# Steps of Td: with one vibration mode each is less than 3 degrees of it, and straight lines between them miss
+# 4e-4 of the amplitude. Rests are found to 2^-HALVINGS of Td: 40 us of 40 ms.
 STEPS, HALVINGS = 128, 10
 
 
@@ -31,7 +33,8 @@ class Mean:
     """Of the last `length` of a motion [s].
 
     inside : (C,) times from a stop, before and after it, at which the motion is asked [s]
-    into   : (STEPS + 1, C) weights of where it is before the stop, at each step after the arrival; they make A
+    into   : (STEPS + 1, C) weights of where it is before the stop, at each step after the arrival; they make
+             A
     out    : (STEPS + 1, C) of where it is after the stop, at each step after the departure; they make B
     """
 
@@ -52,7 +55,8 @@ class Mean:
 
 
 def mean_of_filters(filters: Filters) -> Mean:
-    """The mean of moving averages: the motion in each of `STEPS` parts of it counts as it is in the middle."""
+    """The mean of moving averages: the motion in each of `STEPS` parts of it counts as it is in the
+    middle."""
     weight = np.diff(filters.step(filters.delay * np.arange(STEPS + 1) / STEPS))
     middle = np.arange(STEPS) + 0.5
     edge = np.arange(STEPS + 1)[:, None]
@@ -71,7 +75,8 @@ def mean_of_copies(shaper: Shaper) -> Mean:
     since = step - shaper.delay[:, None] * STEPS / shaper.length
 
     def between(place: FloatArray) -> FloatArray:
-        """(STEPS + 1, C) weights of the two steps beside the places (n, STEPS + 1); none for places at the stop or before it."""
+        """(STEPS + 1, C) weights of the two steps beside the places (n, STEPS + 1); none for places at the
+        stop or before it."""
         share = np.clip(1.0 - np.abs(place[:, :, None] - step), 0.0, 1.0)
         return np.einsum("i,ijc->jc", shaper.weight, np.where(place[:, :, None] > 0.0, share, 0.0))
 

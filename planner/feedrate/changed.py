@@ -1,7 +1,8 @@
-"""Solve only the pieces of a problem that changed: pieces are independent, so one that was solved before need not be solved again.
+"""Solve only the pieces of a problem that changed: pieces are independent, so one that was solved before need
+not be solved again.
 
-A piece is the same if its rows are, to the last digit. Its place s along the job moves when a piece before it changes its length; the
-lengths of its intervals are then the same but for the rounding of s.
+A piece is the same if its rows are, to the last digit. Its place s along the job moves when a piece before it
+changes its length; the lengths of its intervals are then the same but for the rounding of s.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ class _Solved(NamedTuple):
 def solve_changed(
     problem: FeedrateProblem, known: Sequence[Known], solve: Callable[[FeedrateProblem], FeedrateSolution]
 ) -> FeedrateSolution:
-    """The solution of a problem: the pieces that one of the known problems has too, in the same place among its pieces, are taken
-    over, the others are solved. A failure of these is the solution's status."""
+    """The solution of a problem: the pieces that one of the known problems has too, in the same place among
+    its pieces, are taken over, the others are solved. A failure of these is the solution's status."""
     pieces = len(problem.piece) - 1
     known = [one for one in known if one.solution.solved and _comparable(problem, one.problem)]
     found: dict[int, _Solved] = {}

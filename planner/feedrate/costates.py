@@ -1,7 +1,7 @@
 """Multipliers of the second-order optimum: what its limits cost, from the profile alone.
 
-With x = feed^2 and u on the intervals (feedrate/constraints/problem.py), rows g = (r' u + r'' x)/c, pi of the kinematics and mu of
-x/X, the Lagrangian
+With x = feed^2 and u on the intervals (feedrate/constraints/problem.py), rows g = (r' u + r'' x)/c, pi of the
+kinematics and mu of x/X, the Lagrangian
 
     L = sum_i 2 h_i/(sqrt(x_i) + sqrt(x_{i+1})) + pi_i (x_i + 2 h_i u_i - x_{i+1}) + lam_i g_i + mu_i x_i/X_i
 
@@ -9,14 +9,15 @@ is stationary in u_i and x_i:
 
     2 h_i pi_i + lam_i r'/c = 0,       T'_i + pi_i - pi_{i-1} + (lam r''/c of the intervals on both sides) + mu_i/X_i = 0.
 
-Time-optimal profiles speed up or brake with one row at its limit, or keep to X. Where no row holds, pi is 0. Where the motion speeds
-up, pi <= 0, and what more speed is worth adds up towards the start of the ramp; where it brakes, pi >= 0 adds up towards its end.
-A ramp that ends at X or at a peak begins with what its last interval's own time says. Between the two, at a valley, the second
-equation gives mu, or, where X does not hold, the multiplier of the row that holds x alone (r' = 0, r'' x = c): on the grid that is the
-row with the largest |r'' x|/c there. All in one sweep to the left and one to the right.
+Time-optimal profiles speed up or brake with one row at its limit, or keep to X. Where no row holds, pi is 0.
+Where the motion speeds up, pi <= 0, and what more speed is worth adds up towards the start of the ramp; where
+it brakes, pi >= 0 adds up towards its end. A ramp that ends at X or at a peak begins with what its last
+interval's own time says. Between the two, at a valley, the second equation gives mu, or, where X does not
+hold, the multiplier of the row that holds x alone (r' = 0, r'' x = c): on the grid that is the row with the
+largest |r'' x|/c there. All in one sweep to the left and one to the right.
 
-On the grid several rows may hold an interval and the profile is greedy (feedrate/reachability.py), so these multipliers are good to
-some percent, not to rounding (tested against the change of the time with the limits).
+On the grid several rows may hold an interval and the profile is greedy (feedrate/reachability.py), so these
+multipliers are good to some percent, not to rounding (tested against the change of the time with the limits).
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ from planner.feedrate.solution import FeedrateSolution, Multipliers
 
 # A row, or x, within this share of its limit holds it [-]: the passes of the solver end there to rounding.
 HOLDS = 1e-6
-# Rows with 2 h |r''| above this share of |r'| turn from holding u to holding x alone [-]: their pi would oscillate.
+# Rows with 2 h |r''| above this share of |r'| turn from holding u to holding x alone [-]: their pi would
+# oscillate.
 TURNING = 0.5
-# Of what bounds x, a row by itself has to be at this share of its limit [-]; between grid points it may be nearer.
+# Of what bounds x, a row by itself has to be at this share of its limit [-]; between grid points it may be
+# nearer.
 ALONE = 0.5
 
 
@@ -83,7 +86,8 @@ def second_order_multipliers(problem: FeedrateProblem, solution: FeedrateSolutio
 
 @njit(cache=True, error_model="numpy")
 def _holding(i, limits, profile):
-    """The row that holds u on interval i: axis, 0 left or 1 right, r', r'' and c with its sign; axis -1 if none does."""
+    """The row that holds u on interval i: axis, 0 left or 1 right, r', r'' and c with its sign; axis -1 if
+    none does."""
     d1, d2_left, d2_right, limit = limits
     x, u, scale = profile.x, profile.u, 1.0 - profile.margin[i]
     best, axis, side, a, b, size = 1.0 - HOLDS, -1, 0, 0.0, 0.0, 0.0

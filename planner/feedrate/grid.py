@@ -1,22 +1,25 @@
 """Grid points on straight elements: where a second-order profile switches, and what a jerk-limited one needs.
 
-Between rest and feed, or between two corners, a straight element is one interval; its end speeds are already exact, because the
-limits do not change along it. Inside it the optimum accelerates at the largest rate b, holds the speed limit, decelerates at b:
+Between rest and feed, or between two corners, a straight element is one interval; its end speeds are already
+exact, because the limits do not change along it. Inside it the optimum accelerates at the largest rate b,
+holds the speed limit, decelerates at b:
 
     peak below the limit:  one switch,  sigma = (x1 - x0 + 2 b L) / (4 b)
     limit x_c reached:     two,         sigma = (x_c - x0)/(2 b)  and  L - (x_c - x1)/(2 b)
 
 With these points added the profile on the grid *is* the optimum, however long the element.
 
-A jerk-limited profile rounds the switches off: on an element of length L, with limits a and j along it, in about
+A jerk-limited profile rounds the switches off: on an element of length L, with limits a and j along it, in
+about
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
-which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in all). The second-order
-profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and where things happen;
-between its events the points are spread in time, every
-`STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
-So an element from rest to rest takes some 30 points if it is short, and each tenfold length only about 20 more.
+which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in
+all). The second-order profile with the acceleration j tau, as slow at corners as the jerk asks for at
+constant speed, tells when and where things happen; between its events the points are spread in time, every
+`STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between:
+step/distance stays STEP/NEAR. So an element from rest to rest takes some 30 points if it is short, and each
+tenfold length only about 20 more.
 """
 
 from __future__ import annotations
@@ -35,12 +38,14 @@ from planner.feedrate.sampling.samples import insert_points, straight
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 
-# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches the limit. A point nearer to
-# an end of its interval is that end: rounding put points of tiny intervals there, 4e-16 mm apart beside a jump of a limit of one's own.
+# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches
+# the limit. A point nearer to an end of its interval is that end: rounding put points of tiny intervals
+# there, 4e-16 mm apart beside a jump of a limit of one's own.
 SWITCH_MIN = 1e-9
 
-# Spacing of points for jerk-limited profiles (module text) [tau]; lines, pentagon and zigzag at jerks 2e4 to 2e6 are within 0.15 %
-# of a grid four times finer, with STEP 0.5 and NEAR 2 within 0.8 %, at the same number of points on long lines.
+# Spacing of points for jerk-limited profiles (module text) [tau]; lines, pentagon and zigzag at jerks 2e4 to
+# 2e6 are within 0.15 % of a grid four times finer, with STEP 0.5 and NEAR 2 within 0.8 %, at the same number
+# of points on long lines.
 STEP = 0.25
 NEAR = 1.0
 
@@ -106,14 +111,16 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 
 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
-    """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the feed."""
+    """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the
+    feed."""
     d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
     allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 
 def _spread(whole: FloatArray, finer: float) -> tuple[Array, FloatArray]:
-    """Points inside intervals of durations `whole` (n,) [tau], graded towards both ends: their interval and time, ascending."""
+    """Points inside intervals of durations `whole` (n,) [tau], graded towards both ends: their interval and
+    time, ascending."""
     step = STEP / finer
     half = whole / 2.0
     most = np.where(half <= NEAR, half, NEAR * (1.0 + np.log(np.maximum(half, NEAR) / NEAR))) / step

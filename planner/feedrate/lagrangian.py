@@ -1,15 +1,18 @@
-"""The Lagrangian of the jerk-limited problem, interval by interval: what a small change of the problem does to the shortest time.
+"""The Lagrangian of the jerk-limited problem, interval by interval: what a small change of the problem does
+to the shortest time.
 
     L = sum_i  h_i + sum_r lam_ir g_ir + pi_i (x_i + (2 u_i + p_i) ds_i + p_i (2 u_i + p_i) h_i^2/12 - x_{i+1})
 
-with the rows g and the kinematics of jerk/rows.py, and the multipliers lam, pi that the solver ends with. At the optimum L is
-stationary in the profile. So if the limits, or the path under the grid, change with some theta, the shortest time changes by
+with the rows g and the kinematics of jerk/rows.py, and the multipliers lam, pi that the solver ends with. At
+the optimum L is stationary in the profile. So if the limits, or the path under the grid, change with some
+theta, the shortest time changes by
 
     dT/dtheta = dL/dtheta       with profile and multipliers as they are (envelope theorem):
 
-no second solution is needed, and the difference of L between two problems on corresponding grids is the difference of their times to
-first order, place by place. Where two limits hold at once that only together determine the motion (equal axes at 45 degrees), the
-time has a kink; the multipliers then are one of its slopes between left and right.
+no second solution is needed, and the difference of L between two problems on corresponding grids is the
+difference of their times to first order, place by place. Where two limits hold at once that only together
+determine the motion (equal axes at 45 degrees), the time has a kink; the multipliers then are one of its
+slopes between left and right.
 """
 
 from __future__ import annotations
@@ -29,8 +32,9 @@ from planner.feedrate.solution import FeedrateSolution
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lagrangian:
-    """value (P,) of every interval [s], and what it changes by per relative change of the limits: acceleration, jerk (A,) of the axes,
-    all of these together by interval, rows (P,), and feed_sq_max (P,) [s]."""
+    """value (P,) of every interval [s], and what it changes by per relative change of the limits:
+    acceleration, jerk (A,) of the axes, all of these together by interval, rows (P,), and feed_sq_max (P,)
+    [s]."""
 
     value: FloatArray
     acceleration: FloatArray
@@ -53,8 +57,9 @@ class _Profile(NamedTuple):
 def lagrangian(
     problem: FeedrateProblem, solution: FeedrateSolution, columns: ProblemColumns | None = None
 ) -> Lagrangian:
-    """The Lagrangian of a problem at the profile and the multipliers of a solution, of this problem or of a neighbouring one on a
-    corresponding grid; `columns` are those of the problem, if they are known. Raises ValueError if the solution has no multipliers."""
+    """The Lagrangian of a problem at the profile and the multipliers of a solution, of this problem or of a
+    neighbouring one on a corresponding grid; `columns` are those of the problem, if they are known. Raises
+    ValueError if the solution has no multipliers."""
     found = solution.multipliers
     if found is None:
         raise ValueError(f"lagrangian: {solution.solver} gives no multipliers")

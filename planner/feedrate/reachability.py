@@ -1,22 +1,25 @@
 """Own kernel for the second-order problem: reachability analysis in linear time.
 
-TOPP-RA (Pham & Pham 2018, IEEE T-RO 34:645, doi 10.1109/TRO.2018.2819195) with the interpolation scheme. A backward pass finds
-K_i, the largest feed^2 at point i from which the end can still be reached; a forward pass then goes as fast as K allows.
+TOPP-RA (Pham & Pham 2018, IEEE T-RO 34:645, doi 10.1109/TRO.2018.2819195) with the interpolation scheme. A
+backward pass finds K_i, the largest feed^2 at point i from which the end can still be reached; a forward pass
+then goes as fast as K allows.
 
-On interval i every axis gives two rows |a u + b x| <= c, at the left end (a, b) = (r', r'') and at the right end, where
-x_{i+1} = x + 2 h u, (a, b) = (r' + 2 h r'', r''); and reaching K_{i+1} is 0 <= x + 2 h u <= K_{i+1}. For given x the rows leave an
-interval [low(x), high(x)] for u; low is convex and high concave in x, so the gap phi = high - low is concave and positive at
-x = 0 (standing still is always allowed). The largest feasible x is found by Newton's method on phi from the right: on a concave
-piecewise linear function it never overshoots the root and ends after finitely many steps, two or three in practice.
+On interval i every axis gives two rows |a u + b x| <= c, at the left end (a, b) = (r', r'') and at the right
+end, where x_{i+1} = x + 2 h u, (a, b) = (r' + 2 h r'', r''); and reaching K_{i+1} is 0 <= x + 2 h u <=
+K_{i+1}. For given x the rows leave an interval [low(x), high(x)] for u; low is convex and high concave in x,
+so the gap phi = high - low is concave and positive at x = 0 (standing still is always allowed). The largest
+feasible x is found by Newton's method on phi from the right: on a concave piecewise linear function it never
+overshoots the root and ends after finitely many steps, two or three in practice.
 
-For a piece that ends at rest the set of controllable x is [0, K_i], because (x, u) = (0, 0) satisfies every row. For x_end > 0 it
-has a lower end too; the forward pass does not need it, it keeps to K from above and x_end is compared at the end. Cost: a few dozen
-flops per point and axis; no tolerance, no scaling needed.
+For a piece that ends at rest the set of controllable x is [0, K_i], because (x, u) = (0, 0) satisfies every
+row. For x_end > 0 it has a lower end too; the forward pass does not need it, it keeps to K from above and
+x_end is compared at the end. Cost: a few dozen flops per point and axis; no tolerance, no scaling needed.
 
-The passes are greedy, and on the grid that is the optimum only where no interval leads from a larger x_i to a smaller x_{i+1} at
-best: -d(high)/dx <= 1/(2 h), so 2 h |r''_k| <= |r'_k| for the row that acts. It fails in the intervals where r'_k changes sign, so
-the time is the optimum's plus a term that vanishes with h: on the adaptive grid running the path backwards changes the cycle time by
-1e-5 at most, on coarse random curves by percents, and there loosening a limit can cost time. toppra does exactly the same.
+The passes are greedy, and on the grid that is the optimum only where no interval leads from a larger x_i to a
+smaller x_{i+1} at best: -d(high)/dx <= 1/(2 h), so 2 h |r''_k| <= |r'_k| for the row that acts. It fails in
+the intervals where r'_k changes sign, so the time is the optimum's plus a term that vanishes with h: on the
+adaptive grid running the path backwards changes the cycle time by 1e-5 at most, on coarse random curves by
+percents, and there loosening a limit can cost time. toppra does exactly the same.
 """
 
 from __future__ import annotations
@@ -32,11 +35,13 @@ from planner.base.kernels import njit
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached with A <= 6.
+# Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached
+# with A <= 6.
 NEWTON_STEPS = 60
-# Rows whose |a u| stays below this share of their limit, for every u that the other limits allow, bound x alone [-]. Not a threshold
-# on a itself: beside an axis with a limit a million times larger even |r'_k| = 1e-9 counts. Not rounding either: with a u of 1e-13 of
-# the limit the greedy pass would trade the last digit of x_i for all of u_i (module text; a zigzag with r'_k = 1e-16 lost 7e-6).
+# Rows whose |a u| stays below this share of their limit, for every u that the other limits allow, bound x
+# alone [-]. Not a threshold on a itself: beside an axis with a limit a million times larger even |r'_k| =
+# 1e-9 counts. Not rounding either: with a u of 1e-13 of the limit the greedy pass would trade the last digit
+# of x_i for all of u_i (module text; a zigzag with r'_k = 1e-16 lost 7e-6).
 NEGLIGIBLE = 1e-10
 # Relative slack under which an end condition counts as reachable: rounding of the passes [-].
 ROUNDING = 1e-9
@@ -90,8 +95,9 @@ def _bounds_of(problem: FeedrateProblem) -> Bounds:
 def controllable_sets(problem: FeedrateProblem) -> FloatArray:
     """(P,) K, the largest feed^2 at each point from which the end of its piece can still be reached [mm2/s2].
 
-    Where a piece ends at rest exactly the feeds with feed^2 in [0, K] are controllable. Where it ends in motion there is a lower end as
-    well, which is not looked for. NaN on pieces whose end asks for more than its own bound allows.
+    Where a piece ends at rest exactly the feeds with feed^2 in [0, K] are controllable. Where it ends in
+    motion there is a lower end as well, which is not looked for. NaN on pieces whose end asks for more than
+    its own bound allows.
     """
     return np.asarray(_controllable(axis_rows(problem), _bounds_of(problem)))
 
@@ -101,7 +107,8 @@ class Reachability:
     """The numba reachability solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is reachable."""
+        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is
+        reachable."""
         began = time.perf_counter()
         x, u, bad_piece = _solve(axis_rows(problem), _bounds_of(problem))
         took = time.perf_counter() - began
@@ -151,7 +158,8 @@ def _parallel(rows, on, x_max):
 
 @njit(cache=True, error_model="numpy")
 def _interval(rows, on, x, parallel):
-    """u-interval of an interval at feed^2 = x: low, its slope, high, its slope; without the rows |a| <= parallel * limit."""
+    """u-interval of an interval at feed^2 = x: low, its slope, high, its slope; without the rows |a| <=
+    parallel * limit."""
     d1, d2_left, d2_right, limit = rows
     i, h, scale, target = on
     low, low_slope = -x / (2.0 * h), -0.5 / h  # x + 2 h u >= 0
@@ -182,8 +190,8 @@ def largest_feed_sq(rows, on, x_max):
         if a <= parallel * c:  # rows without u bound x alone
             x = min(x, c / b)
         elif a > 2.0 * h * b:
-            # x <= target + 2 h |u| and a |u| <= c + b x. Newton would get there, but from an x_max far above, where the last digits of
-            # x_max drown the result.
+            # x <= target + 2 h |u| and a |u| <= c + b x. Newton would get there, but from an x_max far above,
+            # where the last digits of x_max drown the result.
             x = min(x, (target * a + 2.0 * h * c) / (a - 2.0 * h * b))
         c = limit[i + 1, k] * scale
         b = d2_left[i + 1, k]
@@ -242,8 +250,8 @@ def _solve(rows, bounds):
         for i in range(first, last):
             on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
             low, _, high, _ = _interval(rows, on, x[i], _parallel(rows, on, x_max[i]))
-            # Equal up to rounding where the set is a point. The difference of x over 2 h would be the same u but for rounding, which
-            # exceeds the limits where h is a billionth of its neighbours.
+            # Equal up to rounding where the set is a point. The difference of x over 2 h would be the same u
+            # but for rounding, which exceeds the limits where h is a billionth of its neighbours.
             u[i] = max(high, low)
             x[i + 1] = min(max(x[i] + 2.0 * on.h * u[i], 0.0), on.target)
         if x[last] < x_end[g] * (1.0 - ROUNDING):

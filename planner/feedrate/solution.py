@@ -1,4 +1,5 @@
-"""The result of a feedrate solver: a status with a sentence, and a profile or NaN, never a plausible number."""
+"""The result of a feedrate solver: a status with a sentence, and a profile or NaN, never a plausible
+number."""
 
 from __future__ import annotations
 
@@ -29,11 +30,13 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prices:
-    """The prices of the limits: derivatives of the cycle time with respect to them, never positive, on the solved grid.
+    """The prices of the limits: derivatives of the cycle time with respect to them, never positive, on the
+    solved grid.
 
     velocity, acceleration, jerk : (A,) dT/d(axis limit) [s per mm/s, mm/s2, mm/s3]
-    feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity or the
-                                   acceleration at a jump of the curvature costs is in here too, as part of the sums above
+    feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity
+                                   or the acceleration at a jump of the curvature costs is in here too, as
+                                   part of the sums above
     """
 
     velocity: FloatArray
@@ -76,8 +79,9 @@ class Prices:
 class Multipliers:
     """Multipliers of the interval to the right of each point [s]; 0 where there is no interval.
 
-    rows     : (P, A, 4) of the axis limits, as shares of the limits: acceleration at the interval's start, jerk there, jerk at its
-               end, acceleration there; negative where the lower side is the one that holds
+    rows     : (P, A, 4) of the axis limits, as shares of the limits: acceleration at the interval's start,
+               jerk there, jerk at its end, acceleration there; negative where the lower side is the one that
+               holds
     feed     : (P, 2) of x / feed_sq_max at the point and in the middle of the interval
     dynamics : (P,) of the kinematics of x [s per mm2/s2]
     """
@@ -101,9 +105,12 @@ class FeedrateSolution:
     sentence     : what happened and, on failure, what to do
     solver       : repr of the solver
     feed_sq      : (P,) x [mm2/s2]; all NaN unless solved, like the next three
-    acc_s        : (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a piece that ends at rest
-    jerk_s       : (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere at second order
-    duration     : (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile rests at both ends
+    acc_s        : (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a
+                   piece that ends at rest
+    jerk_s       : (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere
+                   at second order
+    duration     : (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile
+                   rests at both ends
     solve_time   : [s]
     iterations   : of an iterative solver; the largest of all pieces
     effort       : what else the solver counted, by name
@@ -209,7 +216,8 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
+    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i +
+    feed_{i+1}).
 
     0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
 
@@ -226,9 +234,9 @@ def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
 def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> tuple[FloatArray, Array]:
     """How close the profile comes to its limits, and to which.
 
-    Returns the largest ratio (P,) of any constraint at each point or at either end of the interval to its right (1 = active),
-    and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited solutions only. Solver-independent: computed
-    from the profile alone.
+    Returns the largest ratio (P,) of any constraint at each point or at either end of the interval to its
+    right (1 = active), and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited
+    solutions only. Solver-independent: computed from the profile alone.
     """
     worst, which = np.zeros(len(problem)), problem.feed_sq_bound.copy()
     for limit, ratio in ratios_by_limit(problem, solution):
@@ -238,14 +246,15 @@ def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> t
 
 
 def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Iterator[tuple[int, FloatArray]]:
-    """For every constraint its index in `active_names` and the profile's ratios (P,) to it, as in `constraint_ratios`; of the bounds
-    on feed^2 only the smallest at each point has a ratio there."""
+    """For every constraint its index in `active_names` and the profile's ratios (P,) to it, as in
+    `constraint_ratios`; of the bounds on feed^2 only the smallest at each point has a ratio there."""
     x, u = solution.require().feed_sq, solution.acc_s
     for bound in range(len(problem.bound_names)):
         yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_limit, 0.0)
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
-    # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both ends.
+    # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both
+    # ends.
     gained = jerk * np.where(jerk == 0.0, 0.0, solution.duration[inner])
     ends = (
         (inner, u[inner], problem.d2_right, problem.d3_right),

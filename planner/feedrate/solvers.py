@@ -5,9 +5,11 @@
     third order    own                 our interior-point kernel (feedrate/jerk/)
                    ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
                    sequential-convex   the problem in the path domain as a sequence of convex ones, by casadi and ipopt
-                                       (feedrate/reference/sequential_convex.py), brought onto constant jerks (exact_motion.py)
+                                       (feedrate/reference/sequential_convex.py), brought onto constant jerks
+                                       (exact_motion.py)
 
-A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one method:
+A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one
+method:
 
     solve(problem, progress) -> FeedrateSolution      a profile with multipliers, or a status and a sentence that says what to do
 
@@ -38,7 +40,8 @@ class ThirdOrderSolver(Protocol):
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Solve all pieces of the problem, which start and end at rest; failures are a status, not an exception.
+        """Solve all pieces of the problem, which start and end at rest; failures are a status, not an
+        exception.
 
         progress : called with the share of the points that is done [-]
         """
@@ -55,7 +58,8 @@ THIRD_ORDER: dict[str, ThirdOrderSolver] = {
 
 
 def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
-    """The solver without jerk limits of that name, or the solver given. Raises InputError for a name that is none of them."""
+    """The solver without jerk limits of that name, or the solver given. Raises InputError for a name that is
+    none of them."""
     if not isinstance(solver, str):
         return solver
     if solver not in SECOND_ORDER:
@@ -64,7 +68,8 @@ def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
 
 
 def third_order_solver(solver: str | ThirdOrderSolver) -> ThirdOrderSolver:
-    """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is none of them."""
+    """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is
+    none of them."""
     if not isinstance(solver, str):
         return solver
     if solver not in THIRD_ORDER:

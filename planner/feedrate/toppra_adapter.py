@@ -1,9 +1,11 @@
-"""The package toppra as a second solver of the same problem: written by others, to compare the own kernel with.
+"""The package toppra as a second solver of the same problem: written by others, to compare the own kernel
+with.
 
-toppra (H. Pham, MIT) solves one linear programme in (u, x) per grid point and pass with Seidel's method. It is given exactly the
-rows of `FeedrateProblem`: for every interval the left and the right end (|a u + b x| <= 1 after division by the limit; see
-reachability.py), declared as "collocation" so that toppra interpolates nothing of its own. Its interpolation scheme would take one
-r'' per point, and a jump of the curvature would be lost.
+toppra (H. Pham, MIT) solves one linear programme in (u, x) per grid point and pass with Seidel's method. It
+is given exactly the rows of `FeedrateProblem`: for every interval the left and the right end (|a u + b x| <=
+1 after division by the limit; see reachability.py), declared as "collocation" so that toppra interpolates
+nothing of its own. Its interpolation scheme would take one r'' per point, and a jump of the curvature would
+be lost.
 
 What toppra 0.6 adds silently, in its own unscaled units, and what it would cost:
 
@@ -18,11 +20,12 @@ What toppra 0.6 adds silently, in its own unscaled units, and what it would cost
     a walk of 1e10 (normalised by     along a row ends at "infinity", and a row without u (r'_k = 0) walks so far: the pass fails as
     the row) from the origin           "uncontrollable"; four of our six jobs did until u was given bounds of its own
 
-All of these are absolute, so the adapter chooses the units: the largest u is about 1 and the largest x about `FEED_SQ_SCALE`, so
-large that a slack of 1e-8 is 1e-14 of it and yet far from 1e8. The units are powers of two: scaling rounds nothing. What remains
-of the lowering is 1e-14 of the largest x per point, and u is toppra's own, which keeps the rows.
-Measured on the 200 random problems of the tests against the own kernel: cycle times differ by 3e-8, feeds by 2e-7 at worst; with
-the largest x at 1 instead by 3e-5 and 2e-4. On real paths 1e-12.
+All of these are absolute, so the adapter chooses the units: the largest u is about 1 and the largest x about
+`FEED_SQ_SCALE`, so large that a slack of 1e-8 is 1e-14 of it and yet far from 1e8. The units are powers of
+two: scaling rounds nothing. What remains of the lowering is 1e-14 of the largest x per point, and u is
+toppra's own, which keeps the rows. Measured on the 200 random problems of the tests against the own kernel:
+cycle times differ by 3e-8, feeds by 2e-7 at worst; with the largest x at 1 instead by 3e-5 and 2e-4. On real
+paths 1e-12.
 """
 
 from __future__ import annotations
@@ -44,10 +47,11 @@ from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it must be small against 1e8 (module text).
+# Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it must be small against 1e8 (module
+# text).
 FEED_SQ_SCALE = 1e6
-# The limit in every row [-]: the geometric mean of 1 and `FEED_SQ_SCALE`, so that neither the coefficients of u nor those of x are
-# near the 1e-10 at which rows count as parallel.
+# The limit in every row [-]: the geometric mean of 1 and `FEED_SQ_SCALE`, so that neither the coefficients of
+# u nor those of x are near the 1e-10 at which rows count as parallel.
 ROW_SCALE = 1e3
 # Relative slack under which an end speed counts as allowed: rounding, as in the own kernel [-].
 ROUNDING = 1e-9
@@ -58,7 +62,8 @@ class ToppraSolver:
     """toppra's TOPPRA with Seidel's solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is reachable."""
+        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is
+        reachable."""
         toppra = _import_toppra()
         began = time.perf_counter()
         x, u = np.empty(len(problem)), np.zeros(len(problem))
@@ -140,8 +145,8 @@ def _solve_piece(
 
 
 def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
-    """Units of length [mm] and time [s], powers of two, in which the largest u of piece g is about 1 and the largest x about
-    `FEED_SQ_SCALE`."""
+    """Units of length [mm] and time [s], powers of two, in which the largest u of piece g is about 1 and the
+    largest x about `FEED_SQ_SCALE`."""
     first, last = problem.piece[g], problem.piece[g + 1] - 1
     along = np.abs(problem.d1[first : last + 1]) / problem.acceleration_limit[first : last + 1]
     u_max = float((1.0 / along.max(axis=1)).max())
@@ -155,7 +160,8 @@ def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
 def _rows(
     problem: FeedrateProblem, g: int, length: float, time_unit: float
 ) -> tuple[FloatArray, tuple[FloatArray | None, ...]]:
-    """Grid (n+1,) of piece g and toppra's parameters (a, b, c, F, g, bounds of u, bounds of x) in the given units."""
+    """Grid (n+1,) of piece g and toppra's parameters (a, b, c, F, g, bounds of u, bounds of x) in the given
+    units."""
     points = slice(problem.piece[g], problem.piece[g + 1])
     d1, d2_left, d2_right = problem.d1[points], problem.d2_left[points], problem.d2_right[points]
     size, axes = d1.shape
@@ -172,7 +178,8 @@ def _rows(
     x_max = problem.feed_sq_limit[points] / feed_sq
     a, b = a * (ROW_SCALE * acc), b * (ROW_SCALE * feed_sq)
     both = np.vstack([np.eye(2 * axes), -np.eye(2 * axes)])
-    # Bounds of u that the rows imply, twice over: without them Seidel's walk along a row with a = 0 ends at its own "infinity".
+    # Bounds of u that the rows imply, twice over: without them Seidel's walk along a row with a = 0 ends at
+    # its own "infinity".
     with np.errstate(divide="ignore"):
         u_max = 2.0 * ((ROW_SCALE + np.abs(b) * x_max[:, None]) / np.abs(a)).min(axis=1)
     u_bounds = np.stack([-u_max, u_max], axis=1)

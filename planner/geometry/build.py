@@ -1,16 +1,19 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
-A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for exact stop (G61.1),
-or exact path (G61) with a turn (with limited jerk also where the curvature jumps: corners/smooth.py), between rapid and feed moves
-(unless the machine blends rapids), and at a reversal. Where the tangents agree it is smooth; everywhere else it is a corner. An axis
-that never moves and that the machine lacks is left out.
+A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for
+exact stop (G61.1), or exact path (G61) with a turn (with limited jerk also where the curvature jumps:
+corners/smooth.py), between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where
+the tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine
+lacks is left out.
 
-Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are lengths then,
-and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps / R. F is the speed of
-the linear part of a block (program.py); in that norm it becomes F ds/dl, constant along lines, arcs and helices.
+Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are
+lengths then, and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps
+/ R. F is the speed of the linear part of a block (program.py); in that norm it becomes F ds/dl, constant
+along lines, arcs and helices.
 
-A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is infinite. Between them
-the motion goes on as at smooth joints, in exact stop mode too; where the spline itself has a kink there is a corner.
+A block along a spline becomes several segments (geometry/curves.py), few of them lines where its curvature is
+infinite. Between them the motion goes on as at smooth joints, in exact stop mode too; where the spline itself
+has a kink there is a corner.
 """
 
 from __future__ import annotations
@@ -31,11 +34,13 @@ from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.bezier import homogeneous
 from planner.nc.program import MOVES, Kind, PathControl, Program
 
-# Turning angle below which two tangents are the same [rad]. Coordinates of 1e3 mm carry 1e-13 mm of rounding, so a segment of
-# 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100 mm/s, far below any drive's resolution.
+# Turning angle below which two tangents are the same [rad]. Coordinates of 1e3 mm carry 1e-13 mm of rounding,
+# so a segment of 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100
+# mm/s, far below any drive's resolution.
 COLLINEAR_ANGLE = 1e-8
-# Turning angle above which a corner is a reversal and becomes a full stop [rad]: 175 degrees. The corner speed of paper 002
-# eq. (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000 mm/s2 and eps = 0.05 mm only 0.5 mm/s.
+# Turning angle above which a corner is a reversal and becomes a full stop [rad]: 175 degrees. The corner
+# speed of paper 002 eq. (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000
+# mm/s2 and eps = 0.05 mm only 0.5 mm/s.
 REVERSAL_ANGLE = np.deg2rad(175.0)
 # Coordinates beyond this have lost the micrometre in float64 products and are certainly a mistake [mm].
 COORDINATE_MAX = 1e9
@@ -46,10 +51,11 @@ ZERO_LENGTH = 1e-9
 def toolpath_from_program(program: Program, machine: Machine, tolerance: float | None = None) -> Toolpath:
     """Lay out the blocks of a program as segments and joints.
 
-    tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine; None to use those
+    tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine;
+                None to use those
 
-    Raises InputError for a program that moves nowhere, a tolerance below `TOLERANCE_MIN` or beyond `COORDINATE_MAX`, an axis that moves
-    and that the machine lacks, and coordinates beyond `COORDINATE_MAX`.
+    Raises InputError for a program that moves nowhere, a tolerance below `TOLERANCE_MIN` or beyond
+    `COORDINATE_MAX`, an axis that moves and that the machine lacks, and coordinates beyond `COORDINATE_MAX`.
     """
     if isinstance(tolerance, str):
         raise InputError(f"tolerance '{tolerance}'; give a number, in mm")
@@ -180,12 +186,14 @@ def _laid(program: Program, splines: CurveSegments, block: Array) -> _Laid:
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """(n,) angles between the unit vectors u1 and u2 (n, A), row by row [rad]. Exact to rounding near 0 and pi, unlike acos."""
+    """(n,) angles between the unit vectors u1 and u2 (n, A), row by row [rad]. Exact to rounding near 0 and
+    pi, unlike acos."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
 
 
 def _axes_in_use(program: Program, machine: Machine) -> Array:
-    """Indices of the axes that the machine has or that move: a plotter needs no z for a program that stays in the plane."""
+    """Indices of the axes that the machine has or that move: a plotter needs no z for a program that stays in
+    the plane."""
     moved = (program.end != program.start).any(axis=0)
     for normal in np.unique(program.arc_normal):
         moved[: len(LINEAR_AXES)][np.arange(len(moved[: len(LINEAR_AXES)])) != normal] = True
@@ -214,7 +222,8 @@ def _check_coordinates(program: Program) -> None:
 
 
 def _curves_of(program: Program, tolerance: FloatArray) -> CurveSegments:
-    """The segments of all splines, for tolerances (B,) of the blocks [mm]; pieces that go nowhere are left out."""
+    """The segments of all splines, for tolerances (B,) of the blocks [mm]; pieces that go nowhere are left
+    out."""
     splines = program.splines
     goes = np.flatnonzero(np.ptp(splines.points, axis=1).max(axis=1, initial=0.0) > ZERO_LENGTH)
     near = CHORD_SHARE * tolerance[splines.block[goes]]
@@ -280,8 +289,8 @@ def _curvature_bound(arcs: Arcs) -> FloatArray:
 
 
 def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> FloatArray:
-    """Feed (M,) [mm/s] of the segments along the path in all axes, at most `feed_max` of the machine; of threads as it is, to be
-    refused."""
+    """Feed (M,) [mm/s] of the segments along the path in all axes, at most `feed_max` of the machine; of
+    threads as it is, to be refused."""
     feed = program.feed[block].copy()
     if len(program.axes) > len(LINEAR_AXES):
         feed *= path_per_length(program.axes, machine.radius, laid)
@@ -292,12 +301,14 @@ def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> Flo
 
 
 def feed_groups(axes: tuple[str, ...]) -> Array:
-    """(A,) what F goes by, of which the first that moves counts: 0 for x, y, z, 1 for u, v, w, 2 for rotary axes."""
+    """(A,) what F goes by, of which the first that moves counts: 0 for x, y, z, 1 for u, v, w, 2 for rotary
+    axes."""
     return np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
 
 
 def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath) -> FloatArray:
-    """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes by (program.py)."""
+    """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes
+    by (program.py)."""
     change, groups = (laid.end - laid.start) ** 2, feed_groups(axes)
     further = change[:, groups > 0].sum(axis=1)
     linear, parallel, rotary = (np.sqrt(change[:, groups == n].sum(axis=1)) for n in range(3))
@@ -309,7 +320,8 @@ def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath
 
 
 def _exact(program: Program, block: Array, joint: Array) -> Array:
-    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a block under G64."""
+    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a
+    block under G64."""
     rounded = joint == Joint.CORNER
     exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
     return exact

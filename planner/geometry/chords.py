@@ -1,9 +1,10 @@
 """Arcs and curves as chords, for motions that consist of straight legs and corners.
 
-A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices rise linearly along arc and
-chord alike. A chord over h of a curve's parameter stays within b h^2/8 of it, for the largest second derivative b. The sagitta is a
-given fraction of the tolerance of the segment, and is subtracted from the tolerance at the joints of the chords: corners rounded inside
-the polygon then keep the tolerance of the segment.
+A chord of an arc of radius R that turns by phi stays within the sagitta R (1 - cos(phi/2)) of it; helices
+rise linearly along arc and chord alike. A chord over h of a curve's parameter stays within b h^2/8 of it, for
+the largest second derivative b. The sagitta is a given fraction of the tolerance of the segment, and is
+subtracted from the tolerance at the joints of the chords: corners rounded inside the polygon then keep the
+tolerance of the segment.
 """
 
 from __future__ import annotations
@@ -122,7 +123,8 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
 
 
 def parted_by_feed(toolpath: Toolpath) -> Toolpath:
-    """The same path with a corner of angle 0 where the programmed feed changes on a straight line, so that a leg ends there."""
+    """The same path with a corner of angle 0 where the programmed feed changes on a straight line, so that a
+    leg ends there."""
     same_way = toolpath.joint[1:-1] == Joint.SMOOTH
     change = np.flatnonzero(same_way & (toolpath.feed[1:] != toolpath.feed[:-1])) + 1
     return toolpath.with_joints(change, Joint.CORNER)

@@ -1,15 +1,19 @@
-"""Curves: rational Bezier cubics as segments of a toolpath, over a parameter x that is all but their arc length.
+"""Curves: rational Bezier cubics as segments of a toolpath, over a parameter x that is all but their arc
+length.
 
-A segment of length L is C(u), u in [0, 1], of nc/bezier.py with 1 for its outer weights. Corners and grids want a parameter in mm with
+A segment of length L is C(u), u in [0, 1], of nc/bezier.py with 1 for its outer weights. Corners and grids
+want a parameter in mm with
 |dp/dx| = 1 where legs meet, so u is a quintic of t = x/L with, at both ends, that speed and no acceleration along the path,
 
     u(0) = 0,   u'(0) = L/|C'|,   u''(0) = -L^2 (C'.C'')/|C'|^4,     and the mirror image at t = 1,
 
-which changes nothing of the curve. Between the ends |dp/dx| differs from 1; the curves of a program are halved until it does by less
-than `UNEVEN`, and until they turn by less than `TURN_MAX`. At their ends p'' is the curvature vector.
+which changes nothing of the curve. Between the ends |dp/dx| differs from 1; the curves of a program are
+halved until it does by less than `UNEVEN`, and until they turn by less than `TURN_MAX`. At their ends p'' is
+the curvature vector.
 
-Where C' = 0, at a control point that stands on an end of the curve or at a cusp, the curvature is infinite and no halving helps; where
-it is all but 0 many would be needed. What is left there, within `CHORD_SHARE` of the tolerance of its chord, is run as that chord.
+Where C' = 0, at a control point that stands on an end of the curve or at a cusp, the curvature is infinite
+and no halving helps; where it is all but 0 many would be needed. What is left there, within `CHORD_SHARE` of
+the tolerance of its chord, is run as that chord.
 """
 
 from __future__ import annotations
@@ -25,8 +29,8 @@ from planner.nc.bezier import evenly_weighted, halves, lengths
 
 UNEVEN = 0.02  # of |dp/dx| [-]: corners of curves are as long as they are meant to be to so much
 TURN_MAX = np.pi / 2  # of a segment [rad]: its ends and its chord do not oppose each other
-# Places at which a segment is looked at, and what is added to the largest curvature and third derivative found there [-]: between two
-# of 33 places a cubic's change is below a percent.
+# Places at which a segment is looked at, and what is added to the largest curvature and third derivative
+# found there [-]: between two of 33 places a cubic's change is below a percent.
 PLACES, BETWEEN = 33, 1.02
 # The least curvature that counts [1/mm], so that none is divided by: it bends by 1e-4 mm on a metre.
 BEND_MIN = 1e-9
@@ -61,7 +65,8 @@ class Curves:
         return len(self.twist)
 
     def at(self, row: Array, length: FloatArray, x: FloatArray) -> FloatArray:
-        """(n, 4, A) points [mm] and three x-derivatives of the curves in rows `row` (n,), `length` (n,) [mm] long, at x (n,) [mm]."""
+        """(n, 4, A) points [mm] and three x-derivatives of the curves in rows `row` (n,), `length` (n,) [mm]
+        long, at x (n,) [mm]."""
         out = np.empty((len(row), 4, self.points.shape[2]))
         _at(self.points, self.weight, row, length, np.asarray(x, float), out)
         return out
@@ -130,8 +135,8 @@ def curve_segments(pieces: FloatArray, near: FloatArray) -> CurveSegments:
 
 
 def _straightened(pieces: FloatArray) -> FloatArray:
-    """The same pieces (K, 4, A+1), straight ones with their control points a third apart: many have them at the ends, where the
-    parameter then stands still although the curve goes on."""
+    """The same pieces (K, 4, A+1), straight ones with their control points a third apart: many have them at
+    the ends, where the parameter then stands still although the curve goes on."""
     points = pieces[..., :-1] / pieces[..., -1:]
     chord = points[:, 3] - points[:, 0]
     size = np.linalg.norm(chord, axis=1)

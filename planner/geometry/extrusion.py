@@ -1,16 +1,18 @@
 """The extruder of a 3-D printer along a path: an axis that follows the way, and moves alone at full stops.
 
-Between two joints at which it has its programmed place it feeds in proportion to the length of the motion's path, so that what is
-programmed is fed, whatever corners the path cuts. Where its ratio changes its speed steps, as on printers: no motion that goes on could
-avoid it. Joints nearer to each other than `APART` tolerances share one ratio; without that the rounding of E on short blocks
-would be steps of its own.
+Between two joints at which it has its programmed place it feeds in proportion to the length of the motion's
+path, so that what is programmed is fed, whatever corners the path cuts. Where its ratio changes its speed
+steps, as on printers: no motion that goes on could avoid it. Joints nearer to each other than `APART`
+tolerances share one ratio; without that the rounding of E on short blocks would be steps of its own.
 
-Its limits v, a, j are limits v/r, a/r, j/r along the path where the ratio is r. A motion within eps of a joint's vertex saves at most
-2 eps of the length on either side of it (motion/vertex_times.py), so between two joints
+Its limits v, a, j are limits v/r, a/r, j/r along the path where the ratio is r. A motion within eps of a
+joint's vertex saves at most 2 eps of the length on either side of it (motion/vertex_times.py), so between two
+joints
 
     r <= amount / (length - 2 eps for each of the two that is no full stop)
 
-Alone it moves from rest to rest in the shortest time (base/point_to_point.py), at the F of its line at most, while the other axes wait.
+Alone it moves from rest to rest in the shortest time (base/point_to_point.py), at the F of its line at most,
+while the other axes wait.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ LEAST_LEFT = 0.5  # of the length between two joints, whatever is saved of it [-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Extrusion:
-    """The extruder along a path of M segments: K joints where it has its programmed place, P moves while the other axes wait.
+    """The extruder along a path of M segments: K joints where it has its programmed place, P moves while the
+    other axes wait.
 
     limits : (3,) of its velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3]
     joint  : (K,) index, ascending, the first 0 and the last M
@@ -147,7 +150,8 @@ def extrusion_of(
 
 
 def extruding_part(extrusion: Extrusion, kept: Array) -> Extrusion:
-    """The ratios of the segments `kept` (M,) alone; what the extruder does in time is that of the whole path."""
+    """The ratios of the segments `kept` (M,) alone; what the extruder does in time is that of the whole
+    path."""
     return replace(extrusion, ratio=extrusion.ratio[kept])
 
 
@@ -161,7 +165,8 @@ def _before(at: Array, lasts: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def _joints(end, ends, full_stop, apart):
-    """Indices of the joints where the ratio may change: full stops, and ends of blocks far enough behind the last.
+    """Indices of the joints where the ratio may change: full stops, and ends of blocks far enough behind the
+    last.
 
     end   : (M,) way at the end of each segment [mm]
     ends  : (M,) True where its block ends

@@ -1,10 +1,11 @@
 """Legs: the straight lines, arcs and curves between which corners are rounded.
 
-A leg is one arc, one segment of a curve, or all collinear lines that follow one another. Collinear lines are joined because where a
-CAM system cut a straight line into blocks must not change the motion: a corner may reach back over several short blocks of the same
-line.
+A leg is one arc, one segment of a curve, or all collinear lines that follow one another. Collinear lines are
+joined because where a CAM system cut a straight line into blocks must not change the motion: a corner may
+reach back over several short blocks of the same line.
 
-The kernels see one numpy record per leg (`leg_dtype`): a tuple of ten arrays would cost ten reference counts per call.
+The kernels see one numpy record per leg (`leg_dtype`): a tuple of ten arrays would cost ten reference counts
+per call.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from planner.base.kernels import njit
 from planner.geometry.curves import curve_point, curve_tangent
 from planner.geometry.toolpath import Joint, Toolpath
 
-# Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its blocks.
+# Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its
+# blocks.
 JOINED_ANGLE = 1e-7
 
 
@@ -26,7 +28,8 @@ JOINED_ANGLE = 1e-7
 class Legs:
     """R legs of a toolpath and the R+1 joints between them.
 
-    first  : (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the leg's start
+    first  : (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the
+             leg's start
     offset : (M,) place of each segment's start on its leg [mm]
     length : (R,) range of the leg's parameter x [mm]
     table  : (R,) records of `leg_dtype`, the same geometry for the kernels
@@ -48,7 +51,8 @@ class Legs:
 
     @property
     def place(self) -> FloatArray:
-        """(M+1,) where each segment starts, counted along the legs from the start of the job [mm]; last, where the job ends."""
+        """(M+1,) where each segment starts, counted along the legs from the start of the job [mm]; last,
+        where the job ends."""
         start = np.concatenate([[0.0], np.cumsum(self.length)])
         return np.append(np.repeat(start[:-1], np.diff(self.first)) + self.offset, start[-1])
 
@@ -56,8 +60,9 @@ class Legs:
 def leg_dtype(axes: int) -> np.dtype:
     """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py.
 
-    On a curve, which is `round` as well, start, direction, center and e1 are its control points, the first numbers of e2 and drift the
-    weights of the inner two, and radius and rate those of an arc that turns as fast as the curve anywhere.
+    On a curve, which is `round` as well, start, direction, center and e1 are its control points, the first
+    numbers of e2 and drift the weights of the inner two, and radius and rate those of an arc that turns as
+    fast as the curve anywhere.
     """
     vectors = ("start", "direction", "center", "e1", "e2", "drift")
     flags = [("round", np.bool_), ("curve", np.bool_)]
@@ -89,7 +94,8 @@ def legs_of(toolpath: Toolpath) -> Legs:
 
 
 def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
-    """Write the curves among the legs (R,) that begin with the segments `segment` (R,) into their records, in place."""
+    """Write the curves among the legs (R,) that begin with the segments `segment` (R,) into their records, in
+    place."""
     leg = np.flatnonzero(toolpath.curve[segment] >= 0)
     row, bend = toolpath.curve[segment[leg]], toolpath.curvature[segment[leg]]
     for k, name in enumerate(("start", "direction", "center", "e1")):
@@ -101,7 +107,8 @@ def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def leg_point(legs, leg, x, out):
-    """Point [mm] and first three x-derivatives of a leg at x [mm], into out (4, A); legs: records of `leg_dtype`."""
+    """Point [mm] and first three x-derivatives of a leg at x [mm], into out (4, A); legs: records of
+    `leg_dtype`."""
     data = legs[leg]
     axes = out.shape[1]
     if not data.round:

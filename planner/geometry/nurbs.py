@@ -1,7 +1,7 @@
 """NURBS curves: points, and an NC program of the curve itself or of its chords.
 
-A curve of degree p with control points P_i, weights w_i and knots u_i is r(u) = sum N_i w_i P_i / sum N_i w_i, on the domain
-[u_p, u_n].
+A curve of degree p with control points P_i, weights w_i and knots u_i is r(u) = sum N_i w_i P_i / sum N_i
+w_i, on the domain [u_p, u_n].
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
 from planner.nc.program import Kind, PathControl, Program, SplineTable
 
-# Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured [fraction of the chord].
+# Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured
+# [fraction of the chord].
 CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
 # The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
@@ -93,7 +94,8 @@ class Nurbs:
         return points
 
     def stations(self, sagitta: float) -> FloatArray:
-        """(k,) parameters, all knots among them, between which the chords leave the curve by at most `sagitta` [mm].
+        """(k,) parameters, all knots among them, between which the chords leave the curve by at most
+        `sagitta` [mm].
 
         Raises InputError unless that is positive.
         """
@@ -152,7 +154,8 @@ class Nurbs:
 
 
 def chords(points: FloatArray, axes: tuple[str, ...], feed: float) -> Program:
-    """A program of G1 moves at `feed` [mm/s] through points (B+1, A) [mm]; the machine stands at the first of them."""
+    """A program of G1 moves at `feed` [mm/s] through points (B+1, A) [mm]; the machine stands at the first of
+    them."""
     blocks = len(points) - 1
     none: Array = np.zeros(0)
     return Program(

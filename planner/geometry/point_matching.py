@@ -1,18 +1,21 @@
 """Which block each point of a motion is at: a sequence of points matched with the programmed path, in order.
 
-The path is a chain of straight links (arcs and curves as chords within `CHORD_FRACTION` of the tolerance) between vertices. Wanted is
-for every point n a link i(n) that never goes back, within the link's budget, such that every vertex between i(n-1) and i(n) is within
-`MISSED` of its budgets from the chord from point n-1 to point n. Of all such assignments the one with the least
+The path is a chain of straight links (arcs and curves as chords within `CHORD_FRACTION` of the tolerance)
+between vertices. Wanted is for every point n a link i(n) that never goes back, within the link's budget, such
+that every vertex between i(n-1) and i(n) is within `MISSED` of its budgets from the chord from point n-1 to
+point n. Of all such assignments the one with the least
 
     sum of |point - link|^2  +  sum of |vertex - chord|^2  +  budget^2 for every block that gets no point
                               +  budget^2 for every point that is faster than its block's feed allows
                               +  `TOO_FAR` budget^2 for every vertex that is missed by more than its budget
 
-is found by dynamic programming over the links that can be reached from the point before, a window of about two budgets, so that
-time and memory are linear in points and links. Distances below `SAME_PLACE` count as none; of equal assignments that which passes
-the vertices last is taken: a motion that stands on a vertex is still at the block before.
+is found by dynamic programming over the links that can be reached from the point before, a window of about
+two budgets, so that time and memory are linear in points and links. Distances below `SAME_PLACE` count as
+none; of equal assignments that which passes the vertices last is taken: a motion that stands on a vertex is
+still at the block before.
 
-A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are widened, up to `WIDEST` times.
+A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are
+widened, up to `WIDEST` times.
 """
 
 from __future__ import annotations
@@ -31,8 +34,9 @@ SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
 SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
 # Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
 MISSED = 2.0
-# Price of a vertex missed by more than its budget [budget^2]: more than that of all points around it. Small moves inside the tolerance
-# would else be entered before their first vertex is reached, at their own, higher feed.
+# Price of a vertex missed by more than its budget [budget^2]: more than that of all points around it. Small
+# moves inside the tolerance would else be entered before their first vertex is reached, at their own, higher
+# feed.
 TOO_FAR = 1e6
 FIRST_WIDER, WIDEST = 1.05, 100.0  # budgets are widened by the first, then doubled, up to the second [-]
 ANYWHERE = 1e12  # the same where no point is to be lost
@@ -80,7 +84,8 @@ def chain_of(toolpath: Toolpath) -> PathChain:
 class SegmentsInOrder:
     """Which segment of the toolpath each point of a motion is at, for points that come chunk by chunk.
 
-    Which link a point is at is settled as soon as all assignments that are still possible agree on it; until then its chunk is kept.
+    Which link a point is at is settled as soon as all assignments that are still possible agree on it; until
+    then its chunk is kept.
     """
 
     def __init__(self, toolpath: Toolpath):
@@ -110,7 +115,8 @@ class SegmentsInOrder:
             self._settle_before(at)
 
     def runs(self) -> tuple[Array, Array] | None:
-        """(R,) at which point each run of points at one segment begins, and (R,) that segment; None where it cannot be told."""
+        """(R,) at which point each run of points at one segment begins, and (R,) that segment; None where it
+        cannot be told."""
         last = len(self._chain.budget) - 1
         if self._lost or (not self._count and not self._open) or self._high != last:
             return None
@@ -144,7 +150,8 @@ class SegmentsInOrder:
 
 
 class _Marks(NamedTuple):
-    """For n points the first link (n,) that each can be at, where its marks begin (n,), and the marks: how each is best entered."""
+    """For n points the first link (n,) that each can be at, where its marks begin (n,), and the marks: how
+    each is best entered."""
 
     first: Array
     begin: Array
@@ -170,8 +177,8 @@ def from_chord(begin, end, point):
 def in_order(chain, point, feed):
     """Match points (n, A) with feeds (n,) with a chain.
 
-    Returns whether that succeeds; (n,) the link of each point; (K+1,) where each vertex is passed, the point before plus the share of
-    the chord behind it.
+    Returns whether that succeeds; (n,) the link of each point; (K+1,) where each vertex is passed, the point
+    before plus the share of the chord behind it.
     """
     count, links = len(point), len(chain.budget)
     cost, link, crossed = np.empty(links), np.empty(count, np.int64), np.empty(links + 1)
@@ -203,12 +210,15 @@ def links_anywhere(chain, point):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _forward(chain, before, point, feed, fresh, low, high, cost, widest):
-    """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh` if there is none before.
+    """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh`
+    if there is none before.
 
-    cost   : (K,) of the best assignment that ends at each of these links; those of the last point are written into it
+    cost   : (K,) of the best assignment that ends at each of these links; those of the last point are written
+             into it
     widest : budgets are widened up to so many times [-]
 
-    Returns whether there is any assignment, the fields of `_Marks`, and the links that the last point can be at.
+    Returns whether there is any assignment, the fields of `_Marks`, and the links that the last point can be
+    at.
     """
     vertex, at_vertex, budget = chain.vertex, chain.at_vertex, chain.budget
     skipped, cap = chain.skipped, chain.feed
@@ -263,8 +273,8 @@ def _forward(chain, before, point, feed, fresh, low, high, cost, widest):
 
 @njit(cache=True, error_model="numpy")
 def _trace(first, begin, marks, last, link):
-    """The best assignment of the points of `_Marks` that ends at the link `last`, into link (n,); returns the link of the point
-    before them."""
+    """The best assignment of the points of `_Marks` that ends at the link `last`, into link (n,); returns the
+    link of the point before them."""
     i = last
     for n in range(len(first) - 1, -1, -1):
         link[n] = i

@@ -1,9 +1,11 @@
-"""Moves whose feed is to be held: threads, cut in step with the spindle. From rest the feed F is reached behind a run-in of the length
+"""Moves whose feed is to be held: threads, cut in step with the spindle. From rest the feed F is reached
+behind a run-in of the length
 
     d = F T / 2,     T = F / a + a / j  where F >= a^2 / j,  else 2 sqrt(F / j),
 
-a and j what the axes allow along the straight move; as long is the run-out. (The jerk-limited step to F: the speed is symmetric about
-its middle, so its mean is F / 2.) A move of the length l holds its feed over l - 2 d.
+a and j what the axes allow along the straight move; as long is the run-out. (The jerk-limited step to F: the
+speed is symmetric about its middle, so its mean is F / 2.) A move of the length l holds its feed over l - 2
+d.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ def run_in(toolpath: Toolpath, machine: Machine) -> FloatArray:
 
 
 def require_room(toolpath: Toolpath, machine: Machine) -> None:
-    """Raise InputError for a thread whose feed the machine does not have, or that has no move with room to reach it."""
+    """Raise InputError for a thread whose feed the machine does not have, or that has no move with room to
+    reach it."""
     held = np.flatnonzero(toolpath.held)
     if not len(held):
         return
@@ -64,7 +67,8 @@ def require_room(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def _parted(toolpath: Toolpath, held: np.ndarray) -> np.ndarray:
-    """(n,) True where a cut begins among the indices `held` (n,), but for the first: another move or a stop lies before it."""
+    """(n,) True where a cut begins among the indices `held` (n,), but for the first: another move or a stop
+    lies before it."""
     parted = np.append(False, np.diff(held) > 1) | (toolpath.joint[held] == Joint.STOP)
     parted[0] = False
     return parted

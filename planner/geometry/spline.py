@@ -1,7 +1,7 @@
 """Splines: smooth curves that replace legs and corners, in runs, as polynomials of degree five, one per span.
 
-On a span the point is sum_m coef[m] tau^m, tau in [0, 1]; it stands for the programmed path from the place `begin` to
-`begin + width`, counted along the legs from the start of the job [mm].
+On a span the point is sum_m coef[m] tau^m, tau in [0, 1]; it stands for the programmed path from the place
+`begin` to `begin + width`, counted along the legs from the start of the job [mm].
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ class Spline:
     """Q runs of spans, in the order of the path; S spans in all.
 
     first       : (Q+1,) run q holds the spans first[q] : first[q+1]
-    joint_first, joint_last : (Q,) the joints between legs that run q replaces; it begins on the leg before the first of them and
+    joint_first, joint_last : (Q,) the joints between legs that run q replaces; it begins on the leg before
+                              the first of them and
                   ends on the leg after the last
     x_first, x_last : (Q,) where on those legs [mm]
     spans       : (S,) records of `span_dtype`
@@ -68,7 +69,8 @@ def no_spline(axes: int) -> Spline:
 
 @njit(cache=True, error_model="numpy")
 def span_point(spans, i, tau, out):
-    """Point [mm] and three tau-derivatives of span i at tau in [0, 1], into out (4, A); spans: records of `span_dtype`."""
+    """Point [mm] and three tau-derivatives of span i at tau in [0, 1], into out (4, A); spans: records of
+    `span_dtype`."""
     coef = spans[i].coef
     for k in range(out.shape[1]):
         value, first, second, third = 0.0, 0.0, 0.0, 0.0

@@ -1,15 +1,17 @@
 """Where a spline passes the joints of the blocks that it stands for.
 
-A span stands for what is programmed between two places (geometry/spline.py), but only the run as a whole does so within the tolerance:
-its shape slides along the path, by several tolerances where that is faster. So the curve is matched with the path in order
-(geometry/point_matching.py), at points whose chords leave it by `CHORD_FRACTION` of the tolerance at most. A joint is passed where the
-curve C is nearest to it, V, as far as that keeps the order; joints that are within reach of each other at those places T_i that are
-together nearest to them:
+A span stands for what is programmed between two places (geometry/spline.py), but only the run as a whole does
+so within the tolerance: its shape slides along the path, by several tolerances where that is faster. So the
+curve is matched with the path in order (geometry/point_matching.py), at points whose chords leave it by
+`CHORD_FRACTION` of the tolerance at most. A joint is passed where the curve C is nearest to it, V, as far as
+that keeps the order; joints that are within reach of each other at those places T_i that are together nearest
+to them:
 
     least  sum_i |C(T_i) - V_i|^2,    T_1 <= T_2 <= ...,    (C - V) . C' = 0
 
-with V the mean of those that are passed together. Points of an arc that are `ARC_ANGLE` apart are passed likewise. Behind the place of
-a joint the feed is that of the next block; it is found to rounding where the feed changes.
+with V the mean of those that are passed together. Points of an arc that are `ARC_ANGLE` apart are passed
+likewise. Behind the place of a joint the feed is that of the next block; it is found to rounding where the
+feed changes.
 """
 
 from __future__ import annotations
@@ -27,16 +29,19 @@ from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
 
 LOOKED_AT = 5  # places on a span at which its bend is looked at
-# Between points of an arc that are passed in order [rad]: an arc inside the tolerance may not be passed backwards.
+# Between points of an arc that are passed in order [rad]: an arc inside the tolerance may not be passed
+# backwards.
 ARC_ANGLE = np.pi / 8
-# Bisections of two chords for the nearest place: to 1e-15 of them where the feed changes, elsewhere to a thousandth.
+# Bisections of two chords for the nearest place: to 1e-15 of them where the feed changes, elsewhere to a
+# thousandth.
 FINE, COARSE = 50, 10
 
 
 def passed_places(toolpath: Toolpath, legs: Legs, spline: Spline) -> FloatArray:
     """(M+1,) where the smooth path passes the start of each of M segments, counted like `Legs.place` [mm].
 
-    Where a run of the spline replaces the legs it is the place that the spans give the curve's point there, elsewhere `Legs.place`.
+    Where a run of the spline replaces the legs it is the place that the spans give the curve's point there,
+    elsewhere `Legs.place`.
     """
     place = legs.place.copy()
     if not len(spline):
@@ -90,7 +95,8 @@ def _marks(toolpath: Toolpath, chain: PathChain) -> _Marks:
 
 @njit(cache=True, error_model="numpy")
 def _chords(spans, i, tolerance, out):
-    """How many chords of span i leave it by `CHORD_FRACTION` of the tolerance: a chord over a fraction h of it by |r''| h^2/8."""
+    """How many chords of span i leave it by `CHORD_FRACTION` of the tolerance: a chord over a fraction h of
+    it by |r''| h^2/8."""
     most_sq = 0.0
     for n in range(LOOKED_AT):
         span_point(spans, i, n / (LOOKED_AT - 1.0), out)
@@ -163,10 +169,12 @@ def _chord_apart_sq(point, n, vertex):
 
 @njit(cache=True, error_model="numpy")
 def _nearest_together(point, vertices, budget, near):
-    """The chord (K,) on which each of K vertices is passed: those, in order, that are together nearest to them (module text).
+    """The chord (K,) on which each of K vertices is passed: those, in order, that are together nearest to
+    them (module text).
 
     budget : (K,) [mm]
-    near   : (K,) a chord within the budget of each, overwritten; looked at are those that join on to it within the budget
+    near   : (K,) a chord within the budget of each, overwritten; looked at are those that join on to it
+             within the budget
     """
     K, last = len(vertices), len(point) - 2
     first, count = np.empty(K, np.int64), np.empty(K, np.int64)
@@ -205,8 +213,9 @@ def _nearest_together(point, vertices, budget, near):
 
 @njit(cache=True, error_model="numpy")
 def _in_order_places(spans, of, points, near, marks, begin, end, out, passes):
-    """The places (end - begin,) [mm] of the marks from `begin` on, each the nearest one next to the chord `near`. Where these are not
-    in order the marks are passed together, at the place nearest to the mean of them: the sum of their squares is least there."""
+    """The places (end - begin,) [mm] of the marks from `begin` on, each the nearest one next to the chord
+    `near`. Where these are not in order the marks are passed together, at the place nearest to the mean of
+    them: the sum of their squares is least there."""
     at = points[1]
     group = np.empty(end - begin, np.int64)  # the first mark of each group
     groups = 0

@@ -1,16 +1,18 @@
-"""The record of the programmed path: M segments (lines, arcs, helices, curves) and the M+1 joints around them.
+"""The record of the programmed path: M segments (lines, arcs, helices, curves) and the M+1 joints around
+them.
 
 Segment i runs from joint i to joint i+1. Every segment is a curve over its own parameter x in [0, length_i]:
 
     line   p(x) = start + x * u
     arc    p(x) = center + radius * (cos(rate x) e1 + sin(rate x) e2) + drift * x
 
-`rate` [rad/mm] is signed; e1 points from the centre to the start, e2 is e1 turned by 90 degrees counter-clockwise about the
-plane's normal; `drift` is the helix' rise per mm. Programs print arcs with rounded numbers, so that start and end lie on
-circles of slightly different radius; the gap is spread over the arc as a component of `drift` inside the plane, which makes the
-curve smooth and lets it end exactly on the programmed point. x is the arc length but for that gap (relative error gap/length),
-so nothing downstream may assume |dp/dx| = 1 on arcs. A curve of the program is several segments (geometry/curves.py); |dp/dx| is 1
-at their ends.
+`rate` [rad/mm] is signed; e1 points from the centre to the start, e2 is e1 turned by 90 degrees
+counter-clockwise about the plane's normal; `drift` is the helix' rise per mm. Programs print arcs with
+rounded numbers, so that start and end lie on circles of slightly different radius; the gap is spread over the
+arc as a component of `drift` inside the plane, which makes the curve smooth and lets it end exactly on the
+programmed point. x is the arc length but for that gap (relative error gap/length), so nothing downstream may
+assume |dp/dx| = 1 on arcs. A curve of the program is several segments (geometry/curves.py); |dp/dx| is 1 at
+their ends.
 """
 
 from __future__ import annotations
@@ -86,13 +88,16 @@ class Toolpath:
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
-    held            : (M,) True where the feed is to be reached and held: cut in step with the spindle (geometry/run_in.py)
-    exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends is rounded
+    held            : (M,) True where the feed is to be reached and held: cut in step with the spindle
+                      (geometry/run_in.py)
+    exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends
+                      is rounded
     zero_length     : (Z,) blocks that move nowhere, kept as events
-    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one norm measures them
+    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one
+                      norm measures them
     extrusion       : what the extruder does along it; None without one
-    inside          : (M,) `along` over the smaller tolerance of the segment's ends [-], where joints were given less of it
-                      (delivery/periods.py); None for 1
+    inside          : (M,) `along` over the smaller tolerance of the segment's ends [-], where joints were
+                      given less of it (delivery/periods.py); None for 1
     """
 
     source: str
@@ -160,7 +165,8 @@ class Toolpath:
         return np.flatnonzero(np.append(True, self.block[1:] != self.block[:-1]))
 
     def block_ends(self) -> Toolpath:
-        """One line for each block, from its start to its end, as long as the block: to time blocks, no path to be followed."""
+        """One line for each block, from its start to its end, as long as the block: to time blocks, no path
+        to be followed."""
         first = self.block_first
         if len(first) == len(self):
             return self
@@ -188,8 +194,8 @@ class Toolpath:
         return dataclasses.replace(self, joint=joint)
 
     def part(self, kept: Array) -> Toolpath:
-        """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of it: where some are left out,
-        the path jumps at a full stop."""
+        """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of
+        it: where some are left out, the path jumps at a full stop."""
         # with the joint behind each segment; the first is a full stop, like all that begin a part
         joints = np.append(True, kept)
         columns: dict[str, Any] = {}

@@ -1,9 +1,11 @@
-"""Whether steps keep everything exactly: their limits at every time, and the tolerance by the control points of their cubics.
+"""Whether steps keep everything exactly: their limits at every time, and the tolerance by the control points
+of their cubics.
 
-Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed has degree 4: it is
-looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is
-looked at in the same places. For the tolerance see nlp.py: control points within the budget of those of the leg's own cubic, along
-places that never go back. On arcs a step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
+Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed
+has degree 4: it is looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is
+zero (Newton). The normal acceleration is looked at in the same places. For the tolerance see nlp.py: control
+points within the budget of those of the leg's own cubic, along places that never go back. On arcs a step is
+looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
 """
 
 from __future__ import annotations
@@ -45,7 +47,8 @@ class Keeps(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _at(v, a, j, t):
-    """Squared speed, v.a, and the squared normal acceleration times the squared speed, at time t in a step."""
+    """Squared speed, v.a, and the squared normal acceleration times the squared speed, at time t in a
+    step."""
     square, along, push = 0.0, 0.0, 0.0
     for k in range(len(v)):
         w, b = v[k] + t * (a[k] + 0.5 * t * j[k]), a[k] + t * j[k]
@@ -55,7 +58,8 @@ def _at(v, a, j, t):
 
 @njit(cache=True, error_model="numpy")
 def _of_state(keeps, r, h, v, a, j):
-    """The largest share of the state's limits in a step on leg r, and of the feed in the axes that F goes by."""
+    """The largest share of the state's limits in a step on leg r, and of the feed in the axes that F goes
+    by."""
     worst, axes = 0.0, len(v)
     w, b = np.empty(axes), np.empty(axes)
     for n in range(PLACES if len(keeps.state) or keeps.word.shape[1] else 0):
@@ -104,8 +108,8 @@ def _of_limits(keeps, r, h, v, a, j):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def watched_shares(keeps, leg, h, state, jerk):
-    """(N,) the largest share in every step of the limits that rows watch in places, of the normal acceleration and the state; leg (N,),
-    h (N,), state (N+1, 3, A), jerk (N, A)."""
+    """(N,) the largest share in every step of the limits that rows watch in places, of the normal
+    acceleration and the state; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
     shares = np.zeros(len(leg))
     for i in range(len(leg)):
         shares[i] = _of_state(keeps, leg[i], h[i], state[i, 1], state[i, 2], jerk[i])
@@ -138,7 +142,8 @@ def bend_of(curvature, rate, s):
 
 @njit(cache=True, error_model="numpy")
 def _split(c, part, piece):
-    """The Bezier ordinates c (4, B) of a cubic: `piece` (4, B) gets those of its first part, c keeps those of the rest."""
+    """The Bezier ordinates c (4, B) of a cubic: `piece` (4, B) gets those of its first part, c keeps those of
+    the rest."""
     piece[0] = c[0]
     for level in range(3):  # de Casteljau
         for m in range(3 - level):
@@ -148,8 +153,9 @@ def _split(c, part, piece):
 
 @njit(cache=True, error_model="numpy")
 def _of_arc(keeps, r, c, s0, end, known, budgets, work):
-    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten, from the place s0; budgets
-    (2,) of both ends. It ends at the place `end`, or, if that is not known, at one sought from there. Returns where it ends too."""
+    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten,
+    from the place s0; budgets (2,) of both ends. It ends at the place `end`, or, if that is not known, at one
+    sought from there. Returns where it ends too."""
     legs, budget = keeps.legs, keeps.budget[r]
     point, ahead, tangent, ahead_tangent, bend, piece, s, part_of_s = work
     worst = 0.0
@@ -197,8 +203,8 @@ def _of_line(keeps, r, c, s0, end, known, budgets, work):
 def worst_shares(keeps, leg, h, state, jerk, place):
     """The largest share of a limit, and of the tolerance, in N steps.
 
-    leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points along the leg: where
-    places on arcs are sought from
+    leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points
+    along the leg: where places on arcs are sought from
     """
     N, axes = jerk.shape
     limit, tube, before = 0.0, 0.0, 0.0
@@ -233,10 +239,11 @@ def worst_shares(keeps, leg, h, state, jerk, place):
 
 
 def switches_kept(run: TubeRun, leg: Array, state: FloatArray) -> bool:
-    """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end: where the feed falls the way
-    to the vertex comes nearer up to its node, where it rises the way from there on goes away. That is looked at next to the node, on
-    the nodes within the budget of the vertex: what is farther than that from the vertex is not nearest to it, and on an arc of more
-    than half a turn the way to its end goes away from there at first.
+    """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end:
+    where the feed falls the way to the vertex comes nearer up to its node, where it rises the way from there
+    on goes away. That is looked at next to the node, on the nodes within the budget of the vertex: what is
+    farther than that from the vertex is not nearest to it, and on an arc of more than half a turn the way to
+    its end goes away from there at first.
 
     leg (N,), state (N+1, 3, A)
     """

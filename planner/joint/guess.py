@@ -1,8 +1,9 @@
 """Where the search begins: the motion of another method, cut into steps.
 
-A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3), or takes it to its
-full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it has `Cut.per_unit` steps, and all of a leg
-at least `Cut.of_leg` and one in `LONGEST` units. So phases of full jerk get short steps and cruises a few long ones.
+A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3),
+or takes it to its full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it
+has `Cut.per_unit` steps, and all of a leg at least `Cut.of_leg` and one in `LONGEST` units. So phases of full
+jerk get short steps and cruises a few long ones.
 
 Every step is a cubic in time with the control points
 
@@ -22,9 +23,11 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.joint.run import TubeRun
 from planner.motion.trajectory import Trajectory
 
-# Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so many because of it.
+# Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so
+# many because of it.
 LONGEST, MOST_FOR_LENGTH = 4.0, 60
-# Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to move.
+# Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to
+# move.
 ARC_STEP = 0.8
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
@@ -33,8 +36,8 @@ NEAREST_STEPS = 5
 class Cut(NamedTuple):
     """How finely a motion is cut into steps.
 
-    Twice as many find motions 2e-5 to 5e-5 faster in three times the time; begun with half as many, a corner of 90 degrees and a
-    pentagon do not converge.
+    Twice as many find motions 2e-5 to 5e-5 faster in three times the time; begun with half as many, a corner
+    of 90 degrees and a pentagon do not converge.
     """
 
     per_unit: float = 4.0  # steps in a unit of time where the jerk is at its limit (module text) [-]
@@ -142,7 +145,8 @@ def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) 
     lasting = np.diff(motion.t)
     spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
-    # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from that of the run
+    # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from
+    # that of the run
     inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
     t = np.union1d(inside, vertex_time)
     leg = np.minimum(np.searchsorted(vertex_time, t, side="right") - 1, len(run) - 1)
@@ -167,7 +171,8 @@ def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArr
 
 
 def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelled: FloatArray) -> FloatArray:
-    """(N, 4) places of the control points; travelled: (N+1,) length that the motion has travelled at the nodes [mm]."""
+    """(N, 4) places of the control points; travelled: (N+1,) length that the motion has travelled at the
+    nodes [mm]."""
     p, v = state[:, 0], state[:, 1]
     third = h[:, None] / 3
     controls = np.stack([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])

@@ -1,16 +1,18 @@
-"""The free optimum inside the tolerance near a motion, by a primal-dual interior-point method with slacks (Mehrotra 1992).
+"""The free optimum inside the tolerance near a motion, by a primal-dual interior-point method with slacks
+(Mehrotra 1992).
 
     minimise    sum of h + pull sum ((h - guess)/guess)^2 + smooth sum h (jerk/limit)^2, h as it was guessed
     subject to  the kinematics (recursion.py) and g <= 0 for every row (rows.py), with slacks s and multipliers z
 
-from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. Kinematics and rows are linearised
-anew in every iteration. The curvature of the rows counts, that of the kinematics does not: h times velocity, acceleration and jerk is
-indefinite, and with it a step would not go down. Instead a change of h costs `prox` in every iteration, so that steps stay where the
-linear model holds.
+from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. Kinematics
+                                      and rows are linearised
+anew in every iteration. The curvature of the rows counts, that of the kinematics does not: h times velocity,
+acceleration and jerk is indefinite, and with it a step would not go down. Instead a change of h costs `prox`
+in every iteration, so that steps stay where the linear model holds.
 
-Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal optima for ever. When the
-complementarity s.z has reached what is asked for and the time has settled, prox grows by `FREEZE` in every iteration, until rows and
-kinematics hold.
+Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
+optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox
+grows by `FREEZE` in every iteration, until rows and kinematics hold.
 """
 
 from __future__ import annotations
@@ -27,19 +29,21 @@ from planner.joint.rows import VECTORS, Linear, put_rows, slopes
 from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
-# Growth of prox per iteration once it grows, and its largest value [-]: with 1.5 searches of 80 random jobs take 1.2 times as many
-# iterations and end at the same times within 2e-5 on the mean.
+# Growth of prox per iteration once it grows, and its largest value [-]: with 1.5 searches of 80 random jobs
+# take 1.2 times as many iterations and end at the same times within 2e-5 on the mean.
 FREEZE, FROZEN = 2.5, 1e4
-# The time has settled when it changes by no more than this share of the complementarity asked for in so many iterations in a row, and
-# at last after so many at that complementarity. Of 29 runs of random jobs, frozen as soon as that was reached (with a growth of 1.5),
-# one ended 4.4e-4 slower, and all 6e-5 on the mean; half as many of the second end 1e-5 slower.
+# The time has settled when it changes by no more than this share of the complementarity asked for in so many
+# iterations in a row, and at last after so many at that complementarity. Of 29 runs of random jobs, frozen as
+# soon as that was reached (with a growth of 1.5), one ended 4.4e-4 slower, and all 6e-5 on the mean; half as
+# many of the second end 1e-5 slower.
 STILL, STILL_FOR, CLOSE_FOR = 0.1, 2, 40
 MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning.least` lets it [-]
-# Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two starts of the bracket all
-# of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
+# Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two
+# starts of the bracket all of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
 PREDICTED = 0.3
-# Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up. With 1e-10 for all steps
-# 18 of 71 windows of a relief of 10,000 blocks went on to the last iteration: the last gap stays at 1e-9 once durations hardly change.
+# Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up.
+# With 1e-10 for all steps 18 of 71 windows of a relief of 10,000 blocks went on to the last iteration: the
+# last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule
@@ -52,8 +56,9 @@ class Tuning(NamedTuple):
     prox: float  # the same of the change in one iteration
     gap: float  # complementarity at the end, share of the time
     smooth: float  # weight of (jerk/limit)^2 of every axis, against a step's time
-    # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off: limits are narrowed by more
-    # than that (problem.py). Slacks of the others follow no more closely than the tangents that are kept.
+    # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off:
+    # limits are narrowed by more than that (problem.py). Slacks of the others follow no more closely than the
+    # tangents that are kept.
     missed: float
     least: float  # to which prox falls while the time settles
     first_gap: float  # complementarity of the start, share of the time
@@ -111,7 +116,8 @@ def _directions(on, slacks, slope, aim, second):
 
 @njit(cache=True, error_model="numpy")
 def _predicted(on, slacks, along, dual, second):
-    """Complementarity after a predictor that goes the shares `along` and `dual` of its way; second (N, R) its second-order terms."""
+    """Complementarity after a predictor that goes the shares `along` and `dual` of its way; second (N, R) its
+    second-order terms."""
     s, z, _, ds, dz = slacks
     left = 0.0
     for i in range(len(on)):
@@ -124,8 +130,9 @@ def _predicted(on, slacks, along, dual, second):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def solve_window(legs, limits, x, u, place, tuning, at):
-    """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns whether it has been
-    reached, the iterations, and the multipliers (N, R) of the rows, in units of time. Meanwhile at[0] is the iteration."""
+    """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns
+    whether it has been reached, the iterations, and the multipliers (N, R) of the rows, in units of time.
+    Meanwhile at[0] is the iteration."""
     N, axes = len(u), u.shape[1] - 1
     R, S, C, on = limits.on.shape[1], 3 * axes, axes + 1, limits.on
     many = (N, R)

@@ -1,4 +1,5 @@
-"""The legs of a run (run.py) as kernels see them: points, tangents, nearest places, and how far a control point is from a tangent."""
+"""The legs of a run (run.py) as kernels see them: points, tangents, nearest places, and how far a control
+point is from a tangent."""
 
 from __future__ import annotations
 
@@ -63,8 +64,8 @@ def formula_point(legs, r, x, point, tangent, bend):
 
 @njit(cache=True, error_model="numpy")
 def along_tangent(length, c, x, ahead, point, tangent):
-    """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or else behind it, and
-    within the leg."""
+    """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or
+    else behind it, and within the leg."""
     miss, square = 0.0, 0.0
     for k in range(len(c)):
         miss += (c[k] - point[k]) * tangent[k]
@@ -74,8 +75,8 @@ def along_tangent(length, c, x, ahead, point, tangent):
 
 
 class Foot(NamedTuple):
-    """Where the tangent touches an arc to which an inner control point belongs: at the place x of a node, behind the point or ahead of
-    it. A place that is `fixed` does not move with the node."""
+    """Where the tangent touches an arc to which an inner control point belongs: at the place x of a node,
+    behind the point or ahead of it. A place that is `fixed` does not move with the node."""
 
     x: float
     fixed: bool
@@ -92,8 +93,8 @@ class Slopes(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def off_tangent(legs, r, c, node, foot, room, slopes):
-    """The row of an inner control point c (A,) on an arc, (d2/room2 - 1)/2 with its distance d from the tangent at a foot, and the
-    place on the leg; its derivatives into `slopes`."""
+    """The row of an inner control point c (A,) on an arc, (d2/room2 - 1)/2 with its distance d from the
+    tangent at a foot, and the place on the leg; its derivatives into `slopes`."""
     axes, x = len(c), foot.x
     point, bend, tangent = np.empty(axes), np.empty(axes), slopes.tangent
     formula_point(legs, r, x, point, tangent, bend)

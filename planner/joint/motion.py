@@ -1,8 +1,8 @@
 """From steps to a motion: integrated exactly, ending exactly, and slowed down by what is left of rounding.
 
-A solver's rows have residuals of some 1e-8. The steps' jerks are integrated from the first node, and the smallest change of the jerks
-that makes the last node meet its end is added (least squares, per axis). Slowing down by lam divides speeds by lam, accelerations
-by lam^2 and jerks by lam^3 and leaves the path as it is.
+A solver's rows have residuals of some 1e-8. The steps' jerks are integrated from the first node, and the
+smallest change of the jerks that makes the last node meet its end is added (least squares, per axis). Slowing
+down by lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and leaves the path as it is.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from planner.joint.guess import Guess
 from planner.joint.run import TubeRun
 from planner.joint.state_limits import state_shares
 
-# Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their square from acceleration to
-# position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
+# Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their
+# square from acceleration to position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
 CLOSED_EVERY = 50
-# Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is above by less than 1e-6.
+# Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is
+# above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
 
@@ -41,7 +42,8 @@ class Steps:
 
 
 def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Steps:
-    """The motion with the jerk (N, A) [mm/s3] over steps of h (N,) [s], from vertex to vertex and within all limits (module text).
+    """The motion with the jerk (N, A) [mm/s3] over steps of h (N,) [s], from vertex to vertex and within all
+    limits (module text).
 
     guess : what the search began with
     """
@@ -55,7 +57,8 @@ def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Ste
 
 
 def integrated(begin: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A) [mm, s].
+    """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A)
+    [mm, s].
 
     h    : (N,) durations [s]
     jerk : (N, A) constant on each step [mm/s3]
@@ -73,7 +76,8 @@ def _summed(begin: FloatArray, change: FloatArray) -> FloatArray:
 
 
 def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those given, changed least.
+    """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those
+    given, changed least.
 
     h    : (N,) durations [s]
     jerk : (N, A) [mm/s3]
@@ -89,8 +93,8 @@ def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) 
 
 
 def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The motion that meets every `CLOSED_EVERY`th of the nodes, state (N+1, 3, A), and the last one: its nodes, and the jerks (N, A),
-    those given changed least between two of them.
+    """The motion that meets every `CLOSED_EVERY`th of the nodes, state (N+1, 3, A), and the last one: its
+    nodes, and the jerks (N, A), those given changed least between two of them.
 
     h    : (N,) durations [s]
     jerk : (N, A) [mm/s3]
@@ -104,7 +108,8 @@ def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple
 
 
 def _largest_square(v: FloatArray, middle: FloatArray, after: FloatArray, counts: FloatArray) -> FloatArray:
-    """(N,) the largest Bernstein coefficient of the squared speed in the axes that count (A,) on each step (rows.py)."""
+    """(N,) the largest Bernstein coefficient of the squared speed in the axes that count (A,) on each step
+    (rows.py)."""
     v, middle, after = v * counts, middle * counts, after * counts
     square = [(v * v).sum(axis=1), (v * middle).sum(axis=1), (middle * after).sum(axis=1)]
     square.append((2.0 * (middle * middle).sum(axis=1) + (v * after).sum(axis=1)) / 3.0)

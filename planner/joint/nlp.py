@@ -1,8 +1,8 @@
 """The free optimum inside the tolerance: the motion of the axes itself is what is sought, its path included.
 
-The motion along a run of R legs has N steps of duration h_i and constant jerk j_i (a vector over the axes); nodes between them have
-position p_i, velocity v_i, acceleration a_i. The kinematics are exact, and every programmed vertex has a node. A step is a Bezier cubic
-with the control points
+The motion along a run of R legs has N steps of duration h_i and constant jerk j_i (a vector over the axes);
+nodes between them have position p_i, velocity v_i, acceleration a_i. The kinematics are exact, and every
+programmed vertex has a node. A step is a Bezier cubic with the control points
 
     c0 = p_i,   c1 = p_i + h v_i/3,   c2 = p_{i+1} - h v_{i+1}/3,   c3 = p_{i+1};     s0 <= s1 <= s2 <= s3 their places on the leg.
 
@@ -15,21 +15,23 @@ with the control points
                m (p - V).v <= 0         at a vertex V, with m = 1 where the feed falls and -1 where it rises (rows.py)
                node at a vertex: s = the vertex;     v = a = 0, p = the vertex at both ends.
 
-The smallest |a - u v| over u is the normal acceleration; rows of this kind have good derivatives down to rest, |v x a| <= a_n |v| has
-not. What holds for the control points holds for the whole step: acceleration is linear and velocity a parabola with the Bezier
-ordinates v_i, v_i + a_i h/2, v_{i+1}, so all limits but the normal acceleration hold at every time. The q_k are the control points
-of the leg's own cubic along the places s_k (run.py): P(s_k) on lines, and with the tangents at s0 and s3 on arcs. With the Bernstein
-weights B_k
+The smallest |a - u v| over u is the normal acceleration; rows of this kind have good derivatives down to
+rest, |v x a| <= a_n |v| has not. What holds for the control points holds for the whole step: acceleration is
+linear and velocity a parabola with the Bezier ordinates v_i, v_i + a_i h/2, v_{i+1}, so all limits but the
+normal acceleration hold at every time. The q_k are the control points of the leg's own cubic along the places
+s_k (run.py): P(s_k) on lines, and with the tangents at s0 and s3 on arcs. With the Bernstein weights B_k
 
     |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - q_k| + what the leg is off its cubic
 
-and the place sum B_k s_k never goes back: motion and path are within the budget in the sense of Frechet, which is what the tolerance
+and the place sum B_k s_k never goes back: motion and path are within the budget in the sense of Frechet,
+                                           which is what the tolerance
 asks for: in order, every vertex reached, both sides.
 
-Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and ipopt trickling among them: a
-weak pull of every h to its guess makes it one, `PULL`, and a weak one of every jerk to 0, `SMOOTH`. It is not convex and has no
-certificate: what is found is the best near the guess.
-All quantities are in units in which the mean step of the guess has length 1 and duration 1, so that scaling a job scales its plan.
+Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and
+ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and a weak one of every
+jerk to 0, `SMOOTH`. It is not convex and has no certificate: what is found is the best near the guess. All
+quantities are in units in which the mean step of the guess has length 1 and duration 1, so that scaling a job
+scales its plan.
 """
 
 from __future__ import annotations
@@ -49,28 +51,33 @@ from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
 from planner.joint.state_limits import REST, formula
 
-# Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and saves a third of the
-# iterations on single corners; without it, the pentagon does not converge in 500. 1e-2 costs 5e-4.
+# Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and
+# saves a third of the iterations on single corners; without it, the pentagon does not converge in 500. 1e-2
+# costs 5e-4.
 PULL = 1e-4
-# Weight of the squares of all jerks, as shares of their limits, against the time [-]: where jerk saves next to nothing there is little
-# of it, instead of as much as there may be. On nine jobs 1e-4 costs up to 1e-5 of the time and 1e-3 up to 9e-5; with the first the jerk
-# of the bracket changes half as much in all, that of a circle of chords a twentieth.
+# Weight of the squares of all jerks, as shares of their limits, against the time [-]: where jerk saves next
+# to nothing there is little of it, instead of as much as there may be. On nine jobs 1e-4 costs up to 1e-5 of
+# the time and 1e-3 up to 9e-5; with the first the jerk of the bracket changes half as much in all, that of a
+# circle of chords a twentieth.
 SMOOTH = 3e-4
 # Steps may become this much longer or shorter than they were guessed [-].
 LONGER = 4.0
-# The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the limits hold, and ipopt
-# begins between them with tiny steps. 1.2 settles 7 of the 8 runs tried (single corners, pentagon, arcs, spiral) in 47 to 295
-# iterations, 1.5 the eighth.
+# The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the
+# limits hold, and ipopt begins between them with tiny steps. 1.2 settles 7 of the 8 runs tried (single
+# corners, pentagon, arcs, spiral) in 47 to 295 iterations, 1.5 the eighth.
 SLOWER = (1.2, 1.5, 1.0)
-# Where normal acceleration is limited it is watched at these places of every step [-], and steps become no more than this much longer:
-# with the others' freedom one step reaches round the whole corner, with twice the limit between two places.
+# Where normal acceleration is limited it is watched at these places of every step [-], and steps become no
+# more than this much longer: with the others' freedom one step reaches round the whole corner, with twice the
+# limit between two places.
 WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
-# It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-] does not count.
+# It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-]
+# does not count.
 NOT_SLOWER = 1e-4
-# By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt needs room there.
+# By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt
+# needs room there.
 RELAXED = 1e-6
-# A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a spiral of 100 chords takes
-# 7 s, one of 400 two minutes and 0.44 GB.
+# A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a
+# spiral of 100 chords takes 7 s, one of 400 two minutes and 0.44 GB.
 LEGS_MAX = 500
 
 
@@ -95,7 +102,8 @@ class TubeNLP:
             raise ValueError(f"TubeNLP.tol: {self.tol} must be positive")
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
-        """The best motion near the guess, never slower than it; a failure from every start is the status of the last.
+        """The best motion near the guess, never slower than it; a failure from every start is the status of
+        the last.
 
         Raises InputError if casadi is missing.
         """
@@ -110,15 +118,16 @@ class TubeNLP:
         return replace(found, iterations=iterations, solve_time=took)
 
     def solve_from(self, run: TubeRun, guess: Guess, given: Guess) -> TubeSolution:
-        """Transcribe and solve once, from a guess of the same steps as the one given, to whose durations they are pulled. The whole
-        formulation, from top to bottom."""
+        """Transcribe and solve once, from a guess of the same steps as the one given, to whose durations they
+        are pulled. The whole formulation, from top to bottom."""
         ca = import_needed("casadi", "method tube")
 
         began = time.perf_counter()
         steps, axes, leg = len(guess), len(run.axis), guess.leg
         at_vertex = np.flatnonzero(np.diff(leg)) + 1  # nodes
 
-        # ---- scaling: units in which the mean step has length 1 and duration 1 ---------------------------------------------
+        # ---- scaling: units in which the mean step has length 1 and duration 1
+        # ---------------------------------------------
         second, length = guess.h.mean(), run.offset[-1] / steps
         speed, acc, jerk = length / second, length / second**2, length / second**3
         v_max, a_max, j_max = run.velocity / speed, run.acceleration / acc, run.jerk / jerk
@@ -126,8 +135,9 @@ class TubeNLP:
         watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
         state = np.flatnonzero(np.isfinite(run.state)).tolist()
 
-        # ---- variables, stage by stage: state (p, v, a) and place of a node; jerk, duration and the other places of its step --------
-        # Legs may be a thousand times shorter than others: places, and what orders them, are in units of the mean step of their leg.
+        # ---- variables, stage by stage: state (p, v, a) and place of a node; jerk, duration and the other
+        # places of its step -------- Legs may be a thousand times shorter than others: places, and what
+        # orders them, are in units of the mean step of their leg.
         mean_step = (run.length / np.bincount(leg))[np.append(leg, leg[-1])]
         states, controls = 3 * axes + 1, axes + 4 + watched
         w = ca.MX.sym("w", (states + controls) * steps + states)
@@ -135,19 +145,22 @@ class TubeNLP:
         node, step = stage[:states, :], stage[states:, :]
         after = ca.horzcat(node[:, 1:], w[-states:])
 
-        # ---- objective ------------------------------------------------------------------------------------------------------
+        # ---- objective
+        # ------------------------------------------------------------------------------------------------------
         h_guess = given.h / second
         h_all = step[axes, :]
         merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
         used = step[:axes, :] / ca.repmat(ca.DM(j_max), 1, steps)
         merit += SMOOTH * ca.sum2(ca.sum1(used**2) * ca.DM(h_guess).T)
 
-        # ---- dynamics of one step -------------------------------------------------------------------------------------------
+        # ---- dynamics of one step
+        # -------------------------------------------------------------------------------------------
         p, v, a, j = (ca.SX.sym(name, axes) for name in ("p", "v", "a", "j"))
         places, h = [ca.SX.sym(name) for name in ("s0", "s1", "s2", "s3")], ca.SX.sym("h")
         p1, v1, a1 = p + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j
 
-        # ---- constraints of one step; its numbers are parameters -------------------------------------------------------------
+        # ---- constraints of one step; its numbers are parameters
+        # -------------------------------------------------------------
         base, drift, e1, e2 = (ca.SX.sym(name, axes) for name in ("base", "drift", "e1", "e2"))
         scalars = (
             "begin",
@@ -218,7 +231,8 @@ class TubeNLP:
                 row = [there * (sign * pushed / bound - along_it) / pace for sign in (1.0, -1.0)]
                 rows += [(one, -np.inf, RELAXED) for one in row]
 
-        # ---- constraints of all steps, stage by stage: gaps first -----------------------------------------------------------
+        # ---- constraints of all steps, stage by stage: gaps first
+        # -----------------------------------------------------------
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
         numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
         numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, mean_next)
@@ -236,7 +250,8 @@ class TubeNLP:
         low, high = (np.concatenate([np.full(row[0].numel(), row[k]) for row in rows]) for k in (1, 2))
         row_min, row_max = (np.tile(np.append(np.zeros(states), bound), steps) for bound in (low, high))
 
-        # ---- limits and boundary ----------------------------------------------------------------------------------------------
+        # ---- limits and boundary
+        # ----------------------------------------------------------------------------------------------
         node_max = np.tile(np.concatenate([np.full(axes, np.inf), v_max, a_max, [np.inf]]), (steps + 1, 1))
         node_min = -node_max
         node_min[at_vertex, -1] = node_max[at_vertex, -1] = (run.offset[leg] / mean_step[:-1])[at_vertex]
@@ -253,7 +268,8 @@ class TubeNLP:
             [np.tile(-j_max, (steps, 1)), h_guess / LONGER, np.full((steps, 3 + watched), -np.inf)]
         )
 
-        # ---- initial guess ----------------------------------------------------------------------------------------------------
+        # ---- initial guess
+        # ----------------------------------------------------------------------------------------------------
         p0, v0, a0 = guess.state[:, 0] / length, guess.state[:, 1] / speed, guess.state[:, 2] / acc
         place = np.append(guess.place[:, 0], run.offset[-1]) / mean_step
         node_start = np.column_stack([p0, v0, a0, place])
@@ -266,7 +282,8 @@ class TubeNLP:
             ]
         )
 
-        # ---- solve --------------------------------------------------------------------------------------------------------------
+        # ---- solve
+        # --------------------------------------------------------------------------------------------------------------
         program = {"x": w, "f": merit, "g": constraints}
         sizes = Sizes(steps, states, controls, len(low))
         solver = ca.nlpsol(
@@ -284,7 +301,8 @@ class TubeNLP:
         if status not in SOLVED:
             return TubeSolution(status=status, sentence=sentence, iterations=iterations, solve_time=took)
 
-        # ---- unpack -------------------------------------------------------------------------------------------------------------
+        # ---- unpack
+        # -------------------------------------------------------------------------------------------------------------
         found = x[: (states + controls) * steps].reshape(steps, -1)
         place = np.append(found[:, states - 1], x[-1]) * mean_step
         return TubeSolution(

@@ -15,8 +15,9 @@ ROUNDING = 1e-4
 def step_numbers(
     run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
-    """(N, 5 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its end, its limits; the
-    vertex at the leg's end, and what the feed does where the step ends there (`TubeRun.switch`, over tolerance and pace).
+    """(N, 5 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its
+    end, its limits; the vertex at the leg's end, and what the feed does where the step ends there
+    (`TubeRun.switch`, over tolerance and pace).
 
     mean_step          : (N,) mean length of a step on each step's leg [mm]
     length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
@@ -55,8 +56,8 @@ def step_numbers(
 
 
 def pace(velocity: FloatArray) -> FloatArray:
-    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the normal acceleration have
-    to be as small as the speed.
+    """(N,) speed of each step [mm/s], at most a thousand times below the fastest: near rest the rows of the
+    normal acceleration have to be as small as the speed.
 
     velocity : (N+1, A) at the nodes [mm/s]
     """

@@ -54,8 +54,8 @@ class TubeSolution:
     steps      : the motion, exact and within all limits
     place      : (N+1,) places of the nodes along the run [mm]
     kept       : (N,) steps that stand for the motion of the start, which stays there; None for none
-    price      : (N, 3 A + 5) what the limits of each step cost (price.py) [s], 0 where steps are kept; None where the solver does not
-                 tell
+    price      : (N, 3 A + 5) what the limits of each step cost (price.py) [s], 0 where steps are kept; None
+                 where the solver does not tell
     """
 
     status: Status

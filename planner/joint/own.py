@@ -1,9 +1,11 @@
-"""The free optimum by an own solver: window by window along a run, each by the interior-point method of interior_point.py.
+"""The free optimum by an own solver: window by window along a run, each by the interior-point method of
+interior_point.py.
 
-A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join exactly. The first windows
-lie end to end; those of the second sweep each reach over one join, from inside one window to inside the next, where these have found
-their optimum. Windows of a sweep have no step in common: they are searched side by side, and what they find is the same for any number
-of threads. A window that does not converge, that breaks something when its steps are integrated and looked at exactly (checks.py) is
+A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join
+exactly. The first windows lie end to end; those of the second sweep each reach over one join, from inside one
+window to inside the next, where these have found their optimum. Windows of a sweep have no step in common:
+they are searched side by side, and what they find is the same for any number of threads. A window that does
+not converge, that breaks something when its steps are integrated and looked at exactly (checks.py) is
 divided; what is left of that keeps the motion that the search began with, and is said.
 """
 
@@ -33,25 +35,28 @@ from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.run import TubeRun
 from planner.joint.state_limits import state_shares
 
-# Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that a window which fails is
-# divided into.
+# Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that
+# a window which fails is divided into.
 WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.searched_least
-# A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where it would be.
+# A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where
+# it would be.
 JOIN_WITHIN = SIZES.searched_join
-# What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do not converge with the
-# first do with the second (pentagon on mill), and the other way round. By how much rows may be missed at the end [-]: on some windows
-# with arcs they keep trembling by 1e-5. Where a plan is made otherwise if one window fails there is one try: of 130 random jobs
-# (benchmarks/campaign/jobs.py, effort quick and normal) two were 1.9e-3 and 2.8e-3 slower for it, all took 0.78 of the CPU seconds.
+# What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do
+# not converge with the first do with the second (pentagon on mill), and the other way round. By how much rows
+# may be missed at the end [-]: on some windows with arcs they keep trembling by 1e-5. Where a plan is made
+# otherwise if one window fails there is one try: of 130 random jobs (benchmarks/campaign/jobs.py, effort
+# quick and normal) two were 1.9e-3 and 2.8e-3 slower for it, all took 0.78 of the CPU seconds.
 TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 # The most that rows may be missed by [-].
 MISSED_MOST = max(missed for _, missed in TRIES)
-# Iterations of a window, about, and the share of its work that is told to be done at most before all of it is [-].
+# Iterations of a window, about, and the share of its work that is told to be done at most before all of it is
+# [-].
 USUAL, NEARLY = 25.0, 0.9
 QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
-# Normal acceleration and the state's limits are watched in two places of a step only. Where one is exceeded between them, it is lowered
-# by what it was above, and a little more [-], at most so many times.
+# Normal acceleration and the state's limits are watched in two places of a step only. Where one is exceeded
+# between them, it is lowered by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
@@ -65,11 +70,13 @@ class TubeOwn:
     """Settings of the search.
 
     gap      : complementarity at its end, share of the time [-]
-    divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess need not keep the limits
-               and no part of it is kept: windows may end slower than it, and the search ends at the first one that fails
+    divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess
+               need not keep the limits and no part of it is kept: windows may end slower than it, and the
+               search ends at the first one that fails
     progress : called with the share of the steps that are done [-]
-    least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default, where it does not fall: 31
-               runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times the iterations
+    least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
+               where it does not fall: 31 runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times
+               the iterations
     """
 
     gap: float = 1e-5
@@ -79,7 +86,8 @@ class TubeOwn:
     legs_max: ClassVar[float] = np.inf
 
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
-        """The best motion near the guess, never slower than it. Where no faster one is found its steps are `kept`."""
+        """The best motion near the guess, never slower than it. Where no faster one is found its steps are
+        `kept`."""
         began, search = time.perf_counter(), _Search(self, run, guess)
         search.sweep()
         took = time.perf_counter() - began
@@ -109,7 +117,8 @@ class TubeOwn:
 
 
 class _Count:
-    """Of a window: its steps, whether it was solved at once, iterations so far, that of the present solve, and whether all is over."""
+    """Of a window: its steps, whether it was solved at once, iterations so far, that of the present solve,
+    and whether all is over."""
 
     def __init__(self, steps: int):
         self.steps, self.solved, self.iterations, self.at, self.over = steps, False, 0, np.zeros(1), False
@@ -120,7 +129,8 @@ class _Count:
 
 
 class _Cut:
-    """The steps of a guess (guess.py) while they are searched: arrays that windows write into, each its own steps."""
+    """The steps of a guess (guess.py) while they are searched: arrays that windows write into, each its own
+    steps."""
 
     def __init__(self, guess: Guess):
         self.leg, self.h, self.state, self.place = (
@@ -164,8 +174,8 @@ class _Search:
         )
 
     def _slow(self, nodes: list[int]) -> None:
-        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as narrowed as they may be: no
-        motion keeps them there."""
+        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as
+        narrowed as they may be: no motion keeps them there."""
         run, at = self.run, np.array(nodes, dtype=int)
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
         v, a = state[at, 1], state[at, 2]
@@ -192,8 +202,8 @@ class _Search:
         return np.append(self.guess.place[:, 0], self.run.offset[-1])
 
     def _side_by_side(self, begin: list[int], end: list[int], parts: bool = True) -> None:
-        """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are of no use, the first one
-        that fails ends the search."""
+        """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are
+        of no use, the first one that fails ends the search."""
 
         def improve(lo: int, hi: int, count: _Count) -> None:
             count.solved = self._improve(lo, hi, count, TRIES if parts else TRIES[:1])
@@ -228,8 +238,8 @@ class _Search:
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
     def _improve(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
-        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from what these have found.
-        Whether it did not fail; `count` takes the iterations."""
+        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from
+        what these have found. Whether it did not fail; `count` takes the iterations."""
         if self._improved(lo, hi, count, tries):
             return True
         if hi - lo < 2 * LEAST or not self.settings.divide:
@@ -245,7 +255,8 @@ class _Search:
         return False
 
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
-        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it takes their place."""
+        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
+        takes their place."""
         normal = np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any()
         watched = bool(normal or len(self._keeps.state))
         for prox, missed in tries:
@@ -269,8 +280,9 @@ class _Search:
         return False
 
     def _taken(self, lo: int, hi: int, window: StepWindow, tight: FloatArray) -> bool:
-        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster they take their place.
-        Where a limit that is watched in places only is exceeded between them, `tight` (hi - lo,) grows."""
+        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster
+        they take their place. Where a limit that is watched in places only is exceeded between them, `tight`
+        (hi - lo,) grows."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -313,7 +325,8 @@ def keeps_of(run: TubeRun) -> Keeps:
 
 
 def _strain(run: TubeRun, guess: Guess) -> FloatArray:
-    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each step."""
+    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each
+    step."""
     leg: Array = guess.leg
     p, v, a = (guess.state[:-1, k] for k in range(3))
     far = np.linalg.norm(p - run.points(leg, guess.place[:, 0] - run.offset[leg]), axis=1) / run.room[leg]

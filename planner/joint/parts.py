@@ -1,4 +1,5 @@
-"""The solution along a run as parts of a motion: steps of constant jerk, and between them the start's motion where it stays."""
+"""The solution along a run as parts of a motion: steps of constant jerk, and between them the start's motion
+where it stays."""
 
 from __future__ import annotations
 
@@ -76,7 +77,8 @@ def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun) -> list[Spl
 
 
 def _motion(toolpath: Toolpath, found: FoundRun, lo: int, hi: int) -> AxisMotion:
-    """The steps lo .. hi - 1; before the first one of the run its dwell, and after the last one that at the end of the job."""
+    """The steps lo .. hi - 1; before the first one of the run its dwell, and after the last one that at the
+    end of the job."""
     run, steps, place = found.run, found.steps, found.place
     assert steps is not None
     assert place is not None

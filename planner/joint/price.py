@@ -1,18 +1,21 @@
-"""The prices of limits and tolerance along the free optimum: the multipliers of the search, sorted by what they price.
+"""The prices of limits and tolerance along the free optimum: the multipliers of the search, sorted by what
+they price.
 
-At its end the Lagrangian T + sum z g is stationary in everything but the limits, so that dT/d(ln limit) = sum of z dg/d(ln limit).
-The rows (rows.py) are shares of limits, g = y/limit - 1 of one axis and g = (|y|^2/limit^2 - 1)/2 of a ball. Where z > 0 both are
-0 and have the slope -1: a price is minus a sum of multipliers. Of the feed this lets the radii of its inner rows go with F.
+At its end the Lagrangian T + sum z g is stationary in everything but the limits, so that dT/d(ln limit) = sum
+of z dg/d(ln limit). The rows (rows.py) are shares of limits, g = y/limit - 1 of one axis and g =
+(|y|^2/limit^2 - 1)/2 of a ball. Where z > 0 both are 0 and have the slope -1: a price is minus a sum of
+multipliers. Of the feed this lets the radii of its inner rows go with F.
 
-All limits together fix the time. In k times it, along the same path, velocities are 1/k, accelerations 1/k^2 and jerks 1/k^3 of what
-they were, whence (Euler)
+All limits together fix the time. In k times it, along the same path, velocities are 1/k, accelerations 1/k^2
+and jerks 1/k^3 of what they were, whence (Euler)
 
     sum of velocities and feed  +  2 sum of accelerations and of the normal one  +  3 sum of jerks   =   -T
 
-but for the pull on durations (nlp.py) and the rows in `OTHER`, which are no limits: bounds of durations, the order along the leg, the
-largest length of a step on an arc, the place of a change of the feed.
+but for the pull on durations (nlp.py) and the rows in `OTHER`, which are no limits: bounds of durations, the
+order along the leg, the largest length of a step on an arc, the place of a change of the feed.
 
-The tolerance acts through what eq. (20) leaves of it for the path (run.py): priced is the room of every leg and of every vertex.
+The tolerance acts through what eq. (20) leaves of it for the path (run.py): priced is the room of every leg
+and of every vertex.
 """
 
 from __future__ import annotations
@@ -36,9 +39,10 @@ def columns(axes: int) -> int:
 
 
 def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
-    """(N, 3 A + K + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a window: jerk, acceleration and
-    velocity of each axis, then the feed, the normal acceleration, the K limits of the state, the room of the leg and that of the vertex
-    that the step begins at, and what bounds only the steps themselves."""
+    """(N, 3 A + K + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a
+    window: jerk, acceleration and velocity of each axis, then the feed, the normal acceleration, the K limits
+    of the state, the room of the leg and that of the vertex that the step begins at, and what bounds only the
+    steps themselves."""
     axes = window.limits.box.shape[1]
     box, more = z[:, : 8 * axes].reshape(-1, 4, 2, axes).sum(axis=2), z[:, 8 * axes :]
     at_vertex = window.limits.at_vertex

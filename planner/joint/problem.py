@@ -1,4 +1,5 @@
-"""The problem of a window of steps in numbers: units in which the mean step has length 1 and duration 1, and what every step keeps."""
+"""The problem of a window of steps in numbers: units in which the mean step has length 1 and duration 1, and
+what every step keeps."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from planner.joint.rows import StepLimits
 from planner.joint.run import TubeRun
 from planner.joint.state_limits import ROWS, WORD_ROWS
 
-# Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks stay inside them.
+# Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks
+# stay inside them.
 NARROWED = 2.0
 # Of the largest length of a step on an arc [-]: h (v + a h/2) stands for it, which leaves out h3 j/6.
 STEP_SHARE = 0.95
@@ -87,7 +89,8 @@ def _limits(
     units: tuple[float, float],
     narrow: tuple[float, FloatArray | None],
 ) -> StepLimits:
-    """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed as in `window_of`."""
+    """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed as in
+    `window_of`."""
     second, length = units
     speed, acc, jerk = length / second, length / second**2, length / second**3
     leg = guess.leg[lo:hi]

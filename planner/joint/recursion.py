@@ -4,12 +4,13 @@ Nodes x = (p, v, a), controls u = (j, h), and the gaps r = f(x, u) - x_next of t
 
     p + h v + h2 a/2 + h3 j/6,    v + h a + h2 j/2,    a + h j
 
-with their derivatives A (the same triangle for every axis) and B. With the model 1/2 d'W d + w'd of step i in d = (dx, du), and
-V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the last node,
+with their derivatives A (the same triangle for every axis) and B. With the model 1/2 d'W d + w'd of step i in
+d = (dx, du), and V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the last node,
 
     K = -(W_uu + B'PB)^-1 (W_ux + B'PA),      P_i = W_xx + A'PA + K'(W_ux + B'PA),      lambda = P dx + p.
 
-The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what is missing with every
+The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what
+                                             is missing with every
 step (a method of multipliers).
 
 W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is positive.
@@ -68,8 +69,8 @@ def _times_transposed(M, h, axes, out):
 
 @njit(cache=True, error_model="numpy")
 def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
-    """The recursion into `factor`, with a barrier (curvature.py) and the weights of (dh/limits.h)^2 and of limits.h (j/limit)^2. False
-    where it breaks down."""
+    """The recursion into `factor`, with a barrier (curvature.py) and the weights of (dh/limits.h)^2 and of
+    limits.h (j/limit)^2. False where it breaks down."""
     pull, smooth = weights
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
@@ -205,7 +206,8 @@ def forces(limits, lin, q, pull, smooth, u, w):
 
 @njit(cache=True, error_model="numpy")
 def newton_step(x, u, gap, w, end, factor, step):
-    """The step for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last node."""
+    """The step for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last
+    node."""
     dx, du, after = step
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1

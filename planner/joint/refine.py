@@ -1,8 +1,9 @@
 """A motion that was found in long steps, searched once more in shorter ones.
 
-Most of a search is finding which limit holds where. Long steps tell that in fewer of them, and what they end at is an optimum of the
-shorter ones but for the freedom these have more: each step is divided into equal parts of the same jerk, which is the same motion.
-It tells, too, how much of the tolerance chords and filters take on each leg, so that the motion may use the rest (`reserve_for`).
+Most of a search is finding which limit holds where. Long steps tell that in fewer of them, and what they end
+at is an optimum of the shorter ones but for the freedom these have more: each step is divided into equal
+parts of the same jerk, which is the same motion. It tells, too, how much of the tolerance chords and filters
+take on each leg, so that the motion may use the rest (`reserve_for`).
 """
 
 from __future__ import annotations
@@ -19,14 +20,15 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn, keeps_of
 from planner.joint.run import TubeRun
 
-# Of the normal acceleration that a motion was found to have, what budgets leave room for [-]: with less the search has to hold it down
-# in more places and takes longer, with more the path gets less of the tolerance. And at least, of the largest that the axes give [-].
+# Of the normal acceleration that a motion was found to have, what budgets leave room for [-]: with less the
+# search has to hold it down in more places and takes longer, with more the path gets less of the tolerance.
+# And at least, of the largest that the axes give [-].
 HEADROOM, LEAST = 1.05, 0.05
 
 
 def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) -> FloatArray:
-    """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times its own there and
-    within an interpolation period beside it, as far as chords reach.
+    """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times
+    its own there and within an interpolation period beside it, as far as chords reach.
 
     leg    : (N,) of the steps that were found
     period : of interpolation [s]

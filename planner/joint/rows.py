@@ -1,7 +1,7 @@
 """The inequalities of one step of a motion in time, and what they add to a Newton step (interior_point.py).
 
-A step begins at a node with position p, velocity v, acceleration a, has the jerk j and lasts h. Every row g <= 0 depends on it through
-one vector that is linear in p, v, a and j for a given h,
+A step begins at a node with position p, velocity v, acceleration a, has the jerk j and lasts h. Every row g
+<= 0 depends on it through one vector that is linear in p, v, a and j for a given h,
 
     y = alpha_p p + alpha_v v + alpha_a a + alpha_j j,      dy = alpha . d(p, v, a, j) + e dh,      g = g(y) with dg/dy = n,
 
@@ -20,21 +20,22 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
     p, v             at a vertex               the feed of each leg as far as the motion is nearest to the vertex
     p + h v + h2 a/2 + h3 j/6                  the next node's position, for the tolerance on arcs
 
-The square of the feed has degree 4. With the Bezier ordinates w0, w1, w2 of the velocity its own are w0.w0, w0.w1, (2 w1.w1 + w0.w2)/3,
-w1.w2 and w2.w2; none above the square of the limit F is enough for the whole step, and on a circle at constant feed all are equal.
-w0.w1 = |y|^2 - |a h/4|^2 with y = v + a h/4, so that the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
+The square of the feed has degree 4. With the Bezier ordinates w0, w1, w2 of the velocity its own are w0.w0,
+w0.w1, (2 w1.w1 + w0.w2)/3, w1.w2 and w2.w2; none above the square of the limit F is enough for the whole
+step, and on a circle at constant feed all are equal. w0.w1 = |y|^2 - |a h/4|^2 with y = v + a h/4, so that
+the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
 
-The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the vertex), along which
-n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is convex. On an arc the inner control points
-belong to the tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second vector, p or
-the next node's, through `lin.node`.
+The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the
+vertex), along which n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is
+convex. On an arc the inner control points belong to the tangents at the places of the step's nodes (run.py),
+which move with them: those rows depend on a second vector, p or the next node's, through `lin.node`.
 
-Limits that are functions of velocity and acceleration (state_limits.py) have rows of another kind, with their derivatives by p, v, a, j
-and h, behind all others where a run has such limits.
+Limits that are functions of velocity and acceleration (state_limits.py) have rows of another kind, with their
+derivatives by p, v, a, j and h, behind all others where a run has such limits.
 
-Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place that is nearest to V: with
-m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends on p and, through `lin.node`, on v; its own curvature
-is left out, as that of the kinematics is.
+Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
+that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
+on p and, through `lin.node`, on v; its own curvature is left out, as that of the kinematics is.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ VECTOR_OF_NODE = (
     NEXT,
     V,
 )  # second vectors: of the first and of the second inner control point on arcs, and of `SWITCH`
-# Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before lower), in this order.
+# Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
+# lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
 ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC, SWITCH = range(9, 15)
 MORE_ROWS = 15
@@ -188,7 +190,8 @@ def _put_switch(limits, i, y, vertex, lin):
 
 @njit(cache=True, error_model="numpy")
 def put_rows(legs, limits, x, u, lin):
-    """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the search on arcs begins."""
+    """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the
+    search on arcs begins."""
     N, axes = len(u), u.shape[1] - 1
     y, point = np.empty((VECTORS, axes)), np.empty(axes)
     more = 8 * axes

@@ -1,21 +1,24 @@
-"""The data of the free optimum: a run, the legs of the programmed path between two full stops, with their budgets and limits.
+"""The data of the free optimum: a run, the legs of the programmed path between two full stops, with their
+budgets and limits.
 
-A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length] on it both are
+A leg consists of collinear lines with one feed and one budget, or is an arc. Over the place x in [0, length]
+on it both are
 
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
-with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what is left is for the
-chord error of the interpolation period and for the filters that follow (corners/budget.py, eq. (18)-(20)): at first with the
-largest normal acceleration that the axes can give in any direction, then with little more than what a motion was found to have on the
-leg, which becomes its limit there (`with_reserve`).
+with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what
+is left is for the chord error of the interpolation period and for the filters that follow (corners/budget.py,
+eq. (18)-(20)): at first with the largest normal acceleration that the axes can give in any direction, then
+with little more than what a motion was found to have on the leg, which becomes its limit there
+(`with_reserve`).
 
-A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that meets P(x(t)) at both ends
-with its velocity has the control points
+A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that
+meets P(x(t)) at both ends with its velocity has the control points
 
     P(s0),   P(s0) + (s1 - s0) P'(s0),   P(s3) - (s3 - s2) P'(s3),   P(s3)
 
-and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx. So these are the points that
-the control points of a step belong to; on a line they are the places themselves.
+and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx. So
+these are the points that the control points of a step belong to; on a line they are the places themselves.
 """
 
 from __future__ import annotations
@@ -38,14 +41,16 @@ from planner.geometry.word_feed import ROTARY, goes_by
 from planner.joint.state_limits import bounds_of
 from planner.machine import LINEAR_AXES, Machine
 
-# Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the largest angle that the arc
-# turns by meanwhile [rad], within which tangents tell where a control point belongs.
+# Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the
+# largest angle that the arc turns by meanwhile [rad], within which tangents tell where a control point
+# belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
 ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
 class Budgets(NamedTuple):
-    """The parts of the tolerance that R legs and the R+1 vertices around them may use, eps_ap, and what the rest of it allows."""
+    """The parts of the tolerance that R legs and the R+1 vertices around them may use, eps_ap, and what the
+    rest of it allows."""
 
     leg: FloatArray  # (R,) [mm]
     vertex: FloatArray  # (R+1,) 0 at both ends [mm]
@@ -64,14 +69,15 @@ class TubeRun:
     radius, rate                 : (R,) [mm], [rad/mm]
     curvature                    : (R,) bound of it on the leg [1/mm]
     budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
-    across_max                   : (R,) largest normal acceleration that the rest of the budget and the machine allow [mm/s2]; inf
-                                   where the axes cannot exceed it
+    across_max                   : (R,) largest normal acceleration that the rest of the budget and the
+                                   machine allow [mm/s2]; inf where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes
     state                        : (K,) other limits of velocity and acceleration (state_limits.py)
     linear                       : (A,) 1 for x, y and z, else 0
     reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
-    word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with them, else 0
+    word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with
+                                   them, else 0
     counts                       : (A,) 1 for those axes, else 0
     left                         : why the search cannot look for a motion here, "" if it can
     """
@@ -123,8 +129,8 @@ class TubeRun:
 
     @property
     def step_max(self) -> FloatArray:
-        """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by `ARC_FRACTION` of the budget (module
-        text); inf on lines."""
+        """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by
+        `ARC_FRACTION` of the budget (module text); inf on lines."""
         with np.errstate(divide="ignore"):
             fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
             return np.minimum(fourth**0.25, TURN_MAX / np.abs(self.rate))
@@ -136,14 +142,15 @@ class TubeRun:
 
     @property
     def switch(self) -> FloatArray:
-        """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no motion is so fast."""
+        """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no
+        motion is so fast."""
         feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
         change = np.sign(np.diff(feed, prepend=feed[0]))
         return -np.where(change != 0.0, change, _word_change(self.word))
 
     def word_share(self, leg: Array, velocity: FloatArray) -> FloatArray:
-        """(n,) share of the feed in the axes that F goes by that velocities (n, A) on the legs `leg` (n,) use; 0 where
-        those are all [-]."""
+        """(n,) share of the feed in the axes that F goes by that velocities (n, A) on the legs `leg` (n,)
+        use; 0 where those are all [-]."""
         if not self.word.shape[1]:
             return np.zeros(len(leg))
         return np.asarray(np.linalg.norm(velocity * self.counts, axis=1) / self.word[leg, 0])
@@ -171,7 +178,8 @@ class TubeRun:
 
 
 def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
-    """The runs between full stops, in order. Raises InputError for splines, and if the machine lacks an axis of the toolpath."""
+    """The runs between full stops, in order. Raises InputError for splines, and if the machine lacks an axis
+    of the toolpath."""
     curves = np.flatnonzero(toolpath.curve >= 0)
     if len(curves):
         raise InputError(
@@ -217,9 +225,10 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
 
 
 def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:
-    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why no motion
-    can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so that F is a limit of
-    its own; it has to be of the same axes everywhere, and to change with the feed in all of them."""
+    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why
+    no motion can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so
+    that F is a limit of its own; it has to be of the same axes everywhere, and to change with the feed in all
+    of them."""
     groups, by = feed_groups(toolpath.axes), goes_by(toolpath)[row]
     share = np.where(by == ROTARY, toolpath.radius, 1.0)
     share = share / path_per_length(toolpath.axes, toolpath.radius, toolpath)[row]
@@ -236,7 +245,8 @@ def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]
 
 
 def _word_change(word: FloatArray) -> FloatArray:
-    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for rounding of it."""
+    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for
+    rounding of it."""
     if not word.shape[1]:
         return np.zeros(len(word))
     known = np.where(np.isfinite(word[:, 0]), word[:, 0], np.finfo(np.float64).max)
@@ -249,7 +259,8 @@ def budgets_of(
 ) -> Budgets:
     """The budgets by eq. (18)-(20) for the legs that hold the segments first[r] : first[r+1], first (R+1,).
 
-    reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest that the axes can give
+    reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest
+               that the axes can give
     """
     reachable = normal_anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
@@ -267,7 +278,8 @@ def budgets_of(
 
 
 def with_reserve(run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: FloatArray) -> TubeRun:
-    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg, and no more than that."""
+    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg,
+    and no more than that."""
     budgets = budgets_of(toolpath, machine, run.first, reserved)
     return replace(
         run,
@@ -279,7 +291,8 @@ def with_reserve(run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: F
 
 
 def _edges(toolpath: Toolpath) -> Array:
-    """Joints between legs: those of geometry/legs.py, and where feed or budget, the larger one of its joints', change on a line."""
+    """Joints between legs: those of geometry/legs.py, and where feed or budget, the larger one of its
+    joints', change on a line."""
     budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
     edge = np.zeros(len(toolpath) + 1, dtype=bool)
     edge[legs_of(toolpath).first] = True

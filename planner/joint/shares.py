@@ -1,7 +1,9 @@
 """How much of each limit, and of the tolerance, the steps of a run use: what they are at.
 
-Limits are looked at in the middle of a step: what is at its limit there is so for most of the step, where a mere switch from one limit
-to another is at both for an instant. Of the tolerance it is the nearest control point of the cubic, at a vertex the vertex.
+Limits are looked at in the middle of a step: what is at its limit there is so for most of the step, where a
+                                              mere switch from one limit
+to another is at both for an instant. Of the tolerance it is the nearest control point of the cubic, at a
+vertex the vertex.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place on an arc, from the
 
 
 def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatArray:
-    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal acceleration, the K limits
-    of the state, tolerance.
+    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal
+    acceleration, the K limits of the state, tolerance.
 
     leg   : (N,) of each step
     place : (N+1,) of the nodes along the run [mm]

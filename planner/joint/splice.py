@@ -1,5 +1,5 @@
-"""Parts of several motions, one after the other: each goes from rest to rest, or the next one goes on as it ends, so that nothing jumps
-where they meet."""
+"""Parts of several motions, one after the other: each goes from rest to rest, or the next one goes on as it
+ends, so that nothing jumps where they meet."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ SAME_TIME = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplicedRun:
-    """A motion from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If it is `moving`
-    at its end, the next one begins with the same position, velocity and acceleration."""
+    """A motion from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If
+    it is `moving` at its end, the next one begins with the same position, velocity and acceleration."""
 
     motion: MotionInTime
     begin: float
@@ -68,7 +68,8 @@ class Spliced:
         return np.append(0.0, np.cumsum([s[-1] - s[0] for s in ends]))
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
+        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
+        period."""
         of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
         chunks = []
         # Without times there are the columns of the first run, without rows.

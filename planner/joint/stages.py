@@ -1,7 +1,9 @@
-"""The free optimum's program stage by stage, as fatrop asks for: the variables of a node, then those of its step, then the next node's.
+"""The free optimum's program stage by stage, as fatrop asks for: the variables of a node, then those of its
+step, then the next node's.
 
-Of every stage the constraints are first the gaps of the next node, next - f(stage), then the rows of the step. ipopt does not mind the
-order. Casadi's interface is told the stages: left to find them, it finds wrong ones.
+Of every stage the constraints are first the gaps of the next node, next - f(stage), then the rows of the
+step. ipopt does not mind the order. Casadi's interface is told the stages: left to find them, it finds wrong
+ones.
 """
 
 from __future__ import annotations
@@ -16,13 +18,14 @@ from planner.joint.outcome import BROKE_DOWN, OUTCOMES
 
 # Residual of the rows [-]: what is left is integrated away (joint/motion.py).
 FEASIBILITY = 1e-6
-# Barrier parameter at the beginning [-]; that of ipopt decreases monotonely. Adaptive ones drop early, hug the limits and trickle
-# (pentagon: more than 300 iterations instead of 112).
+# Barrier parameter at the beginning [-]; that of ipopt decreases monotonely. Adaptive ones drop early, hug
+# the limits and trickle (pentagon: more than 300 iterations instead of 112).
 BARRIER = 0.1
-# The search of ipopt may end when the time changes by less than this fraction in each of so many iterations [-], with all rows kept and
-# the complementarity below the last of them [-].
+# The search of ipopt may end when the time changes by less than this fraction in each of so many iterations
+# [-], with all rows kept and the complementarity below the last of them [-].
 SETTLED, SETTLED_ITERATIONS, COMPLEMENTARITY = 1e-7, 4, 1e-7
-# CPU time that ipopt may take for a run [s]. Its iterations do not bound it: one random job of less than 120 steps took 15 minutes.
+# CPU time that ipopt may take for a run [s]. Its iterations do not bound it: one random job of less than 120
+# steps took 15 minutes.
 SECONDS = 300.0
 
 

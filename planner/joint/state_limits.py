@@ -1,28 +1,31 @@
 """Limits of the search that are functions of a motion's velocity v and acceleration a.
 
 The tangential acceleration: |a.t| <= A_t with t = v/|v|, of x, y and z alone. On a step a is linear and v a
-parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at its ends
-e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both sides are
-cubics with the ordinates
+parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. With the directions e0, e1 of the velocity at its
+ends e(q) = (1-q) e0 + q e1 is no longer than 1, so that a.v <= A_t v.e(q) is enough for the whole step. Both
+sides are cubics with the ordinates
 
     a.v     b0.w0,   (b1.w0 + 2 b0.w1)/3,   (2 b1.w1 + b0.w2)/3,   b1.w2
     v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
 
-and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn between
+and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn
+                                             between
 them. (Rows at places instead are made use of between them, by a motion that weaves inside the tolerance.) The
-last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and are
-no rows.
+last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and
+are no rows.
 
-A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the model
-has what is positive of that of the products b.w: without it windows take many more iterations, or do not converge.
+A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the
+model has what is positive of that of the products b.w: without it windows take many more iterations, or do
+not converge.
 
-The feed in the axes that F goes by, where others move with them: |v| <= F in x, y and z (or u, v and w, or the rotary
-axes alone), beside that in all axes of the rows of the feed (rows.py). It has the ordinates of |v|^2 as rows,
+The feed in the axes that F goes by, where others move with them: |v| <= F in x, y and z (or u, v and w, or
+the rotary axes alone), beside that in all axes of the rows of the feed (rows.py). It has the ordinates of
+|v|^2 as rows,
 
     w0.w0 where a leg begins,   w0.w1,   (2 w1.w1 + w0.w2)/3,   w1.w2,   w2.w2,        over F^2, half of it, less 1/2.
 
-Another limit of the first kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of `_ordinates`, `used`
-and `formula`.
+Another limit of the first kind is one of `STATE_LIMITS`, a bound in `bounds_of` and a branch of `_ordinates`,
+`used` and `formula`.
 """
 
 from __future__ import annotations
@@ -55,15 +58,16 @@ REST = 1e-3  # of a step's pace: below that the direction of a velocity counts l
 
 
 def bounds_of(limits: Limits, moves: Array) -> FloatArray:
-    """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that nothing can reach; (0,)
-    where that is so for all of them."""
+    """(K,) bounds of `STATE_LIMITS` on a run on which some of the axes move, `moves` (A,), inf for one that
+    nothing can reach; (0,) where that is so for all of them."""
     reached = np.linalg.norm(limits.acceleration[moves & np.isin(limits.axes, LINEAR_AXES)])
     bounds = np.array([limits.tangential if limits.tangential < reached else np.inf])
     return bounds if np.isfinite(bounds).any() else bounds[:0]
 
 
 def formula(ca: Any, kind: int, w: Any, b: Any, linear: FloatArray, rest: Any) -> list[tuple[Any, Any]]:
-    """Pairs (a.v, v.e) of all four ordinates of a limit of `STATE_LIMITS` in symbols of casadi, given as `ca`.
+    """Pairs (a.v, v.e) of all four ordinates of a limit of `STATE_LIMITS` in symbols of casadi, given as
+    `ca`.
 
     w, b   : ordinates of the velocity (3) and of the acceleration (2) of a step
     linear : (A,) 1 for x, y and z, else 0
@@ -81,8 +85,8 @@ def formula(ca: Any, kind: int, w: Any, b: Any, linear: FloatArray, rest: Any) -
 
 @njit(cache=True, error_model="numpy")
 def _ordinates(x, u, linear, rest, work, value, slope):
-    """The first three ordinates of a.v and of v.e of a step with the node x (3 A,) and the controls u (A+1,), value (2, 3), and their
-    derivatives by p, v, a, j and h, slope (2, 3, 4 A + 1). work (5, A)."""
+    """The first three ordinates of a.v and of v.e of a step with the node x (3 A,) and the controls u (A+1,),
+    value (2, 3), and their derivatives by p, v, a, j and h, slope (2, 3, 4 A + 1). work (5, A)."""
     axes = len(u) - 1
     h, (e0, e1, w0, w1, w2) = u[axes], work
     square0, square1 = rest * rest, rest * rest
@@ -159,8 +163,8 @@ def _put_word_rows(limits, i, x, u, g, out):
 
 @njit(cache=True, error_model="numpy")
 def put_state_rows(limits, i, x, u, g, out):
-    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g (6 K + 5 W,), and their derivatives by p, v, a, j and
-    h into out (6 K + 5 W, 4 A + 1)."""
+    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g (6 K + 5 W,), and their
+    derivatives by p, v, a, j and h into out (6 K + 5 W, 4 A + 1)."""
     axes = len(u) - 1
     if limits.word.shape[1]:
         first = ROWS * limits.state.shape[1]
@@ -181,8 +185,9 @@ def put_state_rows(limits, i, x, u, g, out):
 
 @njit(cache=True, error_model="numpy")
 def add_state_curvature(W, limits, i, x, u, z):
-    """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i across the
-    motion: of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,): multipliers."""
+    """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i
+    across the motion: of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4, the first square. z (6 K,):
+    multipliers."""
     axes = len(u) - 1
     h, w, square = u[axes], np.empty((3, axes)), np.zeros(3)
     first = ROWS * limits.state.shape[1]

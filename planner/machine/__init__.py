@@ -4,8 +4,8 @@
     whole.py    `Machine`, the record of all of them, and its faults in words
     files.py    machine files and built-in machines
 
-Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at `Machine.radius`.
-`planner machine init FILE` writes a template with every key and its unit.
+Files and records are in mm, s and, for rotary axes, degrees; `Machine.limits` returns lengths at
+`Machine.radius`. `planner machine init FILE` writes a template with every key and its unit.
 """
 
 from planner.machine.files import builtin_machines, builtin_text, load_machine, machine_from_dict

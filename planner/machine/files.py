@@ -14,7 +14,8 @@ from planner.base.files import require_ending
 from planner.base.names import known_name
 from planner.machine.whole import Machine
 
-# What settings of a control have and no machine file has: sections of LinuxCNC and Klipper, numbers of grbl, commands of Marlin.
+# What settings of a control have and no machine file has: sections of LinuxCNC and Klipper, numbers of grbl,
+# commands of Marlin.
 _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
@@ -56,7 +57,8 @@ def load_machine(path: str | Path) -> Machine:
 
 
 def machine_from_dict(data: dict[str, Any], *, source: str | None = None) -> Machine:
-    """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at once."""
+    """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at
+    once."""
     try:
         return Machine(**data)
     except InputError as fault:

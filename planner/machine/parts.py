@@ -1,4 +1,5 @@
-"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees. They do not change once they are made."""
+"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees. They do not change once
+they are made."""
 
 from __future__ import annotations
 
@@ -24,14 +25,15 @@ TIMED_BY_NAME = {
     6: "tool_change",
 }  # keys of [times]
 
-# Smallest and largest magnitude of a number of a machine file, in the unit of its key. No machine has any beyond them, and their
-# products and quotients are numbers: third powers of a magnitude beyond 1e100 are not.
+# Smallest and largest magnitude of a number of a machine file, in the unit of its key. No machine has any
+# beyond them, and their products and quotients are numbers: third powers of a magnitude beyond 1e100 are not.
 MAGNITUDE_MIN, MAGNITUDE_MAX = 1e-12, 1e12
-# Smallest tolerance [mm]: 10 nm, finer than a machine follows. The shorter the way through a corner, the shorter the steps in which its
-# feed is sought: `planner plan` takes 1.4 CPU s for two blocks with 1e-5 mm, 28 with 1e-6, and 53 with 1e-7.
+# Smallest tolerance [mm]: 10 nm, finer than a machine follows. The shorter the way through a corner, the
+# shorter the steps in which its feed is sought: `planner plan` takes 1.4 CPU s for two blocks with 1e-5 mm,
+# 28 with 1e-6, and 53 with 1e-7.
 TOLERANCE_MIN = 1e-5
-# Of velocities and accelerations, 1e5 times gravity [mm/s, mm/s2]: how closely the verifier looks between samples, and how long it
-# takes, grows with the acceleration.
+# Of velocities and accelerations, 1e5 times gravity [mm/s, mm/s2]: how closely the verifier looks between
+# samples, and how long it takes, grows with the acceleration.
 AXIS_LIMIT_MAX = 1e9
 
 
@@ -56,7 +58,8 @@ AxisLimit = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_u
 
 
 class Record(BaseModel):
-    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make another record."""
+    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make
+    another record."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
@@ -72,7 +75,8 @@ class Record(BaseModel):
 class Axis(Record):
     """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes.
 
-    wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction (LinuxCNC's WRAPPED_ROTARY)
+    wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction
+              (LinuxCNC's WRAPPED_ROTARY)
     """
 
     velocity: AxisLimit
@@ -84,12 +88,13 @@ class Axis(Record):
 class Fir(Record):
     """Moving averages in series in the drives or in the control, behind the delivered setpoints.
 
-    The motion behind them stays within the tolerance, whatever the method. Filters by which a method makes its setpoints are a setting
-    of that method instead.
+    The motion behind them stays within the tolerance, whatever the method. Filters by which a method makes
+    its setpoints are a setting of that method instead.
 
     time_constants : their lengths [s], any number, in any order
-    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept by methods `optimal` and
-                     `second-order` everywhere and by `bezier` at its corners; the other methods do not use it
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept
+                     by methods `optimal` and `second-order` everywhere and by `bezier` at its corners; the
+                     other methods do not use it
     """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
@@ -104,7 +109,8 @@ class Mode(Record):
 
 
 class Plotter(Record):
-    """How plotter files (HPGL) are read: length of a plotter unit [mm], standstills while the pen or knife goes down and up [s]."""
+    """How plotter files (HPGL) are read: length of a plotter unit [mm], standstills while the pen or knife
+    goes down and up [s]."""
 
     unit: Positive = 0.025
     pen_down: NotNegative = 0.0
@@ -112,7 +118,8 @@ class Plotter(Record):
 
 
 class ToolData(Record):
-    """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42 use [mm]."""
+    """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42
+    use [mm]."""
 
     length: Finite = 0.0
     x: Finite = 0.0
@@ -120,13 +127,15 @@ class ToolData(Record):
 
 
 class Times(Record):
-    """The times of events while the axes stand still, beside dwells [s]; None where it is not known, and left out of totals.
+    """The times of events while the axes stand still, beside dwells [s]; None where it is not known, and left
+    out of totals.
 
     tool_change   : M6, with stopping the spindle, and of plotters another pen
     spindle_start : M3 and M4, until the spindle turns as it should
     spindle_stop  : M5, and the stop before it turns the other way
     m_code        : every other M code that `m_codes` does not name
-    m_codes       : of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a person
+    m_codes       : of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a
+                    person
     """
 
     tool_change: NotNegative | None = None
@@ -150,8 +159,9 @@ class Times(Record):
 
 
 class DialectData(Record):
-    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or None: a whole unit; `lathe`
-    says whether they are a lathe's, or None: their words tell; `inch` whether lengths are inches before the first G20 or G21."""
+    """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or
+    None: a whole unit; `lathe` says whether they are a lathe's, or None: their words tell; `inch` whether
+    lengths are inches before the first G20 or G21."""
 
     least_increment: Positive | None = None
     lathe: bool | None = None
@@ -159,14 +169,16 @@ class DialectData(Record):
 
 
 class ControlData(Record):
-    """The settings of the control's own planner, for predictions of how long it takes (controls/export/models.py); None for its default.
+    """The settings of the control's own planner, for predictions of how long it takes
+    (controls/export/models.py); None for its default.
 
     name                   : of the control; the other keys count for programs that are written for it
     acceleration           : largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204
     square_corner_velocity : of Klipper, speed at a corner of 90 degrees [mm/s]
     minimum_cruise_ratio   : of Klipper [-], the share of the way that is not to be sped up and braked on
     junction_deviation     : of grbl ($11) and Marlin (M205 J) [mm]
-    corner_jump            : of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have [mm/s]
+    corner_jump            : of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have
+                             [mm/s]
     """
 
     name: Literal["grbl", "klipper", "marlin", "reprapfirmware", "linuxcnc"]
@@ -191,10 +203,12 @@ _KEYS = {
 class KinematicsData(Record):
     """How the rotary axes carry the workpiece and the tool; machine/kinematics/chain.py has the formulas.
 
-    type         : "xyzac-trt", "xyzbc-trt" (both axes turn the table), "head-table" (the head tilts, the table turns about z) or
-                   "head-head" (an axis c carries the axis that tilts the tool)
-    x_rot_point, y_rot_point, z_rot_point : point on the axis of c where it turns the table, in machine coordinates [mm]
-    x_offset, y_offset, z_offset : tables: from that point to the tilting axis; heads: from the tilting axis to the tool's axis [mm]
+    type         : "xyzac-trt", "xyzbc-trt" (both axes turn the table), "head-table" (the head tilts, the
+                   table turns about z) or "head-head" (an axis c carries the axis that tilts the tool)
+    x_rot_point, y_rot_point, z_rot_point : point on the axis of c where it turns the table, in machine
+                                            coordinates [mm]
+    x_offset, y_offset, z_offset : tables: from that point to the tilting axis; heads: from the tilting axis
+                                   to the tool's axis [mm]
     pivot_length : heads: from the tilting axis down to the spindle's nose [mm]
     tool_length  : where the program names no tool of another length [mm]
     tilt         : heads: letter of the tilting axis, "a" or "b"

@@ -1,4 +1,5 @@
-"""Limits of one's own: beside the axes' limits, what else of a machine may not be exceeded, as a class of some ten lines.
+"""Limits of one's own: beside the axes' limits, what else of a machine may not be exceeded, as a class of
+some ten lines.
 
     class SpindlePower(PathLimit):
         name = "spindle power"
@@ -13,17 +14,19 @@
         def joint(self, at):                          # any smooth function of the position
             return np.arctan2(at.y, at.x)
 
-`PathLimit` bounds velocity, acceleration and jerk along the path by functions of position and direction; `JointLimit` bounds those of a
-function q of the position, such as a joint of the kinematics that carry the tool. Along a path r(s), with ' for d/ds,
+`PathLimit` bounds velocity, acceleration and jerk along the path by functions of position and direction;
+`JointLimit` bounds those of a function q of the position, such as a joint of the kinematics that carry the
+tool. Along a path r(s), with ' for d/ds,
 
     velocity      q' feed                                       <= velocity
     acceleration  q' u + q'' feed^2                             <= acceleration
     jerk          q' jerk + 3 q'' feed u + q''' feed^3          <= jerk
 
-the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (base/series.py). The length of the path is such a q
-with q' = 1. Between grid points the same measures hold as for the axes: points where the rows are not close to linear and a margin
-(feedrate/sampling/own_rows.py), tightening (planning/optimal/tighten.py). Methods `optimal` and `second-order` plan with these
-limits; the verdict judges the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
+the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (base/series.py). The length of
+the path is such a q with q' = 1. Between grid points the same measures hold as for the axes: points where the
+rows are not close to linear and a margin (feedrate/sampling/own_rows.py), tightening
+(planning/optimal/tighten.py). Methods `optimal` and `second-order` plan with these limits; the verdict judges
+the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
 """
 
 from __future__ import annotations
@@ -44,8 +47,8 @@ AT_REST = 1e-6
 
 
 class Place:
-    """n places on a path: `x`, `y` ... [mm], `direction`, the unit tangent there (n, A), for limits that depend on it, and `block`, the
-    program's block there (n,), where it is known."""
+    """n places on a path: `x`, `y` ... [mm], `direction`, the unit tangent there (n, A), for limits that
+    depend on it, and `block`, the program's block there (n,), where it is known."""
 
     def __init__(
         self,
@@ -118,7 +121,8 @@ class PathLimit:
 
 
 class JointLimit(ABC):
-    """Bounds on velocity, acceleration and jerk of a function of the position; inf for those that are not bounded."""
+    """Bounds on velocity, acceleration and jerk of a function of the position; inf for those that are not
+    bounded."""
 
     name: str = ""
     unit: str = "mm"
@@ -129,8 +133,9 @@ class JointLimit(ABC):
 
     @abstractmethod
     def joint(self, at: Place) -> Any:
-        """q at the places, computed with numpy from `at.x`, `at.y` ...: it is called with arrays, and with their derivatives
-        (base/series.py), so that it may use operators and numpy's functions, but no conditions."""
+        """q at the places, computed with numpy from `at.x`, `at.y` ...: it is called with arrays, and with
+        their derivatives (base/series.py), so that it may use operators and numpy's functions, but no
+        conditions."""
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
         """Largest velocity, acceleration and jerk of q, the same everywhere [`unit`/s, /s2, /s3]."""
@@ -142,7 +147,8 @@ class JointLimit(ABC):
 
 
 class ScaledLimit:
-    """A limit with `factor` times the bounds of one of its quantities ("velocity", "acceleration", "jerk"), else the same."""
+    """A limit with `factor` times the bounds of one of its quantities ("velocity", "acceleration", "jerk"),
+    else the same."""
 
     def __init__(self, limit: OwnLimit, quantity: str, factor: float):
         self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
@@ -183,7 +189,8 @@ def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
 
 
 def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
-    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive, or not one for each place."""
+    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive, or
+    not one for each place."""
     found = np.empty((count, 3))
     for k, bound in enumerate(limit.bounds(at)):
         if np.ndim(bound) and np.shape(bound) != (count,):
@@ -202,8 +209,9 @@ def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
 
 
 def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
-    """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`, 4 arrays (n, A), with
-    respect to whatever they are with respect to. Raises InputError where they are not finite."""
+    """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`,
+    4 arrays (n, A), with respect to whatever they are with respect to. Raises InputError where they are not
+    finite."""
     table = np.stack(motion)
     columns = [Series(table[:, :, k]) for k in range(len(axes))]
     found = limit.value(Place(axes, columns, table[1]))

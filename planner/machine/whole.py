@@ -34,7 +34,8 @@ LINEAR_AXES = ("x", "y", "z")
 ROTARY_AXES = ("a", "b", "c")
 PARALLEL_AXES = ("u", "v", "w")  # linear too, beside x, y and z
 ALL_AXES = LINEAR_AXES + ROTARY_AXES + PARALLEL_AXES
-# Distance from a rotary axis at which turning counts as a length, where the machine says none [mm]: half of a workpiece of 100 mm.
+# Distance from a rotary axis at which turning counts as a length, where the machine says none [mm]: half of a
+# workpiece of 100 mm.
 ROTARY_RADIUS = 50.0
 TANGENTIAL = "tangential"  # what the acceleration of x, y and z together is called: "acceleration.tangential"
 EXTRUDER = "e"  # follows the path, and is no axis of it
@@ -48,9 +49,11 @@ class Machine(Record):
     """A machine. The template explains every key. Raises InputError for all faults at once.
 
     name                : of the machine
-    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm of filament
+    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm
+                          of filament
     dt                  : interpolation period [s]
-    interpolation       : what the machine does between two setpoints: "linear", "cubic" or "hold" (docs/files.md)
+    interpolation       : what the machine does between two setpoints: "linear", "cubic" or "hold"
+                          (docs/files.md)
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
     feed_max            : largest feed along the path [mm/s], or None
@@ -58,10 +61,13 @@ class Machine(Record):
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     tangential_acceleration : largest acceleration along the path, of x, y and z together [mm/s2], or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
-    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is `ROTARY_RADIUS`. A machine
-                          file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
-    macros              : what the control does for an M code or T: the name of its macro, by the code ("M6"), for exports
-    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
+    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is
+                          `ROTARY_RADIUS`. A machine file may say `tolerance_angle` [deg] instead, the angle
+                          that is worth the tolerance
+    macros              : what the control does for an M code or T: the name of its macro, by the code ("M6"),
+                          for exports
+    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not
+                          known
     control             : what is set in the control's own planner, or None: its defaults
     """
 

@@ -4,11 +4,13 @@ On the piece that begins at t_m, with tau = t - t_m, every axis follows
 
     p + v tau + a tau^2/2 + j tau^3/6,
 
-so that position, velocity, acceleration and jerk are exact at any time. Its arc length is not given but measured,
+so that position, velocity, acceleration and jerk are exact at any time. Its arc length is not given but
+measured,
 
     s(t) = integral of |velocity|,
 
-by Gauss quadrature with steps that adapt: the speed is the root of a polynomial of degree 4, a polynomial itself on straight
+by Gauss quadrature with steps that adapt: the speed is the root of a polynomial of degree 4, a polynomial
+                                           itself on straight
 pieces. It has a kink where the motion turns back, hence steps end where an axis does.
 """
 
@@ -24,9 +26,11 @@ from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
 from planner.motion.trajectory import Trajectory
 
-# Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-]; the better one is then good to rounding.
+# Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-]; the better one is
+# then good to rounding.
 QUADRATURE_ROUNDING = 1e-9
-# Smallest step of the quadrature [fraction of the piece]; near a kink it is worth its square of the piece's length.
+# Smallest step of the quadrature [fraction of the piece]; near a kink it is worth its square of the piece's
+# length.
 SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
@@ -34,7 +38,8 @@ GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisMotion:
-    """L pieces of constant jerk over A axes; a standstill is a piece without velocity. After the last piece everything is at rest.
+    """L pieces of constant jerk over A axes; a standstill is a piece without velocity. After the last piece
+    everything is at rest.
 
     axes         : axis letters
     t            : (L,) start of each piece [s], non-decreasing; the first is 0
@@ -81,7 +86,8 @@ class AxisMotion:
         return s
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation period."""
+        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
+        period."""
         rates = self.velocity, self.acceleration, self.jerk
         pieces = self.t, self.position, *rates, self.s, float(self.end)
         columns, s, feed, piece = _sample(pieces, times)
@@ -101,7 +107,8 @@ class AxisMotion:
         )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
-        """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at` (n,) [s], where it rests."""
+        """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at`
+        (n,) [s], where it rests."""
         before = nearest(np.append(self.t, self.end), at)
         place = self.at(self.t[before], 1.0).position  # a piece begins there
         later = np.zeros(len(self) + 1)
@@ -126,7 +133,8 @@ class AxisMotion:
 
 @njit(cache=True, error_model="numpy")
 def _gauss(v, a, j, begin, h):
-    """Arc length over [begin, begin + h] of one piece with velocity v, acceleration a and jerk j (A,) at its start."""
+    """Arc length over [begin, begin + h] of one piece with velocity v, acceleration a and jerk j (A,) at its
+    start."""
     total = 0.0
     for n in range(len(GAUSS_X)):
         tau, speed_sq = begin + h * GAUSS_X[n], 0.0
@@ -180,7 +188,8 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 def _sample(pieces, times):
     """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,).
 
-    pieces : t (L,), position, velocity, acceleration and jerk (L, A) and end of `AxisMotion`, before the end s (L+1,)
+    pieces : t (L,), position, velocity, acceleration and jerk (L, A) and end of `AxisMotion`, before the end
+             s (L+1,)
     """
     t, position, velocity, acceleration, jerk, s, end = pieces
     samples, axes = len(times), position.shape[1]

@@ -14,13 +14,14 @@ from planner.motion.trajectory import Trajectory
 
 
 def joint_setpoints(motion: Trajectory, kinematics: Kinematics) -> Trajectory:
-    """The motion with the joints in place of the tip: positions, velocities, accelerations and jerks; times, path length and feed stay
-    those of the tip. Of a motion that is evaluated on demand they are, too."""
+    """The motion with the joints in place of the tip: positions, velocities, accelerations and jerks; times,
+    path length and feed stay those of the tip. Of a motion that is evaluated on demand they are, too."""
     return _changed(motion, lambda axes, table, radius: joints_along(kinematics, axes, table, radius))
 
 
 def tip_of_setpoints(setpoints: Trajectory, chain: Chain) -> Trajectory:
-    """The motion of the tip that setpoints of the joints carry, with its derivatives: `joint_setpoints` the other way."""
+    """The motion of the tip that setpoints of the joints carry, with its derivatives: `joint_setpoints` the
+    other way."""
     return _changed(setpoints, lambda axes, table, radius: points_along(chain, axes, table, radius))
 
 

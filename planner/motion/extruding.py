@@ -1,12 +1,13 @@
-"""The extruder beside a motion: its place, velocity, acceleration and jerk at any time, from what it does along the path.
+"""The extruder beside a motion: its place, velocity, acceleration and jerk at any time, from what it does
+along the path.
 
-Between two joints with programmed places E0 and E1 (geometry/extrusion.py), which the motion passes at the lengths s0 and s1 of its own
-path, with r = (E1 - E0)/(s1 - s0)
+Between two joints with programmed places E0 and E1 (geometry/extrusion.py), which the motion passes at the
+lengths s0 and s1 of its own path, with r = (E1 - E0)/(s1 - s0)
 
     E = E0 + r (s - s0),      velocity r feed,      acceleration r u,      jerk r d u/dt
 
-with u the acceleration along the path. While the motion rests at a full stop, the moves of the extruder alone follow one another, each
-in seven phases of constant jerk (base/point_to_point.py).
+with u the acceleration along the path. While the motion rests at a full stop, the moves of the extruder alone
+follow one another, each in seven phases of constant jerk (base/point_to_point.py).
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ AT_JOINT = 1e-9
 
 
 class _Passed(NamedTuple):
-    """Of the K joints of an extrusion: the length that is run when the motion passes them (K,) [mm], and when it arrives there and
-    leaves (K,) [s]."""
+    """Of the K joints of an extrusion: the length that is run when the motion passes them (K,) [mm], and when
+    it arrives there and leaves (K,) [s]."""
 
     s: FloatArray
     arrival: FloatArray
@@ -39,8 +40,8 @@ class _Passed(NamedTuple):
 
 
 class _Alone(NamedTuple):
-    """The P moves alone: begin and end (P,) [s], index of the joint (P,), and at the start of each phase its time (P, 7) [s], place,
-    velocity and acceleration (P, 7, 3), and its jerk (P, 7)."""
+    """The P moves alone: begin and end (P,) [s], index of the joint (P,), and at the start of each phase its
+    time (P, 7) [s], place, velocity and acceleration (P, 7, 3), and its jerk (P, 7)."""
 
     begin: FloatArray
     end: FloatArray

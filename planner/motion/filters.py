@@ -1,24 +1,27 @@
-"""FIR filters: moving averages in series, what they make of a velocity pulse, and how long they should be (paper 000, eq. 1-10).
+"""FIR filters: moving averages in series, what they make of a velocity pulse, and how long they should be
+(paper 000, eq. 1-10).
 
-A moving average of length T has unit area; n of them in series have the kernel h = m_1 * ... * m_n on [0, Td], Td = sum T_i.
-With S = integral of h and R = integral of S (step and ramp response), a pulse of length L and speed V, Tv = L/V, that starts at
-t = 0 leaves the filters as the velocity
+A moving average of length T has unit area; n of them in series have the kernel h = m_1 * ... * m_n on [0,
+Td], Td = sum T_i. With S = integral of h and R = integral of S (step and ramp response), a pulse of length L
+and speed V, Tv = L/V, that starts at t = 0 leaves the filters as the velocity
 
     V [S(t) - S(t - Tv)]                                                            for every Tv > 0     (eq. 5 holds for Tv >= Td)
 
-All three are piecewise polynomials; with the sums T_s of all subsets s of the lengths, and m = 1, 2, 3 for h, S, R,
+All three are piecewise polynomials; with the sums T_s of all subsets s of the lengths, and m = 1, 2, 3 for h,
+S, R,
 
     (1 / (T_1 ... T_n)) sum_s (-1)^|s| (t - T_s)_+^(n + m - 2) / (n + m - 2)!
 
 used up to the middle, where little cancels, and mirrored beyond: h(t) = h(Td - t), S(t) + S(Td - t) = 1,
 R(t) = t - Td/2 + R(Td - t). Delay of the mean Td/2, variance sum T_i^2 / 12.
 
-In the frequency domain |M(w)| = prod |sin(w T_i / 2) / (w T_i / 2)| (eq. 8, 9: with absolute values, or the product would be
-negative where an odd number of factors is). The acceleration of a full move of speed V is V [delta(t) - delta(t - Tv)] before the
-filters, a Dirac impulse at each end (eq. 6), of spectrum V |1 - exp(-i w Tv)| |M(w)| after them.
+In the frequency domain |M(w)| = prod |sin(w T_i / 2) / (w T_i / 2)| (eq. 8, 9: with absolute values, or the
+product would be negative where an odd number of factors is). The acceleration of a full move of speed V is V
+[delta(t) - delta(t - Tv)] before the filters, a Dirac impulse at each end (eq. 6), of spectrum V |1 - exp(-i
+w Tv)| |M(w)| after them.
 
-M is zero at w_r for T = k 2 pi / w_r (eq. 10). A mode with damping ratio z rings at w_d = w_r sqrt(1 - z^2); what then remains of it
-is |M| at its pole -z w_r + i w_d, about z for small z.
+M is zero at w_r for T = k 2 pi / w_r (eq. 10). A mode with damping ratio z rings at w_d = w_r sqrt(1 - z^2);
+what then remains of it is |M| at its pole -z w_r + i w_d, about z for small z.
 """
 
 from __future__ import annotations
@@ -32,7 +35,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 
-# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this fraction of a period [-].
+# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this
+# fraction of a period [-].
 PERIOD_ROUNDING = 1e-9
 
 
@@ -76,7 +80,8 @@ class Filters:
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, and its general form for Tv < Td).
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, and its general form
+        for Tv < Td).
 
         speed    : V [mm/s]
         duration : Tv [s], any
@@ -89,7 +94,8 @@ class Filters:
         return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
 
     def residue(self, frequency: float, damping: float) -> float:
-        """Fraction of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its pole [-]."""
+        """Fraction of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its
+        pole [-]."""
         w = 2.0 * np.pi * frequency
         pole = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
         return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))
@@ -125,7 +131,8 @@ def lengths_from_limits(V: FloatArray, A: FloatArray, J: FloatArray) -> tuple[Fl
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the least sum of both.
+    """T1 >= T2 (S,) [s] lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the
+    least sum of both.
 
     With one mode one filter is made a multiple of its period, the other stays as it is.
 

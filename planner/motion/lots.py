@@ -1,10 +1,12 @@
 """A motion along a path at given times, in lots of `LANES` samples.
 
-What is done for every sample is the same: the time law gives the arc length s, the polynomial of the grid interval there (sampling.py)
-the parameter w, and the polynomials of the span the place and its derivatives. So the samples of a lot lie side by side, quantity Q
-of sample o at Q + o, and several are done in one instruction; each has its own copy of the coefficients, so that it does not matter
-how many samples an interval has. Straight legs are spans of degree one. Samples on arcs and corners, and those whose polynomial is too
-far off for one step, are evaluated one by one (`place_of`). A sample's value does not depend on the others of its lot.
+What is done for every sample is the same: the time law gives the arc length s, the polynomial of the grid
+                                           interval there (sampling.py)
+the parameter w, and the polynomials of the span the place and its derivatives. So the samples of a lot lie
+side by side, quantity Q of sample o at Q + o, and several are done in one instruction; each has its own copy
+of the coefficients, so that it does not matter how many samples an interval has. Straight legs are spans of
+degree one. Samples on arcs and corners, and those whose polynomial is too far off for one step, are evaluated
+one by one (`place_of`). A sample's value does not depend on the others of its lot.
 """
 
 from __future__ import annotations
@@ -22,14 +24,16 @@ from planner.motion.sampling import COEFFICIENTS, LENGTH_ROUNDING, ONE_STEP, int
 
 LANES = 16  # samples of a lot: a multiple of the 4 or 8 doubles that one instruction takes
 
-# Of each sample: share q of its interval; w0, w1 - w0 and length of the interval; parameter; speed, acceleration and jerk along the
-# path; sums over the nodes of Gauss' rule and over the axes. And the polynomial of its interval, as `inverses` has it.
+# Of each sample: share q of its interval; w0, w1 - w0 and length of the interval; parameter; speed,
+# acceleration and jerk along the path; sums over the nodes of Gauss' rule and over the axes. And the
+# polynomial of its interval, as `inverses` has it.
 Q, W0, DW, LENGTH, W, SPEED, ALONG, JERK, TOTAL, SQUARE, SECOND, THIRD, TAU, PER = (
     k * LANES for k in range(14)
 )
 LANE = 14 * LANES
 INVERSE = COEFFICIENTS * LANES
-# Of each sample and axis: coefficients of the span; place and derivatives, which become velocity, acceleration and jerk.
+# Of each sample and axis: coefficients of the span; place and derivatives, which become velocity,
+# acceleration and jerk.
 GIVEN = (DEGREE + 1) * LANES
 PLACE, FIRST, BEND, TWIST = (k * LANES for k in range(4))
 MADE = 4 * LANES
@@ -46,7 +50,8 @@ class _Lot(NamedTuple):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _coefficients(table, element, given, o):
-    """The coefficients of a span or a straight leg, into lane o of given (A, GIVEN); False for other elements."""
+    """The coefficients of a span or a straight leg, into lane o of given (A, GIVEN); False for other
+    elements."""
     legs, _, spans = table
     if element >= len(legs):
         c = spans[element - len(legs)].coef
@@ -65,7 +70,8 @@ def _coefficients(table, element, given, o):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _parameters(lot):
-    """The parameter w of each sample by the polynomial of its interval, and where that is off a step by its slope."""
+    """The parameter w of each sample by the polynomial of its interval, and where that is off a step by its
+    slope."""
     lane, c = lot.lane, lot.inverse
     for o in range(LANES):
         q = lane[Q + o]
@@ -95,7 +101,8 @@ def _parameters(lot):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _lengths(lot):
-    """Mean speed |B'| of each sample's curve from the start of its interval to w, by Gauss' rule, into `TOTAL`."""
+    """Mean speed |B'| of each sample's curve from the start of its interval to w, by Gauss' rule, into
+    `TOTAL`."""
     lane, given = lot.lane, lot.given
     for o in range(LANES):
         lane[TOTAL + o] = 0.0
@@ -133,7 +140,8 @@ def _places(lot):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _in_time(lot):
-    """From w-derivatives to derivatives by arc length (corners/elements.py), and to those in time (timing.py)."""
+    """From w-derivatives to derivatives by arc length (corners/elements.py), and to those in time
+    (timing.py)."""
     lane, axes = lot.lane, lot.made.shape[0]
     for o in range(LANES):
         lane[SQUARE + o] = 0.0
@@ -176,8 +184,8 @@ def _in_time(lot):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def sample(table, law, grid, inverse, times, axes):
-    """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that each lies at; an interval
-    of a span may cover several.
+    """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that
+    each lies at; an interval of a span may cover several.
 
     table, grid : `ElementTable` (corners/elements.py), `Grid` (sampling.py)
     law         : `TimeLaw.columns`

@@ -1,7 +1,8 @@
 """Trajectories of long motions: samples that are evaluated when they are asked for.
 
-What goes through all samples (the verifier, the files) takes them chunk by chunk (`Trajectory.chunks`); the same chunk gives the same
-bytes each time. Whoever asks for a whole column gets all of them, kept from then on.
+What goes through all samples (the verifier, the files) takes them chunk by chunk (`Trajectory.chunks`); the
+same chunk gives the same bytes each time. Whoever asks for a whole column gets all of them, kept from then
+on.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ class _AnyMotion(Protocol):
 
 
 class TrajectoryOnDemand(Trajectory):
-    """A `Trajectory` with the columns of a motion at 0, dt, 2 dt, ... and at its end, evaluated when they are asked for."""
+    """A `Trajectory` with the columns of a motion at 0, dt, 2 dt, ... and at its end, evaluated when they are
+    asked for."""
 
     def __new__(cls, *given: Any, **fields: Any) -> Any:
         """With the fields of a `Trajectory`, as from `dataclasses.replace`, such a one."""
@@ -51,11 +53,13 @@ class TrajectoryOnDemand(Trajectory):
         return float(self._motion.end)
 
     def at_places(self, first: Array, block: Array, line: Array) -> TrajectoryOnDemand:
-        """The same with other blocks and lines: sample first[n] is the first of those at block[n], line[n] (R,)."""
+        """The same with other blocks and lines: sample first[n] is the first of those at block[n], line[n]
+        (R,)."""
         return TrajectoryOnDemand(self._motion, self.dt, len(self), _Places(first, block, line))
 
     def heard_by(self, take: Callable[[Trajectory], object]) -> TrajectoryOnDemand:
-        """The same; whoever first goes through its chunks lets `take` have them too, so that they are evaluated once for both."""
+        """The same; whoever first goes through its chunks lets `take` have them too, so that they are
+        evaluated once for both."""
         heard = TrajectoryOnDemand(self._motion, self.dt, len(self), self._places)
         object.__setattr__(heard, "_take", take)
         return heard
@@ -117,7 +121,8 @@ class _Changed:
 
 
 class _Places:
-    """Blocks and lines of samples: those from first[n] on, up to the next one, are at block[n] and line[n] (R,)."""
+    """Blocks and lines of samples: those from first[n] on, up to the next one, are at block[n] and line[n]
+    (R,)."""
 
     def __init__(self, first: Array, block: Array, line: Array):
         self.first, self.block, self.line = first, block, line

@@ -1,17 +1,18 @@
 """Step and direction pulses of a trajectory (paper 003's synchronisation of axes, corrected).
 
-Every axis counts its own pulses. Between two samples its position is the cubic with the samples' positions and velocities, which is
-the motion itself wherever the jerk is constant over the period. With the resolution K [pulses per mm] and the counter c, both relative
-to the start, a pulse is sent at the moment at which
+Every axis counts its own pulses. Between two samples its position is the cubic with the samples' positions
+and velocities, which is the motion itself wherever the jerk is constant over the period. With the resolution
+K [pulses per mm] and the counter c, both relative to the start, a pulse is sent at the moment at which
 
     K x(t) = c + 1/2 + H   (up)        K x(t) = c - 1/2 - H   (down),
 
-so that |K x(t) - c| <= 1/2 + H < 1 at every instant, on all axes, however long the job is: what a period leaves over stays in the
-position and is never added up. The numbers of pulses per period are n_k = c_k - c_{k-1}. H keeps an axis that stands on the edge
-between two counts from sending pulses up and down.
+so that |K x(t) - c| <= 1/2 + H < 1 at every instant, on all axes, however long the job is: what a period
+leaves over stays in the position and is never added up. The numbers of pulses per period are n_k = c_k -
+c_{k-1}. H keeps an axis that stands on the edge between two counts from sending pulses up and down.
 
-The paper floors the long axis' pulses, n'_x = floor(T V_x), and carries the short axis' remainder as a time (eq. (10)-(12)): the first
-loses up to a pulse per period, the second drifts when the speed changes (benchmarks/solvers/pulse_variants.py).
+The paper floors the long axis' pulses, n'_x = floor(T V_x), and carries the short axis' remainder as a time
+(eq. (10)-(12)): the first loses up to a pulse per period, the second drifts when the speed changes
+(benchmarks/solvers/pulse_variants.py).
 """
 
 from __future__ import annotations
@@ -85,7 +86,8 @@ class Drive:
     """The limits of the drives' inputs.
 
     frequency_max : pulses per second [Hz]; None for no limit
-    width         : shortest time that the step signal has to be high, and low, for each pulse [s]; None for no limit
+    width         : shortest time that the step signal has to be high, and low, for each pulse [s]; None for
+                    no limit
 
     Raises InputError unless they are positive and finite.
     """
@@ -108,8 +110,8 @@ class Drive:
 def pulses_of(trajectory: Trajectory, steps: dict[str, float]) -> tuple[AxisPulses, ...]:
     """The pulses of every axis in `steps` [per mm, rotary axes per degree], in the trajectory's order.
 
-    Raises InputError for a resolution that is not positive, an axis that the trajectory lacks, an axis that moves without having a
-    resolution, and for more than `PULSES_MAX` pulses.
+    Raises InputError for a resolution that is not positive, an axis that the trajectory lacks, an axis that
+    moves without having a resolution, and for more than `PULSES_MAX` pulses.
     """
     _check(trajectory, steps)
     return tuple(
@@ -184,7 +186,8 @@ def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
 
 @njit(cache=True, error_model="numpy")
 def _count(t, place, rate, per_period, number, time, direction):
-    """Count the pulses of an axis at `place` with `rate` (T,) [pulses, pulses/s], and write them as far as there is room."""
+    """Count the pulses of an axis at `place` with `rate` (T,) [pulses, pulses/s], and write them as far as
+    there is room."""
     n, counter = 0, 0
     ends = np.empty(4)
     for k in range(len(t) - 1):
@@ -211,7 +214,8 @@ def _count(t, place, rate, per_period, number, time, direction):
 
 @njit(cache=True, error_model="numpy")
 def _cubic(moved, v0, v1):
-    """Coefficients a, b, c of a q^3 + b q^2 + c q on [0, 1] with the value `moved` at 1 and the slopes v0, v1 at the ends."""
+    """Coefficients a, b, c of a q^3 + b q^2 + c q on [0, 1] with the value `moved` at 1 and the slopes v0, v1
+    at the ends."""
     return v0 + v1 - 2.0 * moved, 3.0 * moved - 2.0 * v0 - v1, v0
 
 
@@ -223,7 +227,8 @@ def _value(a, b, c, q):
 
 @njit(cache=True, error_model="numpy")
 def _monotone(a, b, c, ends):
-    """Cut [0, 1] where the slope 3a q^2 + 2b q + c changes its sign; writes the ends (4,), returns how many branches there are."""
+    """Cut [0, 1] where the slope 3a q^2 + 2b q + c changes its sign; writes the ends (4,), returns how many
+    branches there are."""
     ends[0], branches = 0.0, 0
     square = b * b - 3.0 * a * c
     if square > 0.0:

@@ -1,16 +1,18 @@
 """The kernels behind motion/timing.py: a motion along a path at given times.
 
-A time gives an arc length s by the time law; the place on the path is the parameter w of the grid interval there. On curves w(s) has
-no closed form. `inverses` makes one polynomial for each interval, once for all looks at the motions on a grid. With
-q = (s - s0)/h and W = (w - w0)/(w1 - w0) it matches W and three derivatives at both ends: with the speed S = |B'(w)| of the curve
+A time gives an arc length s by the time law; the place on the path is the parameter w of the grid interval
+there. On curves w(s) has no closed form. `inverses` makes one polynomial for each interval, once for all
+looks at the motions on a grid. With q = (s - s0)/h and W = (w - w0)/(w1 - w0) it matches W and three
+derivatives at both ends: with the speed S = |B'(w)| of the curve
 
     dw/ds = 1/S,     d2w/ds2 = -S'/S^3,     d3w/ds3 = (3 S'^2 - S S'')/S^5,
     S' = B'.B''/S,     S'' = (B''.B'' + B'.B''' - S'^2)/S.
 
-How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule; where it is, a polynomial
-q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what is left is measured between these
-places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step from there by the slope of the polynomial, and where that
-is not enough, steps by the curve itself (`_refine`). The samples themselves are in lots.py.
+How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule; where it is, a
+polynomial q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what
+is left is measured between these places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step
+from there by the slope of the polynomial, and where that is not enough, steps by the curve itself
+(`_refine`). The samples themselves are in lots.py.
 """
 
 from __future__ import annotations
@@ -33,25 +35,26 @@ from planner.corners.elements import (
 )
 from planner.geometry.spline import DEGREE
 
-# Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of coordinates, so that
-# accelerations by differences of nearby positions are as good as the columns.
+# Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of
+# coordinates, so that accelerations by differences of nearby positions are as good as the columns.
 LENGTH_ROUNDING = 1e-13
-# The polynomial's slope is off by at most 14 times what its values are off by [share of the interval]: the shape of their error,
-# q^4 (1-q)^4 (q - 1/4) (q - 1/2) (q - 3/4), is nowhere steeper. Where they are off by less than this, a step by its slope leaves less
-# than `LENGTH_ROUNDING`.
+# The polynomial's slope is off by at most 14 times what its values are off by [share of the interval]: the
+# shape of their error, q^4 (1-q)^4 (q - 1/4) (q - 1/2) (q - 3/4), is nowhere steeper. Where they are off by
+# less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
 ONE_STEP = 8e-8
 S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
 COEFFICIENTS = 11  # of an interval's polynomial, with how far it is off
 POINTS_SHARED = SIZES.intervals_shared
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
-# A step leaves about the cube of the miss, so that below this share of the interval no further check is needed [-].
+# A step leaves about the cube of the miss, so that below this share of the interval no further check is
+# needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
 
 
 class Grid(NamedTuple):
-    """The fields of `PathSamples` that say where its intervals are on the elements of the path; and where its joints are on the
-    programmed one."""
+    """The fields of `PathSamples` that say where its intervals are on the elements of the path; and where its
+    joints are on the programmed one."""
 
     piece: Array
     s: FloatArray
@@ -73,8 +76,8 @@ class _Interval(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """Room to evaluate an interval in: coefficients of its span (6, A) and of the derivatives (5, A), (4, A), (3, A) of that;
-    work (2, 4, A), speed (8,)."""
+    """Room to evaluate an interval in: coefficients of its span (6, A) and of the derivatives (5, A), (4, A),
+    (3, A) of that; work (2, 4, A), speed (8,)."""
 
     coef: FloatArray
     first: FloatArray
@@ -164,8 +167,8 @@ def _inverses(table, grid, axes, first, beyond, found):
 
 
 def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
-    """(P, C) for the interval to the right of each point: how far the polynomial is off [share of the interval],
-    c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces.
+    """(P, C) for the interval to the right of each point: how far the polynomial is off [share of the
+    interval], c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces.
 
     grid : P points over so many axes; C = `COEFFICIENTS`
     """
@@ -221,7 +224,8 @@ def _invert(table, on, room, out, c):
 
 @njit(cache=True, error_model="numpy")
 def _off(table, on, room, out, c, shares):
-    """How far the polynomial's arc length is off at three shares of the interval [share of it]; inf where it leaves the interval."""
+    """How far the polynomial's arc length is off at three shares of the interval [share of it]; inf where it
+    leaves the interval."""
     first, second, third = np.inf, np.inf, np.inf
     for n in range(3):
         q = shares[n]
@@ -273,8 +277,9 @@ def _parameter(table, on, room, c, ds, out):
 
 @njit(cache=True, error_model="numpy")
 def _refine(table, on, room, w, ds, out):
-    """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order, and halves of what encloses
-    the solution where that leads outside it (where an interval is a whole span it may)."""
+    """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order,
+    and halves of what encloses the solution where that leads outside it (where an interval is a whole span it
+    may)."""
     w0, w1, h = on.w0, on.w1, on.h
     low, high = w0, w1
     w = min(max(w, w0), w1)
@@ -303,8 +308,8 @@ def _refine(table, on, room, w, ds, out):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def place_of(table, on, room, c, ds, out):
-    """Place and w-derivatives at the arc length ds into an interval, into out (4, A), from its polynomial c; returns the parameter
-    w there."""
+    """Place and w-derivatives at the arc length ds into an interval, into out (4, A), from its polynomial c;
+    returns the parameter w there."""
     w = _parameter(table, on, room, c, ds, out)
     _point(table, on, room, w, out)
     return w

@@ -1,22 +1,23 @@
 """Input shaping: setpoints that leave no vibration behind.
 
-A mode of frequency w and damping ratio z that is shaken by p(t) rings on after the end with an amplitude that is proportional to
+A mode of frequency w and damping ratio z that is shaken by p(t) rings on after the end with an amplitude that
+is proportional to
 |integral of p''(t) exp(-P t) dt|, P = -z w + i w sqrt(1 - z^2). Instead of p a machine can be given a mean of delayed copies,
 
     D(t) = sum_i A_i p(t - t_i),      A_i > 0,  sum A_i = 1,
 
-whose ringing is that of p times |sum_i A_i exp(-P t_i)|. Two copies suffice for one mode (the zero-vibration shaper, Singer and
-Seering 1990, doi 10.1115/1.2894142): half a damped period apart,
+whose ringing is that of p times |sum_i A_i exp(-P t_i)|. Two copies suffice for one mode (the zero-vibration
+shaper, Singer and Seering 1990, doi 10.1115/1.2894142): half a damped period apart,
 
     t = 0, pi / (w sqrt(1 - z^2)),      A = 1/(1+K), K/(1+K),      K = exp(-z pi / sqrt(1 - z^2)),
 
-they cancel each other exactly. Shapers in series, one per mode, are the products of their copies. The moving average of paper 000,
-eq. 10, T = 2 pi/w, is this shaper and a moving average of T/2 in series: it has the same zero, twice the delay and 4/3 of the variance,
-to which the error on curves is proportional.
+they cancel each other exactly. Shapers in series, one per mode, are the products of their copies. The moving
+average of paper 000, eq. 10, T = 2 pi/w, is this shaper and a moving average of T/2 in series: it has the
+same zero, twice the delay and 4/3 of the variance, to which the error on curves is proportional.
 
-D keeps every limit that p keeps, since it is a mean of such motions, and it may keep limits that p exceeds: of two copies half a period
-apart only one may be accelerating. It leaves the path of p by up to (1/2) max|p''| sum_i A_i (t_i - t_mean)^2, which is for the planner
-to keep within the tolerance.
+D keeps every limit that p keeps, since it is a mean of such motions, and it may keep limits that p exceeds:
+of two copies half a period apart only one may be accelerating. It leaves the path of p by up to (1/2)
+max|p''| sum_i A_i (t_i - t_mean)^2, which is for the planner to keep within the tolerance.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ class Shaper:
 
     @property
     def variance(self) -> float:
-        """Of the delays [s2]: half of it times an acceleration is about how far the shaped motion is from the path [mm]."""
+        """Of the delays [s2]: half of it times an acceleration is about how far the shaped motion is from the
+        path [mm]."""
         return float(self.weight @ (self.delay - self.middle) ** 2)
 
     def remains(self, mode: Mode) -> float:
@@ -74,7 +76,8 @@ class Shaper:
 
 
 def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
-    """The zero-vibration shaper of all modes (Singer and Seering 1990): 2^n copies for n modes; one copy without any."""
+    """The zero-vibration shaper of all modes (Singer and Seering 1990): 2^n copies for n modes; one copy
+    without any."""
     delay, weight = np.zeros(1), np.ones(1)
     for mode in modes:
         half = 0.5 * damped_period(mode.frequency, mode.damping)
@@ -87,7 +90,8 @@ def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
 
 @dataclass(frozen=True, eq=False)
 class ShapedMotion:
-    """A motion given to a shaper, from which comes the motion that is delivered; before and after, the motion rests."""
+    """A motion given to a shaper, from which comes the motion that is delivered; before and after, the motion
+    rests."""
 
     motion: MotionInTime
     shaper: Shaper
@@ -104,7 +108,8 @@ class ShapedMotion:
         return self.motion.end + self.shaper.length
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The mean of the copies at ascending times (T,) [s]; block and line are those at the mean delay, s and feed means as well."""
+        """The mean of the copies at ascending times (T,) [s]; block and line are those at the mean delay, s
+        and feed means as well."""
         place = times - np.append(self.shaper.delay, self.shaper.middle)[:, None]
         at_rest = (place <= 0.0) | (place >= self.motion.end)
         # two times next to each other may be one after a delay was subtracted
@@ -125,5 +130,6 @@ class ShapedMotion:
         )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
-        """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at` (n,) [s]."""
+        """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at`
+        (n,) [s]."""
         return ShapedMotion(self.motion.waiting(at - self.shaper.length, by), self.shaper)

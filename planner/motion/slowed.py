@@ -4,24 +4,30 @@ With theta the time of the motion q as it was and tau the time in which it is ru
 
     dtau/dtheta = p(theta) = 1 + sum_i d_i phi(x_i),     phi(x) = (1 + x) e^-x,
 
-x_i the distance in theta from the place i, in units of its reach w_i, 0 inside. With r = dtheta/dtau = 1/p the motion has
+x_i the distance in theta from the place i, in units of its reach w_i, 0 inside. With r = dtheta/dtau = 1/p
+the motion has
 
     velocity      q' r
     acceleration  q'' r^2 + q' r_1,                       r_1 = dr/dtau   = -p'/p^3
     jerk          q''' r^3 + 3 q'' r r_1 + q' r_2,        r_2 = d2r/dtau2 = (3 p'^2 - p p'')/p^5
 
-What is across the path, the normal acceleration, gets r^2 of itself, and the feed r. **A motion that keeps limits V, A, J of an axis,
-and is nowhere faster on it than v, keeps them at the new pace too, if the reach is long enough:**
+What is across the path, the normal acceleration, gets r^2 of itself, and the feed r. **A motion that keeps
+limits V, A, J of an axis, and is nowhere faster on it than v, keeps them at the new pace too, if the reach is
+long enough:**
 
     w >= v / (2 A),      w >= (A + sqrt(A^2 + (16/9) v J)) / (2 J).
 
-Proof: |phi'| <= phi and |phi''| <= phi, so that with u = p - 1 both |p'| <= u/w and |p''| <= u/w^2, of the sum over places too. The
-acceleration is at most A/p^2 + v u/(w p^3), which is A or less if v/w <= A p (p + 1), and p >= 1. The jerk is at most
-J/p^3 + 3 A u/(w p^4) + v (3 u^2 + p u)/(w^2 p^5), which is J or less if 3 A/(w p) + v (3 u + p)/(w p)^2 <= J (p^2 + p + 1). The right
-side is 3 J or more, and (3 u + p)/p^2 = (4 p - 3)/p^2 <= 4/3. So room is needed nowhere: the slower pace itself makes it.
+Proof: |phi'| <= phi and |phi''| <= phi, so that with u = p - 1 both |p'| <= u/w and |p''| <= u/w^2, of the
+       sum over places too. The
+acceleration is at most A/p^2 + v u/(w p^3), which is A or less if v/w <= A p (p + 1), and p >= 1. The jerk is
+at most J/p^3 + 3 A u/(w p^4) + v (3 u^2 + p u)/(w^2 p^5), which is J or less if 3 A/(w p) + v (3 u + p)/(w
+p)^2 <= J (p^2 + p + 1). The right side is 3 J or more, and (3 u + p)/p^2 = (4 p - 3)/p^2 <= 4/3. So room is
+needed nowhere: the slower pace itself makes it.
 
-At a rest p may jump, as nothing moves: what is slower ends at the rests around a place. A place costs d (length + 4 w) of time at most,
-and never more than the whole way between these rests at the slower pace. Beyond `FAR` reaches nothing is left of phi but rounding.
+At a rest p may jump, as nothing moves: what is slower ends at the rests around a place. A place costs d
+                                        (length + 4 w) of time at most,
+and never more than the whole way between these rests at the slower pace. Beyond `FAR` reaches nothing is left
+of phi but rounding.
 """
 
 from __future__ import annotations
@@ -39,7 +45,8 @@ from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 
 FAR = 42.0  # reaches: (1 + FAR) e^-FAR is 2e-17
-# Newton's method for theta: its error gets less by the factor p(1)/p(2) - 1 a step at least, and is squared near the end.
+# Newton's method for theta: its error gets less by the factor p(1)/p(2) - 1 a step at least, and is squared
+# near the end.
 STEPS, SETTLED = 60, 4e-16
 
 
@@ -63,7 +70,8 @@ class Place(NamedTuple):
 
 
 def reach(v: float, A: float, J: float) -> float:
-    """The least reach for an axis that is nowhere faster than v, with limits A and J [s]; inf for what is not limited."""
+    """The least reach for an axis that is nowhere faster than v, with limits A and J [s]; inf for what is not
+    limited."""
     of_jerk = 0.0
     if np.isfinite(J):
         of_jerk = (A + np.sqrt(A * A + 16.0 / 9.0 * v * J)) / (2.0 * J)
@@ -80,7 +88,8 @@ class _Pace(NamedTuple):
 
 
 def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, Array]:
-    """Times of a motion with stands, in the time of the motion without them (n,) [s], and whether it stands then (n,).
+    """Times of a motion with stands, in the time of the motion without them (n,) [s], and whether it stands
+    then (n,).
 
     times  : (n,) [s]
     stands : (m, 2) when it rests, in the time without them, and for how much longer [s]; ascending
@@ -96,9 +105,8 @@ def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, A
 class Slowed:
     """A motion run slower in places, and standing longer where it rests.
 
-    motion : as it was
-    places : where it is slower
-    stands : (n, 2) when it rests [s], at the pace it has here without these rests, and for how much longer [s]; ascending
+    motion : as it was places : where it is slower stands : (n, 2) when it rests [s], at the pace it has here
+    without these rests, and for how much longer [s]; ascending
     """
 
     motion: MotionInTime

@@ -1,7 +1,8 @@
-"""From a speed profile along the path to a time law, and from that to samples in time: the solution itself, integrated exactly.
+"""From a speed profile along the path to a time law, and from that to samples in time: the solution itself,
+integrated exactly.
 
-The time law s(t) is pieces of constant jerk, dwells included. Of a solution there is one piece per grid interval (of no jerk for
-second-order profiles, whose acceleration u along the path is constant there):
+The time law s(t) is pieces of constant jerk, dwells included. Of a solution there is one piece per grid
+interval (of no jerk for second-order profiles, whose acceleration u along the path is constant there):
 
     t_{i+1} = t_i + duration_i,      s(t) = s_i + feed_i tau + u tau^2/2 + jerk tau^3/6,    tau = t - t_i.
 
@@ -11,7 +12,8 @@ With feed, u and jerk, per axis, with r', r'', r''' at s(t):
     acceleration  r' u + r'' feed^2
     jerk          r' jerk + 3 r'' feed u + r''' feed^3            (inside a piece of the law; at its ends u may jump)
 
-Samples lie at k dt and, last, at the end of the program, so the last period is usually shorter. Dwells hold the position.
+Samples lie at k dt and, last, at the end of the program, so the last period is usually shorter. Dwells hold
+the position.
 """
 
 from __future__ import annotations
@@ -132,8 +134,8 @@ def _dwells(samples: PathSamples) -> FloatArray:
 
 # Where a piece of the law is looked at [share of the piece].
 WATCHED = np.array([0.05, 0.5, 0.95])
-# Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their neighbours, and what happens
-# there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
+# Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their
+# neighbours, and what happens there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
 SHORTEST_PIECE = 1e-9
 # More samples than this are refused: a day at 1 ms, and with three axes 14 GB of files.
 SAMPLES_MAX = 1e8
@@ -163,7 +165,8 @@ class MotionInTime(Protocol):
         ...
 
     def waiting(self, at: FloatArray, by: FloatArray) -> MotionInTime:
-        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the ends `at` (n,) of pieces [s]."""
+        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the ends `at` (n,) of pieces
+        [s]."""
         ...
 
 
@@ -189,7 +192,8 @@ class Motion:
         return _trajectory(self, times, dt)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Motion:
-        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to the times `at` (n,) [s]."""
+        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to the times `at` (n,)
+        [s]."""
         law = self.law
         # a run's last piece is its standstill
         still = np.flatnonzero(np.append(law.run[1:] != law.run[:-1], True))
@@ -201,22 +205,24 @@ class Motion:
 
 
 def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
-    """The motion at the interpolation period dt [s], last partial period included; of more samples than `SAMPLES_KEPT` they are
-    evaluated when they are asked for."""
+    """The motion at the interpolation period dt [s], last partial period included; of more samples than
+    `SAMPLES_KEPT` they are evaluated when they are asked for."""
     count, times = _sample_times(motion.end, dt)
     return TrajectoryOnDemand(motion, dt, count) if times is None else motion.at(times, dt)
 
 
 def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
-    """Pieces (n,) that last, and times (n, 3) near both ends and in the middle of each [s], at its shares `WATCHED`: all speeds,
-    accelerations and jerks are smooth there, and peaks in between close to those of parabolas."""
+    """Pieces (n,) that last, and times (n, 3) near both ends and in the middle of each [s], at its shares
+    `WATCHED`: all speeds, accelerations and jerks are smooth there, and peaks in between close to those of
+    parabolas."""
     edges = np.append(motion.t, motion.end)
     pieces = np.flatnonzero(np.diff(edges) > SHORTEST_PIECE)
     return pieces, edges[pieces, None] * (1.0 - WATCHED) + edges[pieces + 1, None] * WATCHED
 
 
 def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:
-    """The motion at the times (T,) [s], put in order, in chunks that share their ends; dt [s] is the trajectories' period."""
+    """The motion at the times (T,) [s], put in order, in chunks that share their ends; dt [s] is the
+    trajectories' period."""
     times = np.unique(times)
     for first in range(0, len(times), CHUNK):
         yield motion.at(times[first : first + CHUNK + 1], dt)
@@ -232,8 +238,8 @@ def require_samples(end: float, dt: float) -> None:
 
 
 def _sample_times(end: float, dt: float) -> tuple[int, FloatArray | None]:
-    """How many samples 0, dt, 2 dt, ..., end are, and their times, None for more than `SAMPLES_KEPT`; a remainder below a millionth of
-    dt is rounding and joins the period before."""
+    """How many samples 0, dt, 2 dt, ..., end are, and their times, None for more than `SAMPLES_KEPT`; a
+    remainder below a millionth of dt is rounding and joins the period before."""
     require_samples(end, dt)
     count = int(np.floor(end / dt * (1 + 1e-12)))
     if not count or end - count * dt > 1e-6 * dt:

@@ -18,7 +18,8 @@ COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "bl
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trajectory:
-    """T samples over A axes. The last sample is the programmed end; the period before it may be shorter than dt.
+    """T samples over A axes. The last sample is the programmed end; the period before it may be shorter than
+    dt.
 
     axes         : axis letters
     dt           : interpolation period [s]
@@ -32,7 +33,8 @@ class Trajectory:
     block        : (T,) index of the block of the program
     line         : (T,) NC line of that block
     radius       : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
-    extruder     : (T, 4) place [mm of filament], velocity, acceleration and jerk of the extruder; (0, 4) without one
+    extruder     : (T, 4) place [mm of filament], velocity, acceleration and jerk of the extruder; (0, 4)
+                   without one
     """
 
     axes: tuple[str, ...]
@@ -80,12 +82,13 @@ class Trajectory:
         return in_degrees(self.axes, self.radius)
 
     def chunks(self) -> Iterator[Trajectory]:
-        """All samples in order, one part after the other. What goes through a long motion takes its parts, so that only one of them
-        has to be in memory (motion/on_demand.py)."""
+        """All samples in order, one part after the other. What goes through a long motion takes its parts, so
+        that only one of them has to be in memory (motion/on_demand.py)."""
         yield self
 
     def through(self, change: Callable[[Trajectory], Trajectory]) -> Trajectory:
-        """The motion with other positions and derivatives: `change` gives those of any samples, each by itself."""
+        """The motion with other positions and derivatives: `change` gives those of any samples, each by
+        itself."""
         return change(self)
 
     def rows(self, k: Array) -> Trajectory:
@@ -108,7 +111,8 @@ def in_degrees(axes: tuple[str, ...], radius: float) -> FloatArray:
 
 
 def joined(chunks: list[Trajectory]) -> Trajectory:
-    """One trajectory from consecutive chunks; a sample that a chunk shares with the one before counts once."""
+    """One trajectory from consecutive chunks; a sample that a chunk shares with the one before counts
+    once."""
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])

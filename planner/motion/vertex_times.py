@@ -1,10 +1,11 @@
 """When a motion passes the vertices of the programmed path, in their order, by the length that it has run.
 
-From one vertex to the next the motion runs the length L of the block between them, give or take what it may cut or round: every
-point of it is within eps of the path, and a corner within eps of its vertex saves no more than 2 eps of the length on either side. So
-vertex i+1 is looked for where the length run since vertex i is within `SLACK` eps of L, never before vertex i, at the nearest point of
-the chords there. Order and length decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told
-apart. (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
+From one vertex to the next the motion runs the length L of the block between them, give or take what it may
+cut or round: every point of it is within eps of the path, and a corner within eps of its vertex saves no more
+than 2 eps of the length on either side. So vertex i+1 is looked for where the length run since vertex i is
+within `SLACK` eps of L, never before vertex i, at the nearest point of the chords there. Order and length
+decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told apart.
+(Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from planner.base.search import nearest
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 
-# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side, and as much again
-# for where the vertex before was found.
+# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side,
+# and as much again for where the vertex before was found.
 SLACK = 8.0
 # A motion rests where it is slower than this fraction of its fastest [-]: rounding.
 STANDING = 1e-9
@@ -31,7 +32,8 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
     motion : sampled so often that between samples it runs straight to within the tolerance
 
-    A motion that stands still as often as the path has full stops passes the joints between two of them between its standstills.
+    A motion that stands still as often as the path has full stops passes the joints between two of them
+    between its standstills.
     """
     stop = np.flatnonzero(toolpath.joint == Joint.STOP)
     begin, end = _standing(motion)
@@ -50,7 +52,8 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
 
 def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
-    """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one before."""
+    """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one
+    before."""
     times = np.empty(len(toolpath) + 1)
     wanted = _wanted(toolpath, 0, len(toolpath))
     seen: tuple[FloatArray, ...] | None = None
@@ -80,7 +83,8 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())
     rest = np.repeat(np.arange(len(begin)), count)
     near = rest[nearest(motion.t[still], times[toolpath.joint == Joint.STOP])]
-    # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in time may be the next one's
+    # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in
+    # time may be the next one's
     stop = np.arange(len(near))
     spare = len(begin) - len(near)
     at = np.minimum(np.maximum.accumulate(near - stop), spare) + stop if spare >= 0 else near
@@ -103,11 +107,13 @@ def _wanted(toolpath: Toolpath, first: int, last: int) -> tuple[FloatArray, Floa
 
 @njit(cache=True, error_model="numpy")
 def _pass(seen, wanted, times, i, share, last_part):
-    """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as it goes; of the last part
-    to the end. The place reached is at the `share` of the first chord.
+    """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as
+    it goes; of the last part to the end. The place reached is at the `share` of the first chord.
 
-    seen   : samples of the motion from the chord on that was reached: positions (T, A) [mm], way run (T,) [mm] and times (T,) [s]
-    wanted : vertices (M+1, A) [mm], lengths (M,) of the segments after them, and by how much the way run may differ (M,) [mm]
+    seen   : samples of the motion from the chord on that was reached: positions (T, A) [mm], way run (T,)
+             [mm] and times (T,) [s]
+    wanted : vertices (M+1, A) [mm], lengths (M,) of the segments after them, and by how much the way run may
+             differ (M,) [mm]
 
     Returns the next vertex, and the place reached: chord and share of it.
     """

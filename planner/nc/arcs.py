@@ -10,11 +10,10 @@ half length h, at sqrt(R^2 - h^2) from it; R > 0 means at most half a turn, R < 
 RADIUS_MIN (a rounded half circle), and where h and R agree to HALF_CIRCLE the centre is the chord's middle:
 the square root would turn a rounding of 1e-13 into 4e-7.
 
-The sweep is the angle from p0 to p1 in the arc's direction, in (0, 2 pi]. An arc about a centre is a full turn
-where p1 is p0 to SAME_PLACE, as in LinuxCNC's motion (pmCircleInit goes by a length, not by an angle: an arc of
-8 mm and radius 1e7 mm turns by less than 1e-6). An arc with R is none: p0 and p1 do not say where its centre is.
-P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x)
-about y, (y, z) about x.
+The sweep is the angle from p0 to p1 in the arc's direction, in (0, 2 pi]. An arc about a centre is a full
+turn where p1 is p0 to SAME_PLACE, as in LinuxCNC's motion (pmCircleInit goes by a length, not by an angle: an
+arc of 8 mm and radius 1e7 mm turns by less than 1e-6). An arc with R is none: p0 and p1 do not say where its
+centre is. P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x) about y, (y, z) about x.
 """
 
 from __future__ import annotations
@@ -38,7 +37,8 @@ HALF_CIRCLE = 1e-12  # relative
 SAME_PLACE = (
     1e-7  # two points are one [mm]: a tenth of the finest digit of programs, far above the rounding of sums
 )
-# Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the rounding of a turn written out.
+# Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the
+# rounding of a turn written out.
 FULL_TURN = 1e-6
 
 
@@ -70,7 +70,8 @@ class ArcWay(NamedTuple):
 
 
 def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> Arc:
-    """The arc about a given centre; all (3,) [mm]. Raises ArcError if start and end are not on one circle about it."""
+    """The arc about a given centre; all (3,) [mm]. Raises ArcError if start and end are not on one circle
+    about it."""
     fault = not_closed(start, end, centre, way.normal, way.unit)
     if fault:
         raise ArcError(fault)
@@ -78,7 +79,8 @@ def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way:
 
 
 def arc_from_radius(start: FloatArray, end: FloatArray, radius: float, way: ArcWay) -> Arc:
-    """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,) [mm].
+    """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,)
+    [mm].
 
     Raises ArcError if there is none.
     """
@@ -126,7 +128,8 @@ def _sweep(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) 
     a, b = IN_PLANE[normal]
     ua, ub = start[a] - centre[a], start[b] - centre[b]
     da, db = end[a] - start[a], end[b] - start[b]
-    # the cross product with the chord, not with the other radius: that loses the digits of the chord where the radius is large
+    # the cross product with the chord, not with the other radius: that loses the digits of the chord where
+    # the radius is large
     angle = math.atan2(ua * db - ub * da, ua * (ua + da) + ub * (ub + db))
     if clockwise:
         angle = -angle

@@ -1,15 +1,17 @@
-"""Words that act before a block moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a control passes on; dwells;
-path control. Outputs are events; an input that is waited for is refused.
+"""Words that act before a block moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a
+control passes on; dwells; path control. Outputs are events; an input that is waited for is refused.
 
-The meaning of F, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one over minutes (G93).
+The meaning of F, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one
+                                          over minutes (G93).
 
     G94    feed = F
     G95    feed = F S                 S in revolutions per minute
     G93    feed = length F            F on every line that moves at a feed
 
-A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the turns,
-and with them the feed of G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of G96. Straight moves are divided so
-that n changes by at most `SURFACE_STEP` in a part, and a part has the feed of its larger radius; an arc has that of its largest.
+A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the
+turns, and with them the feed of G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of
+G96. Straight moves are divided so that n changes by at most `SURFACE_STEP` in a part, and a part has the feed
+of its larger radius; an arc has that of its largest.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ SURFACE_STEP = (
 )
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
 _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
-# Below this feed [programmed units per minute] LinuxCNC takes this one under G93 (inverse_time_rate_straight).
+# Below this feed [programmed units per minute] LinuxCNC takes this one under G93
+# (inverse_time_rate_straight).
 LINUXCNC_SLOWEST = 0.1
 
 
@@ -74,7 +77,8 @@ def take_default(state: State, default: float | None, block: Block, findings: Fi
 
 
 def check_feed(state: State, block: Block) -> None:
-    """See that the block has a feed: under G94 and G95 it is `state.feed` then. Raises WordFault if it has none."""
+    """See that the block has a feed: under G94 and G95 it is `state.feed` then. Raises WordFault if it has
+    none."""
     word = block.motion_word()
     name = f"G{codes.number(10 * state.motion if state.motion <= 3 else state.motion)}"
     if state.feed_mode == "inverse time":
@@ -101,12 +105,14 @@ def check_feed(state: State, block: Block) -> None:
 
 
 def on_surface(state: State) -> bool:
-    """True if the feed depends on the diameter: a feed per turn (G95) under a constant surface speed (G96)."""
+    """True if the feed depends on the diameter: a feed per turn (G95) under a constant surface speed
+    (G96)."""
     return state.spindle.surface_speed and state.feed_mode == "per turn" and state.feed_per_turn > 0
 
 
 def surface_feed(state: State, radius: float, word: int) -> float:
-    """The feed [mm/s] at a radius from the spindle's axis [mm]. Raises WordFault on the axis, if the speed has no bound."""
+    """The feed [mm/s] at a radius from the spindle's axis [mm]. Raises WordFault on the axis, if the speed
+    has no bound."""
     spindle = state.spindle
     per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
     turns = per_minute / (2.0 * math.pi * abs(radius)) if radius else math.inf
@@ -121,8 +127,8 @@ def surface_feed(state: State, radius: float, word: int) -> float:
 
 
 def surface_parts(state: State, start: float, end: float) -> list[float]:
-    """Where a straight move between two radii [mm] is divided, as parts of it, 1 included, so that the speed of the spindle changes by
-    at most `SURFACE_STEP` in each."""
+    """Where a straight move between two radii [mm] is divided, as parts of it, 1 included, so that the speed
+    of the spindle changes by at most `SURFACE_STEP` in each."""
     largest = max(abs(start), abs(end))
     spindle = state.spindle
     per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
@@ -171,8 +177,8 @@ def signal(table: BlockTable, block: Block) -> None:
 # By ten times the G code.
 _EXACT_PATH = 610
 _PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point, a dwell, M6, M0. Cycles
-# make room for themselves.
+# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point,
+# a dwell, M6, M0. Cycles make room for themselves.
 ROWS_AT_ONCE = 4
 _LONG = 60.0  # a dwell of a minute is no usual one [s]
 _SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5

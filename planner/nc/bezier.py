@@ -1,11 +1,12 @@
-"""Rational Bezier cubics: what every spline of a program is made of, whatever its degree (up to three), knots and weights.
+"""Rational Bezier cubics: what every spline of a program is made of, whatever its degree (up to three), knots
+and weights.
 
 With the Bernstein polynomials B_i of degree three, control points P_i and weights w_i > 0 a piece is
 
     C(u) = sum_i B_i(u) w_i P_i / sum_i B_i(u) w_i,       u in [0, 1].
 
-Here the (w_i P_i, w_i) are used as they stand, one more coordinate: knots are inserted, degrees raised and pieces halved by averages of
-them, which keeps the curve exactly (Piegl and Tiller, The NURBS Book, ch. 5).
+Here the (w_i P_i, w_i) are used as they stand, one more coordinate: knots are inserted, degrees raised and
+pieces halved by averages of them, which keeps the curve exactly (Piegl and Tiller, The NURBS Book, ch. 5).
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 
 DEGREE_MAX = 3  # of the pieces: higher degrees are refused (splines.py)
-# Nodes on every step, and steps of a piece, for its length: good to 1e-9 of the length of the butterfly of paper 001 (tested).
+# Nodes on every step, and steps of a piece, for its length: good to 1e-9 of the length of the butterfly of
+# paper 001 (tested).
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(16)
 LENGTH_STEPS = 8
 
@@ -42,7 +44,8 @@ def cubic_pieces(control: FloatArray, knots: FloatArray, degree: int) -> FloatAr
 
 
 def _blossom(control: FloatArray, knots: FloatArray, degree: int, a: float, b: float, i: int) -> FloatArray:
-    """(A+1,) control point i of the piece from a to b: the polar form at (a, ..., a, b, ..., b), i times b (de Boor's algorithm)."""
+    """(A+1,) control point i of the piece from a to b: the polar form at (a, ..., a, b, ..., b), i times b
+    (de Boor's algorithm)."""
     k = int(np.searchsorted(knots, a, side="right")) - 1
     points = control[k - degree : k + 1].copy()
     for r in range(1, degree + 1):
@@ -74,7 +77,8 @@ def halves(pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def evenly_weighted(pieces: FloatArray) -> FloatArray:
-    """The same curves with 1 for the outer two weights: another parameter, u / (u + (1-u) c), and a common factor.
+    """The same curves with 1 for the outer two weights: another parameter, u / (u + (1-u) c), and a common
+    factor.
 
     pieces : (K, 4, A+1)
 

@@ -5,10 +5,11 @@ Checked here is what a line may hold at all: codes that are known, one code per 
 words that some code of the line uses, N at its start. What the words mean in the state of the program is the
 interpreter's business.
 
-Lines that are no words: commands to grbl ($X, $H, $100=250), and G28 with bare axis letters, as 3-D printers have it.
+Lines that are no words: commands to grbl ($X, $H, $100=250), and G28 with bare axis letters, as 3-D printers
+                         have it.
 
-Settings and questions move nothing and are counted. Homing is a rapid to the position of G28 in the machine file, else to machine zero,
-and said so. Everything else that starts with $ may move ($J jogs) and is refused.
+Settings and questions move nothing and are counted. Homing is a rapid to the position of G28 in the machine
+file, else to machine zero, and said so. Everything else that starts with $ may move ($J jogs) and is refused.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ COMMAND = Assumption(
     "command to the control ($)", "commands to the control ($)", "assumed not to move anything"
 )
 _IGNORED = Assumption("command to the control", "commands to the control", "left out, as --ignore says")
-# Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files on a card.
+# Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files
+# on a card.
 _HARMLESS = re.compile(
     r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
 )
@@ -51,12 +53,14 @@ _SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
 _VALUE = re.compile(r"(\w+)=([-+]?\d+\.?\d*)")
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
 _LONGEST = 80  # characters of bare axis letters that are looked at
-# Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in 3^n ways.
+# Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in
+# 3^n ways.
 _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNORECASE)
 
 
 def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
-    """Execute a `$` command at the start of a line into `block`, or Klipper's limit; False for what is none, or is refused."""
+    """Execute a `$` command at the start of a line into `block`, or Klipper's limit; False for what is none,
+    or is refused."""
     if block.g or block.m or block.value or ignored.strict:
         return False
     if words.text(word) != "$":
@@ -93,7 +97,8 @@ def _velocity_limit(words: Words, word: int, block: Block) -> bool:
 
 
 def homed(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
-    """Execute a G28 with bare letters from `word` on into `block`: `G28 X Y`, or all axes for `G28 W`; False for anything else."""
+    """Execute a G28 with bare letters from `word` on into `block`: `G28 X Y`, or all axes for `G28 W`; False
+    for anything else."""
     if block.g.get("one-shot") != 280 or block.value or ignored.strict:
         return False
     data, at = words.data, int(words.at[word])
@@ -119,8 +124,8 @@ PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, no
 
 
 def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) -> Block | None:
-    """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the row cannot be read as a
-    whole, or holds nothing."""
+    """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the
+    row cannot be read as a whole, or holds nothing."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
     owned = ""  # letters that belong to a setting
@@ -196,7 +201,8 @@ def _program_number(
 def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored: IgnoredWords) -> str | None:
     """Keep a code that moves nothing, or that the user knows to be harmless, as an event.
 
-    Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is to be read.
+    Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is
+    to be read.
     """
     letter, value = chr(words.letter[word]), float(words.value[word])
     code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
@@ -273,8 +279,8 @@ def _add_code(
 
 
 def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWords) -> None:
-    """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no motion code, the one in force
-    may use them: the interpreter looks."""
+    """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no
+    motion code, the one in force may use them: the interpreter looks."""
     named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
     block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS

@@ -53,8 +53,8 @@ class EventColumns(NamedTuple):
 
 
 class BlockTable:
-    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used. New blocks stand in the
-    call `frame`.
+    """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used.
+    New blocks stand in the call `frame`.
 
     The compiled loop over plain rows writes into the columns directly and sets the counts.
     """
@@ -100,7 +100,8 @@ class BlockTable:
         self.blocks += 1
 
     def _add_further(self, kind: Kind, state: State) -> None:
-        """The further axes of the block that is being added; its feed, if none of them and of x, y, z is linear and moves."""
+        """The further axes of the block that is being added; its feed, if none of them and of x, y, z is
+        linear and moves."""
         block, k, columns = self.block, self.blocks, state.further.columns
         block.further[k] = state.further.position[columns]
         if kind != Kind.LINE:
@@ -117,7 +118,8 @@ class BlockTable:
         self.add(Kind.ARC, line, state)
 
     def add_spline(self, points: FloatArray, weights: FloatArray, line: int, state: State) -> None:
-        """Append a spline that ends at the state's position: control points (K, 4, 3) [mm] and weights (K, 4) of its pieces."""
+        """Append a spline that ends at the state's position: control points (K, 4, 3) [mm] and weights (K, 4)
+        of its pieces."""
         self.splines += [(self.blocks, p, w) for p, w in zip(points, weights, strict=True)]
         self.add(Kind.SPLINE, line, state)
 
@@ -161,7 +163,8 @@ class BlockTable:
         """The program read so far; the arrays are cut to size, so that the spare room is given back.
 
         frames  : the calls that the blocks stand in, for an expanded program
-        further : letters of the further axes that are read; those that move become axes of the program, rotary ones in rad
+        further : letters of the further axes that are read; those that move become axes of the program,
+                  rotary ones in rad
         """
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)

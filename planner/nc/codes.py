@@ -27,8 +27,8 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """Something counted and said once: its name for one and for many, what is assumed of it, and whether that may change geometry or
-    time (docs/language.md)."""
+    """Something counted and said once: its name for one and for many, what is assumed of it, and whether that
+    may change geometry or time (docs/language.md)."""
 
     one: str
     many: str
@@ -121,7 +121,8 @@ M_REFUSED: dict[int, Refusal] = {
 def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
     """The refusal of a code that no table names; one that is not refused by `strict` alone may move.
 
-    That it can be left out (--ignore) is not said: of a code that may move it would be the plan of another path.
+    That it can be left out (--ignore) is not said: of a code that may move it would be the plan of another
+    path.
     """
     if letter == "M" and not strict:
         what = "an M code that this reader does not know, and that may move with its words or by itself, is"

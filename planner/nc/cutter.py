@@ -1,22 +1,26 @@
-"""Cutter radius compensation, G41 (left of the path) and G42 (right of it): from programmed moves to the tool's.
+"""Cutter radius compensation, G41 (left of the path) and G42 (right of it): from programmed moves to the
+tool's.
 
-In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed move is followed at the
-distance r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t turned left by a quarter. So a line is offset to a
-parallel, and an arc about its centre, its radius less r where it turns towards the tool's side and more r elsewhere. Where two moves
-meet, the second turns by an angle away from the tool's side (outer corner), towards it (inner corner), or by less than `STRAIGHT_ON`:
+In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed
+move is followed at the distance r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t
+turned left by a quarter. So a line is offset to a parallel, and an arc about its centre, its radius less r
+where it turns towards the tool's side and more r elsewhere. Where two moves meet, the second turns by an
+angle away from the tool's side (outer corner), towards it (inner corner), or by less than `STRAIGHT_ON`:
 
     outer corner    an arc of radius r about the programmed corner joins the two offset ends; before a rapid a straight move does
     inner corner    both offset moves end at their intersection: the one that crosses in the sense in which the programmed moves turn
     straight on     the second begins where the first ends
 
-An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to `STRAIGHT_ON`, is an outer corner
-between lines and before an arc with the tool inside, and an inner one otherwise. Straight on, an arc begins up to `STRAIGHT_ON` r / R
-before its programmed start, R the offset radius.
+An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to
+`STRAIGHT_ON`, is an outer corner between lines and before an arc with the tool inside, and an inner one
+otherwise. Straight on, an arc begins up to `STRAIGHT_ON` r / R before its programmed start, R the offset
+radius.
 
-The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there with the
-programmed tangent). The move after G40 leads straight from there to the programmed end. Moves along the normal alone keep the place in
-the plane, and so do dwells and stops; M0 and M1 fix it: an inner corner after them is cut straight. All this is what LinuxCNC does,
-but that it refuses an arc that begins early by more than 0.0254 in mm programs, or 0.001 in inch programs, where a corner follows
+The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one
+that ends there with the programmed tangent). The move after G40 leads straight from there to the programmed
+end. Moves along the normal alone keep the place in the plane, and so do dwells and stops; M0 and M1 fix it:
+an inner corner after them is cut straight. All this is what LinuxCNC does, but that it refuses an arc that
+begins early by more than 0.0254 in mm programs, or 0.001 in inch programs, where a corner follows
 (move_endpoint_and_flush in interp_queue.cc compares the angle with a length); here it is cut.
 
 Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
@@ -95,13 +99,15 @@ class Cutter:
         return self._open.side.last
 
     def begin_beside(self, tangent: complex) -> None:
-        """The tool stands beside the programmed place already, normal to the first move, whose unit tangent is given."""
+        """The tool stands beside the programmed place already, normal to the first move, whose unit tangent
+        is given."""
         state = self._state
         state.actual = self._at(self._beside(self._plane(state.position), tangent), state.position)
         self._placed = True
 
     def line(self, target: FloatArray, kind: Kind, line: int) -> None:
-        """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot follow."""
+        """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot
+        follow."""
         state = self._state
         start, end = self._plane(state.position), self._plane(target)
         length = abs(end - start)
@@ -149,12 +155,14 @@ class Cutter:
         self._add(side, target, Kind.ARC, line, sweep)
 
     def fix(self) -> None:
-        """The place is fixed: a stop, G40 or the end of the program. Raises CutterFault if the last move would gouge."""
+        """The place is fixed: a stop, G40 or the end of the program. Raises CutterFault if the last move
+        would gouge."""
         if self._open is not None:
             self._settle(self._open)
             self._open.fixed, self._open.row = True, -1
 
-    # --- corners ------------------------------------------------------------------------------------------------------------
+    # --- corners
+    # ------------------------------------------------------------------------------------------------------------
 
     def _corner(self, corner: complex, side: OffsetMove, kind: Kind, line: int) -> bool:
         """Join the open move to the next at a programmed corner; True for an inner one."""
@@ -212,7 +220,8 @@ class Cutter:
         elif not open_.fixed and dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
             raise CutterFault(_GOUGE)
 
-    # --- blocks -------------------------------------------------------------------------------------------------------------
+    # --- blocks
+    # -------------------------------------------------------------------------------------------------------------
 
     def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, table = self._state, self._table

@@ -1,13 +1,15 @@
-"""Canned cycles for holes, G73, G74 and G81 to G89: from the words of a hole to its moves, as LinuxCNC has them.
+"""Canned cycles for holes, G73, G74 and G81 to G89: from the words of a hole to its moves, as LinuxCNC has
+them.
 
-A cycle works along the normal of the plane (z in G17). The words are, with coordinates as those of G90 or, in G91, from the level
-before the series of cycles (R), from R (the depth) and from the depth (K):
+A cycle works along the normal of the plane (z in G17). The words are, with coordinates as those of G90 or, in
+G91, from the level before the series of cycles (R), from R (the depth) and from the depth (K):
 
     X Y Z   the hole and its depth           R   where the feed begins        L   how many holes, one increment apart in G91
     Q       depth of a peck (G73, G83)       P   dwell [s]                    I J K   offset and counterbore of G87
 
-They stay in force while the same code does. The tool goes to the hole at the height where it is if that is above R, else at the one it
-will retract to; then fast to R, makes the hole, and retracts to R (G99) or to the level before the series (G98), if that is higher.
+They stay in force while the same code does. The tool goes to the hole at the height where it is if that is
+above R, else at the one it will retract to; then fast to R, makes the hole, and retracts to R (G99) or to the
+level before the series (G98), if that is higher.
 
     G81 drill            feed down
     G82 spot             feed down, dwell
@@ -45,8 +47,8 @@ STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which mus
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole in programmed coordinates and units: in the plane (a, b), along its normal c. (Pecks are counted in programmed units, so
-    that decimal fractions of an inch add up as they do in the control.)
+    """A hole in programmed coordinates and units: in the plane (a, b), along its normal c. (Pecks are counted
+    in programmed units, so that decimal fractions of an inch add up as they do in the control.)
 
     code    : tenths of the G code
     place   : (a, b)
@@ -74,7 +76,8 @@ class Hole:
 
 @dataclass(frozen=True)
 class CycleStep:
-    """One thing a cycle does: a move to (a, b, c), a dwell of so many seconds, a stop, or a spindle code (3, 4, 5)."""
+    """One thing a cycle does: a move to (a, b, c), a dwell of so many seconds, a stop, or a spindle code (3,
+    4, 5)."""
 
     kind: Kind | None
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -169,7 +172,8 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
 
 
 def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:
-    """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it must."""
+    """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it
+    must."""
     code, word = state.motion, block.motion_word()
     name = f"G{codes.number(code)}"
     if code in PECKING and not words["Q"] > 0:

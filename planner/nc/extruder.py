@@ -5,8 +5,8 @@
     M82, M83           E is a place, or a step. After G91 it is a step whatever holds, as in Klipper; Marlin's G90 also ends M83
     G92 E0             what E is called from here on; nothing moves
 
-E is in the program's units, and starts at 0. The words are gone through once more, for E alone, after the blocks are known: a row of
-the program has one block at most where E stands beside G0 to G3.
+E is in the program's units, and starts at 0. The words are gone through once more, for E alone, after the
+blocks are known: a row of the program has one block at most where E stands beside G0 to G3.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from planner.nc.program import MOVES, EventTable, Kind, Program
 
 _FLOW, _WHOLE_FLOW = 221.0, 100.0  # M221 S100
 _E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")
-# G codes in tenths beside which E is the extruder's: straight moves, arcs, planes, units, distance and feed modes.
+# G codes in tenths beside which E is the extruder's: straight moves, arcs, planes, units, distance and feed
+# modes.
 _WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 910, 911, 940])
 
 
@@ -46,8 +47,8 @@ def with_extruder(
     words   : of the program; of these the first `rows` rows
     factors : by which F counts from a line on (M220)
 
-    Raises InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside another G code, and for one
-    alone before the first F word.
+    Raises InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside
+    another G code, and for one alone before the first F word.
     """
     fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES))
     if not fed.amount.any():
@@ -87,7 +88,8 @@ def _refuse(program: Program, line: Array, what: str) -> NoReturn:
 
 
 def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, alone: _Fed) -> Program:
-    """The program with a full stop before each of the blocks `at` (n,), not decreasing, on lines (n,), where the extruder moves alone.
+    """The program with a full stop before each of the blocks `at` (n,), not decreasing, on lines (n,), where
+    the extruder moves alone.
 
     extruded : (B,) of the blocks that are there
     """
@@ -133,7 +135,8 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
 
 @njit(cache=True, error_model="numpy")
 def _fed(letter, value, first, with_moves):
-    """Filament fed by each row (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed in force (R,) [mm/s]."""
+    """Filament fed by each row (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed
+    in force (R,) [mm/s]."""
     rows = len(first) - 1
     amount, feeds = np.zeros(rows), np.zeros(rows)
     absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0

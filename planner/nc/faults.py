@@ -4,10 +4,12 @@ Words that, as far as the program tells, move nothing are counted and said once 
 
     12 M codes that this reader does not know: assumed not to move anything; first M428 line 4
 
-`Reading.strict` refuses them instead. What may move is never among them, except where the sentence says what was assumed of it.
+`Reading.strict` refuses them instead. What may move is never among them, except where the sentence says what
+was assumed of it.
 
-An axis that is not planned may be named as long as it does not move: all its words have one value, after G91 they are 0. The compiled
-loop (plain.py) checks it by `treatment` and `parked`, and so does `check_parked` for the other rows.
+An axis that is not planned may be named as long as it does not move: all its words have one value, after G91
+they are 0. The compiled loop (plain.py) checks it by `treatment` and `parked`, and so does `check_parked` for
+the other rows.
 """
 
 from __future__ import annotations
@@ -78,10 +80,11 @@ class Notes(NamedTuple):
 
 
 class Findings:
-    """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or time, and other notes.
+    """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or
+    time, and other notes.
 
-    strict : such assumptions are faults
-    faults : of the chunks so far, in the order of their words; a line that is executed many times is named once
+    strict : such assumptions are faults faults : of the chunks so far, in the order of their words; a line
+    that is executed many times is named once
     """
 
     def __init__(self, *, strict: bool = False) -> None:
@@ -111,7 +114,8 @@ class Findings:
     def assume(self, text: str, line: int, word: int | None = None) -> None:
         """Keep what was assumed on a line, and may change geometry or time.
 
-        word : index in the chunk; strict reading refuses it there. None where strict reading does not come by.
+        word : index in the chunk; strict reading refuses it there. None where strict reading does not come
+               by.
         """
         if self.strict and word is not None:
             self.report(word, f"{text} (assumed without --strict)")
@@ -119,7 +123,8 @@ class Findings:
             self._notes.setdefault((True, text), [line, 0])[1] += 1
 
     def notes(self, more: Sequence[Said]) -> Notes:
-        """Assumptions and notes, each once, with its first line and how often, and `more`; in the order of the lines."""
+        """Assumptions and notes, each once, with its first line and how often, and `more`; in the order of
+        the lines."""
         found = [
             Said(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
             for (changes, text), (line, times) in self._notes.items()
@@ -208,7 +213,8 @@ class IgnoredWords:
         return name in self.reading.ignore
 
     def may_stand(self, letter: str, value: float, *, absolute: bool) -> bool:
-        """True if a word of an axis that is not planned leaves it where it is; its first word says where that is."""
+        """True if a word of an axis that is not planned leaves it where it is; its first word says where that
+        is."""
         if not absolute:
             return value == 0.0
         code = ord(letter)

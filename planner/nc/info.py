@@ -1,4 +1,5 @@
-"""Description of a program: counts, extents, lengths, feeds, corners, and every construct that is not supported.
+"""Description of a program: counts, extents, lengths, feeds, corners, and every construct that is not
+supported.
 
 Inspecting never stops at the first fault: what can be read is read, so for a program with faults the figures
 describe only that. A corner is the turn between the end of one feed move and the start of the next, at the
@@ -22,7 +23,8 @@ from planner.nc.program import FEED_MOVES, MOVES, EventTable, Expansion, Kind, P
 from planner.nc.reader import interpret, load, source_name
 from planner.nc.reading import AS_USUAL, Reading
 
-# What `planner info` counts: corners that turn by more than each of these [deg], and quantiles of the moves' lengths [-].
+# What `planner info` counts: corners that turn by more than each of these [deg], and quantiles of the moves'
+# lengths [-].
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted

@@ -1,10 +1,12 @@
-"""Numbers whose unit depends on the control: lengths without a point, and dwells, as Fanuc and Haas read them.
+"""Numbers whose unit depends on the control: lengths without a point, and dwells, as Fanuc and Haas read
+them.
 
-X100 is 0.1 mm where the machine's least increment is 0.001 mm, and 0.01 inch under G20, whose increment has the same digits one place
-further on (0.0001 inch). X100. is 100 everywhere. Which of G20 and G21 holds is taken from the lines before it in the file.
+X100 is 0.1 mm where the machine's least increment is 0.001 mm, and 0.01 inch under G20, whose increment has
+the same digits one place further on (0.0001 inch). X100. is 100 everywhere. Which of G20 and G21 holds is
+taken from the lines before it in the file.
 
-P words are dwells beside G4, and of a canned cycle on the line or in force. LinuxCNC and grbl have them in seconds. Fanuc and Haas have
-all of them in milliseconds; written with a point Haas takes seconds.
+P words are dwells beside G4, and of a canned cycle on the line or in force. LinuxCNC and grbl have them in
+seconds. Fanuc and Haas have all of them in milliseconds; written with a point Haas takes seconds.
 """
 
 from __future__ import annotations
@@ -55,7 +57,8 @@ class DwellWords:
         return found
 
     def in_seconds(self, words: Words) -> Words:
-        """The words of a chunk of Fanuc's with their dwells in seconds; a number with a point is in seconds already."""
+        """The words of a chunk of Fanuc's with their dwells in seconds; a number with a point is in seconds
+        already."""
         times = [w for w in self.find(words) if words.text(w)[:1] in ("P", "p") and "." not in words.text(w)]
         if not times:
             return words

@@ -1,13 +1,15 @@
 """Executing blocks in the order of RS274NGC, as LinuxCNC's interpreter has it:
 
-    feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work offset, path control,
-    distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
+    feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work
+    offset, path control, distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
 
-Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act before the line's move
-and M0 after it. G53 holds for its line only; a motion code alone on a line moves nothing.
+Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act
+before the line's move and M0 after it. G53 holds for its line only; a motion code alone on a line moves
+nothing.
 
-Rows that are plain straight moves run in `plain.py`; this file is for the others, and `mover.py` for what they move. A fault is
-recorded and reading goes on with the next line, so that `info` can show them all; `reader.py` refuses a program that has any.
+Rows that are plain straight moves run in `plain.py`; this file is for the others, and `mover.py` for what
+they move. A fault is recorded and reading goes on with the next line, so that `info` can show them all;
+`reader.py` refuses a program that has any.
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of
 
 
 class OpenArc(NamedTuple):
-    """An arc that does not close: its line, whether it would with its centre read the other way, whether I J K are not all 0."""
+    """An arc that does not close: its line, whether it would with its centre read the other way, whether I J
+    K are not all 0."""
 
     line: int
     otherwise: bool
@@ -51,9 +54,11 @@ class OpenArc(NamedTuple):
 
 
 class Interpreter:
-    """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`, `faults()`, `notes`.
+    """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`,
+    `faults()`, `notes`.
 
-    Between two chunks `state`, `setup` and `table` say where the program stands: what parameters of a program ask for.
+    Between two chunks `state`, `setup` and `table` say where the program stands: what parameters of a program
+    ask for.
 
     open_arcs : every arc that does not close
     by_word : rows that were executed word by word, not by the compiled loop
@@ -134,7 +139,8 @@ class Interpreter:
         return self._dwells.in_seconds(words) if self.state.fanuc else words
 
     def execute(self, words: Words) -> None:
-        """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults are kept, none is raised."""
+        """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults
+        are kept, none is raised."""
         row, rows, self._words = 0, len(words.line), words
         self.table.begin(len(words.letter))
         while row < rows and not self.ended:
@@ -180,9 +186,11 @@ class Interpreter:
 
     @property
     def all_arcs_close_otherwise(self) -> bool:
-        """True if there are arcs that do not close, and all of them would with their centres read the other way.
+        """True if there are arcs that do not close, and all of them would with their centres read the other
+        way.
 
-        One line decides nothing, and neither does I0 J0: one odd arc is a mistake, not the way in which a whole program is written.
+        One line decides nothing, and neither does I0 J0: one odd arc is a mistake, not the way in which a
+        whole program is written.
         """
         lines = {arc.line for arc in self.open_arcs if arc.centred}
         return len(lines) > 1 and all(arc.otherwise for arc in self.open_arcs)
@@ -267,7 +275,8 @@ class Interpreter:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
-    # --- modes ------------------------------------------------------------------------------------------------------------------
+    # --- modes
+    # ------------------------------------------------------------------------------------------------------------------
 
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
@@ -297,7 +306,8 @@ class Interpreter:
         state.apply_offsets()
         self.table.keep_origin(state)
 
-    # --- what moves ---------------------------------------------------------------------------------------------------------
+    # --- what moves
+    # ---------------------------------------------------------------------------------------------------------
 
     def _one_shot(self, block: Block) -> None:
         code = block.g.get("one-shot")

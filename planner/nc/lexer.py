@@ -3,17 +3,20 @@
     line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits] [e +|- digits]
     comment = ( anything but a parenthesis )   or   ; to the end of the line
 
-Beyond RS274NGC: a % at the start of a line may have a name after it, which is not read; :1000 is O1000; $ inside a line is a letter
-(the spindle's number, M3 $1); and a number may have an exponent with its sign, as programs that print numbers write small ones:
--8.775e-05. It has no space before it, and E two digits or more: X1E-2 is a coordinate of 1 and an extruder's word.
+Beyond RS274NGC: a % at the start of a line may have a name after it, which is not read; :1000 is O1000; $
+                 inside a line is a letter
+(the spindle's number, M3 $1); and a number may have an exponent with its sign, as programs that print numbers
+write small ones: -8.775e-05. It has no space before it, and E two digits or more: X1E-2 is a coordinate of 1
+and an extruder's word.
 
-A word takes 13 bytes: letter, value and place in the source. Columns and texts come from the source when a message needs them.
-What cannot be read becomes a word too, with the letter `FAULT` and a code as its value, and the rest of its line is left out:
-nothing disappears silently, and the lines after it are still read.
+A word takes 13 bytes: letter, value and place in the source. Columns and texts come from the source when a
+                       message needs them.
+What cannot be read becomes a word too, with the letter `FAULT` and a code as its value, and the rest of its
+line is left out: nothing disappears silently, and the lines after it are still read.
 
-Numbers are rounded correctly, so a coordinate is the same double as float(text): the digits form an integer below 2^53 and the
-point a power of ten up to 1e22, both exact, and one division of exact numbers rounds once. Longer numbers are marked NaN by the
-compiled loop and read by Python.
+Numbers are rounded correctly, so a coordinate is the same double as float(text): the digits form an integer
+below 2^53 and the point a power of ten up to 1e22, both exact, and one division of exact numbers rounds once.
+Longer numbers are marked NaN by the compiled loop and read by Python.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 
-# The longest source line without its comments [bytes]. RS274NGC stops at 255; a line beyond this is not a program's.
+# The longest source line without its comments [bytes]. RS274NGC stops at 255; a line beyond this is not a
+# program's.
 LINE_MAX = 4096
 FAULT = 0
 
@@ -45,9 +49,11 @@ class Unreadable(IntEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Words:
-    """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one line many times.
+    """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one
+    line many times.
 
-    letter : (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number follows it
+    letter : (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number
+             follows it
     value  : (W,) number, as written (no unit applied)
     at     : (W,) byte offset of the letter in `data`
     line   : (R,) 1-based source line
@@ -96,7 +102,8 @@ class Words:
         return len(before.decode("utf-8", "replace")) + 1
 
     def text(self, word: int) -> str:
-        """The word as it is written, up to the next word, comment or end of line; one character of what is unreadable."""
+        """The word as it is written, up to the next word, comment or end of line; one character of what is
+        unreadable."""
         at = int(self.at[word])
         if self.letter[word] == FAULT and self.value[word] != Unreadable.NUMBER:
             return self.data[at : at + 4].decode("utf-8", "replace")[:1]

@@ -1,8 +1,11 @@
-"""Motion of blocks: G0 to G3, splines, drilling cycles and threads, with or without cutter radius compensation.
+"""Motion of blocks: G0 to G3, splines, drilling cycles and threads, with or without cutter radius
+compensation.
 
-G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by switches.
+G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by
+             switches.
 
-G40, G41, G42, G41.1 and G42.1: the words that switch cutter radius compensation (cutter.py), and what is refused while it is on.
+G40, G41, G42, G41.1 and G42.1: the words that switch cutter radius compensation (cutter.py), and what is
+                                refused while it is on.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
 from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State
 
-# Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and which are refused.
+# Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and
+# which are refused.
 _OFF = 400
 _LEFT = (410, 411)
 _DYNAMIC = (411, 421)
@@ -100,7 +104,8 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
 
 
 def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """All axes, or those of the block, go to the position of G28 or G30; in a rotated work system those of the system."""
+    """All axes, or those of the block, go to the position of G28 or G30; in a rotated work system those of
+    the system."""
     code, word = block.g["one-shot"], block.at["one-shot"]
     if code not in state.homes:
         findings.assume(
@@ -125,7 +130,8 @@ def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -
 
 
 def go_to_switches(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or to machine zero."""
+    """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or
+    to machine zero."""
     if not block.homing:
         return
     home = state.homes.get(280, np.zeros(3))
@@ -150,7 +156,8 @@ def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
     return there
 
 
-# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may stand beside them.
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
+# stand beside them.
 COVET_AXES = (100, 280, 300, 520, 920)
 NOWHERE = np.zeros(0)  # where further axes stand that the machine does not have
 _WHY_NO_MOTION = {
@@ -160,7 +167,8 @@ _WHY_NO_MOTION = {
 
 
 class Mover:
-    """Executes the motion of blocks, one after the other: moves the state, and appends to the table of blocks.
+    """Executes the motion of blocks, one after the other: moves the state, and appends to the table of
+    blocks.
 
     feed_default : of moves before the first F word [mm/s], or None
     findings : keeps what is assumed
@@ -182,7 +190,8 @@ class Mover:
         self.splines = SplineReader()
 
     def execute(self, block: Block) -> None:
-        """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault under compensation."""
+        """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault under
+        compensation."""
         state = self.state
         self._take_code(block)
         if block.g.get("one-shot") in COVET_AXES:

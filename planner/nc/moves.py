@@ -1,12 +1,14 @@
-"""A line of a program, as codes by modal group and words by letter, and where its words lead: end points, centres, arcs, and what G53
-and the words of motion codes ask of the state.
+"""A line of a program, as codes by modal group and words by letter, and where its words lead: end points,
+centres, arcs, and what G53 and the words of motion codes ask of the state.
 
-A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate (G53). I J K are
-relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), whatever G90 and G91 say. In diameter mode (G7) X words
-are halved; I, K and R stay radii.
+A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate
+                               (G53). I J K are
+relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), whatever G90 and G91 say. In
+diameter mode (G7) X words are halved; I, K and R stay radii.
 
-A rotated work system turns the plane of an arc with it. An arc in G18 or G19 then lies in a plane of two axes only if the rotation is
-a quarter turn; the record of an arc knows no other planes, and other angles are refused there.
+A rotated work system turns the plane of an arc with it. An arc in G18 or G19 then lies in a plane of two axes
+only if the rotation is a quarter turn; the record of an arc knows no other planes, and other angles are
+refused there.
 """
 
 from __future__ import annotations
@@ -96,13 +98,15 @@ class Block:
         return min(self.at[letter] for letter in letters if letter in self.at)
 
     def motion_word(self) -> int:
-        """Index of the word that makes the block move: its motion code, else its first coordinate, or its first word."""
+        """Index of the word that makes the block move: its motion code, else its first coordinate, or its
+        first word."""
         if "motion" in self.at:
             return self.at["motion"]
         return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
     def fault(self, message: str, at: str = "") -> WordFault:
-        """A fault of the word of a letter or modal group; of the one that makes the block move if none is given."""
+        """A fault of the word of a letter or modal group; of the one that makes the block move if none is
+        given."""
         return WordFault(self.at[at] if at else self.motion_word(), message)
 
 
@@ -125,7 +129,8 @@ _ROUNDING = {
 
 
 class ArcFault(WordFault):
-    """The words of an arc contradict each other; `otherwise` if it would close with its centre read the other way (G90.1, G91.1)."""
+    """The words of an arc contradict each other; `otherwise` if it would close with its centre read the other
+    way (G90.1, G91.1)."""
 
     def __init__(self, word: int, message: str, *, otherwise: bool):
         super().__init__(word, message)
@@ -133,7 +138,8 @@ class ArcFault(WordFault):
 
 
 def is_move(state: State, block: Block) -> bool:
-    """True if the block moves. A motion code alone does not, except for an arc, which then lacks its words."""
+    """True if the block moves. A motion code alone does not, except for an arc, which then lacks its
+    words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))
     return arc or block.has(state.letters)
 
@@ -172,8 +178,8 @@ def _rotated_target(state: State, block: Block) -> FloatArray:
 
 
 def arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
-    """The arc of a block to `end` (3,) [mm], and the index of its normal axis. Raises WordFault if its words are missing or contradict
-    each other."""
+    """The arc of a block to `end` (3,) [mm], and the index of its normal axis. Raises WordFault if its words
+    are missing or contradict each other."""
     try:
         return _arc(state, block, end)
     except ArcError as fault:
@@ -276,7 +282,8 @@ def used_in_force(state: State) -> set[str]:
 
 
 def check_words(state: State, block: Block) -> None:
-    """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the first."""
+    """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the
+    first."""
     if state.motion == REFUSED_MOTION or block.partial:
         return
     used = block.own | used_in_force(state)

@@ -4,24 +4,28 @@ With q the position in a work system before G92 is taken off (state.py), a coord
 
     x = q - G92 offset,      q = R^-1 (position - origin - tool offset)
 
-and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for the G92 offset, G10 L20 for
-the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10 takes coordinates as absolute, whatever G90 and G91
-say; a tool's new offset is in force from its next G43 on.
+and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for
+the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10
+takes coordinates as absolute, whatever G90 and G91 say; a tool's new offset is in force from its next G43 on.
 
-Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59. After G91 both would add,
+Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59.
+                                  After G91 both would add,
 which is refused: the flat program (language/flat.py) could not say it.
 
-Axes beside x, y and z: rotary A B C in degrees, and U V W, which are linear too, in mm. They are joints: no kinematics.
+Axes beside x, y and z: rotary A B C in degrees, and U V W, which are linear too, in mm. They are joints: no
+                        kinematics.
 
-A machine that has one gives its letter to programs. Its coordinates follow the rules of the others, without rotation of the work system
-and without tool offsets:
+A machine that has one gives its letter to programs. Its coordinates follow the rules of the others, without
+rotation of the work system and without tool offsets:
 
     machine position = origin of the work system + G92 offset + programmed coordinate
 
-F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w, else that of the rotary
-axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in absolute mode to the programmed place within a
-turn, forwards if the number is positive (0 included), backwards if it has a minus; after G53 too, where LinuxCNC takes the magnitude of
-the number less the offsets (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
+F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w,
+                       else that of the rotary
+axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in absolute mode to the
+programmed place within a turn, forwards if the number is positive (0 included), backwards if it has a minus;
+after G53 too, where LinuxCNC takes the magnitude of the number less the offsets (rs274ngc/interp_find.cc,
+find_ends and unwrap_rotary).
 """
 
 from __future__ import annotations
@@ -56,7 +60,8 @@ def refuse(state: State, block: Block, where: str) -> None:
 
 
 def move(state: State, block: Block) -> None:
-    """Move the further axes to where the words of a block lead. Raises WordFault for a place of a wrapped axis beyond a turn."""
+    """Move the further axes to where the words of a block lead. Raises WordFault for a place of a wrapped
+    axis beyond a turn."""
     further = state.further
     in_machine = block.g.get("one-shot") == 530
     offset = _zeros() if in_machine else further.offset(state.system)
@@ -133,7 +138,8 @@ def go_home(state: State, block: Block, code: int, *, everything: bool) -> None:
 
 
 def length_moved(state: State, start: FloatArray, xyz: float) -> float:
-    """The length that F and inverse time go by [mm; where only rotary axes move, degrees times the programmed unit].
+    """The length that F and inverse time go by [mm; where only rotary axes move, degrees times the programmed
+    unit].
 
     start : (6,) of the further axes before the move;  xyz : length of the path of x, y and z [mm]
     """
@@ -170,7 +176,8 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
 
 
 def system_of(block: Block) -> int:
-    """The code of the work system that a block names. Raises WordFault for a G54.1 without a P that there is."""
+    """The code of the work system that a block names. Raises WordFault for a G54.1 without a P that there
+    is."""
     code = block.g["work offset"]
     if code != 541:
         return code
@@ -190,7 +197,8 @@ def take_system(state: State, block: Block, findings: Findings) -> None:
 
 
 def assume_origin(state: State, what: str, block: Block, findings: Findings) -> None:
-    """Say that `what` goes by machine coordinates where those of G54 are not known: without it G54 may be anywhere."""
+    """Say that `what` goes by machine coordinates where those of G54 are not known: without it G54 may be
+    anywhere."""
     if state.system == 540 and 540 not in state.systems:
         text = f"{what} is in machine coordinates, and G54 has no offset in the machine file: 0"
         findings.assume(text, block.line, block.at["one-shot"])
@@ -203,7 +211,8 @@ def store_position(state: State, code: int) -> None:
 
 
 def shift_origin(state: State, block: Block) -> None:
-    """G92 gives the place the coordinates, G52 gives the offset; G92.1 and G92.2 take it back, G92.3 brings it again.
+    """G92 gives the place the coordinates, G52 gives the offset; G92.1 and G92.2 take it back, G92.3 brings
+    it again.
 
     Raises WordFault for a G52 or G92 without X, Y and Z.
     """
@@ -299,8 +308,8 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
 
 
 def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
-    """(3,) the tool's offset [mm] with which the place has the block's coordinates: in the system in force (L10), or in G59.3 without
-    G92 (L11)."""
+    """(3,) the tool's offset [mm] with which the place has the block's coordinates: in the system in force
+    (L10), or in G59.3 without G92 (L11)."""
     system = state.work_system(_FIXTURE if kind == 11 else 0)
     place = system.turn(state.position - system.origin, -1.0)
     if kind == 10:

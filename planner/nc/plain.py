@@ -1,9 +1,10 @@
-"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused, left out or parked whatever
-stands beside them (rotary axes, extruders; see `planner.nc.faults`). Everything else stops it.
+"""The compiled loop over plain rows: N, G0, G1, X, Y, Z, F and S words, and letters that are refused, left
+out or parked whatever stands beside them (rotary axes, extruders; see `planner.nc.faults`). Everything else
+stops it.
 
-This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser engraving). It follows the
-same rules as the interpreter: feed first, then S, then the straight move; whatever is not certainly right is left to the
-interpreter, which says what is wrong.
+This is what programs are long with (249,000 of 249,132 lines of a relief, 110,000 S words of a laser
+engraving). It follows the same rules as the interpreter: feed first, then S, then the straight move; whatever
+is not certainly right is left to the interpreter, which says what is wrong.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ class _Others(NamedTuple):
 
 
 class _Counts(NamedTuple):
-    """State that plain rows change besides the position: how far they are read and stored, and the modal motion and feed."""
+    """State that plain rows change besides the position: how far they are read and stored, and the modal
+    motion and feed."""
 
     row: int
     blocks: int
@@ -125,7 +127,8 @@ def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
 def _run(
     rows, begin, fixed, position, place, block, event, refused_word, others
 ):  # pragma: no cover - compiled
-    """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and `refused_word`, and says how far."""
+    """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and
+    `refused_word`, and says how far."""
     letter, value, line, first, frame = rows
     absolute, unit, feed_factor, path_control, tolerance, offset, column, rotary, further_offset, wrapped = (
         fixed

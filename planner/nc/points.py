@@ -1,6 +1,8 @@
-"""Programs of points, and the file that keeps one: straight moves from one point to the next, for paths that are no NC program.
+"""Programs of points, and the file that keeps one: straight moves from one point to the next, for paths that
+are no NC program.
 
-The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid moves, and `tolerance` [mm]
+The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid
+                  moves, and `tolerance` [mm]
 or null. Numbers are written so that they read back exactly.
 """
 

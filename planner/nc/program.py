@@ -1,8 +1,8 @@
 """The record of an NC program: its blocks in arrays, all modal state resolved, in mm, s and rad.
 
-There is one row for each *block that moves or dwells*. A source line can give several blocks (G28 through an intermediate point) or
-none. The data of arcs stand in rows of their own, so that memory grows with what is there. Events are arrays too; an `Event` is made
-when it is looked at (a laser file has 110,000).
+There is one row for each *block that moves or dwells*. A source line can give several blocks (G28 through an
+intermediate point) or none. The data of arcs stand in rows of their own, so that memory grows with what is
+there. Events are arrays too; an `Event` is made when it is looked at (a laser file has 110,000).
 """
 
 from __future__ import annotations
@@ -93,12 +93,14 @@ class Expansion:
 
 @dataclass(frozen=True, kw_only=True)
 class ToolPoint:
-    """The tool centre point of a program that has it on (nc/tool_point.py): x, y and z are those of the tool's tip.
+    """The tool centre point of a program that has it on (nc/tool_point.py): x, y and z are those of the
+    tool's tip.
 
     word       : what switched it on first: "G43.4", "M428", "M128"
     line       : where
     length     : of the tool, which z holds [mm]
-    rapids_off : rapid moves while it was off and a rotary axis not at 0: in the program as their paths of the tip, in chords
+    rapids_off : rapid moves while it was off and a rotary axis not at 0: in the program as their paths of the
+                 tip, in chords
     """
 
     word: str
@@ -109,7 +111,8 @@ class ToolPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class SetLimit:
-    """A limit that the program sets (nc/set_limits.py): "velocity" [mm/s] or "acceleration" [mm/s2] of an axis, or "feed" [mm/s]."""
+    """A limit that the program sets (nc/set_limits.py): "velocity" [mm/s] or "acceleration" [mm/s2] of an
+    axis, or "feed" [mm/s]."""
 
     quantity: str
     axis: str
@@ -120,7 +123,8 @@ class SetLimit:
 class Origins:
     """Where programmed zero is, from block to block: K rows, one for each change.
 
-    block  : (K,) the first block that it holds for, not decreasing; of several rows of one block the last holds
+    block  : (K,) the first block that it holds for, not decreasing; of several rows of one block the last
+             holds
     offset : (K, 3) its machine position: work offset, G92 and tool length together [mm]
     turned : (K,) whether the work system is rotated about z, so that adding `offset` is not enough
     """
@@ -143,10 +147,12 @@ class Origins:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
-    """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the program.
+    """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the
+    program.
 
     block   : (K,) block of each, not decreasing: a block has one after the other
-    points  : (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it ends itself
+    points  : (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is
+              where it ends itself
     weights : (K, 4) > 0 [-]
     """
 
@@ -180,8 +186,9 @@ class Program:
     start        : (A,) machine position before the first block [mm]
     kind         : (B,) `Kind`
     end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
-    feed         : (B,) programmed feed [mm/s]: the speed of x, y and z together, where they stand that of u, v and w, where those stand
-                   too that of the rotary axes [rad/s]; inf for RAPID, DWELL, and STOP without an extruder
+    feed         : (B,) programmed feed [mm/s]: the speed of x, y and z together, where they stand that of u,
+                   v and w, where those stand too that of the rotary axes [rad/s]; inf for RAPID, DWELL, and
+                   STOP without an extruder
     dwell        : (B,) standstill [s], > 0 for DWELL only
     line         : (B,) source line, from 1
     path_control : (B,) `PathControl` in force at the end of the block
@@ -189,19 +196,24 @@ class Program:
     arc_block    : (K,) block index of each arc, ascending
     arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
     arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
-    arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
-    synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no other, ascending
+    arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns
+                   included
+    synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no
+                   other, ascending
     splines      : of the blocks of kind SPLINE
     events       : words without influence on the motion
     origins      : where programmed zero is in machine coordinates
     notes        : what a user should know of how it was read; `assumptions` come first
-    assumptions  : what the reader assumed and what may change geometry or time: "line 9: tool 3 has no length in the machine file: 0
-                   (2 times)"
-    frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was expanded
-    frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing was expanded
+    assumptions  : what the reader assumed and what may change geometry or time: "line 9: tool 3 has no length
+                   in the machine file: 0 (2 times)"
+    frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was
+                   expanded
+    frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing
+                   was expanded
     expansion    : what was expanded; None where nothing was
-    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
-                   kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
+    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it
+                   moves alone, a block of kind STOP with the speed asked for as its feed. (0,) where E is no
+                   axis (nc/extruder.py)
     limits       : that the program sets and that hold throughout, where they are lower than the machine's
     reading      : the settings it was read with
     tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
@@ -276,11 +288,13 @@ class Program:
         return f"<Program {self.source}: {len(self):,} blocks, axes {' '.join(self.axes)}>"
 
     def place(self, block: int) -> str:
-        """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost first."""
+        """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost
+        first."""
         return f"line {self.line[block]}" + self.called(int(self.frame[block]) if self.frames else 0)
 
     def called(self, frame: int) -> str:
-        """The calls that led to a frame, innermost first, behind the line of a block; empty for the main program."""
+        """The calls that led to a frame, innermost first, behind the line of a block; empty for the main
+        program."""
         text = ""
         while frame > 0:
             at = self.frames[frame]

@@ -1,5 +1,6 @@
-"""Reading an NC program or a plotter file (HPGL): from text to `Program`, or an `InputError` that names file, line, column, the word,
-and what to do. The content of a text says which of the two it is, and its name if the content does not.
+"""Reading an NC program or a plotter file (HPGL): from text to `Program`, or an `InputError` that names file,
+line, column, the word, and what to do. The content of a text says which of the two it is, and its name if the
+content does not.
 """
 
 from __future__ import annotations
@@ -47,12 +48,12 @@ def read_program(
 
     path    : the file; None where `text` is given
     text    : the program itself
-    machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what plotter files need;
-              None for zeros and blending
+    machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what
+              plotter files need; None for zeros and blending
     reading : what is refused, left out and assumed
 
-    Raises InputError if the file cannot be read, for the first construct that is not supported or not valid, and unless one of file
-    and text is given.
+    Raises InputError if the file cannot be read, for the first construct that is not supported or not valid,
+    and unless one of file and text is given.
 
     >>> import planner
     >>> len(planner.read_program(text="G21 F3000\\nG1 X10\\nY5\\n"))
@@ -180,7 +181,8 @@ def _with_note(program: Program, open_arcs: Sequence[OpenArc]) -> Program:
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be
+    read."""
     try:
         if str(path) == STDIN:
             return standard_input()

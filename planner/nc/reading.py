@@ -1,7 +1,9 @@
-"""How a program is read: what is refused, what is left out, and what is assumed where the program does not say it.
+"""How a program is read: what is refused, what is left out, and what is assumed where the program does not
+say it.
 
-Without settings a reader is lenient where nothing moves and strict where something does: what it does not know and what cannot move an
-axis is counted in a note (planner/nc/faults.py), and what may move is refused with its line.
+Without settings a reader is lenient where nothing moves and strict where something does: what it does not
+know and what cannot move an axis is counted in a note (planner/nc/faults.py), and what may move is refused
+with its line.
 """
 
 from __future__ import annotations
@@ -32,12 +34,15 @@ class Reading:
     """Settings of the reader, kept in `Program.reading`.
 
     strict       : refuse everything that would be assumed
-    ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands ("$X"); in one normal form
-    arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
-                   incremental unless arcs on more than one line close with absolute centres only, as all of the program do
+    ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands
+                   ("$X"); in one normal form
+    arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute",
+                   or "auto", which is incremental unless arcs on more than one line close with absolute
+                   centres only, as all of the program do
     extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
-    dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells: "linuxcnc", "fanuc" (Haas too),
-                   "heidenhain", "siemens", or "auto", by what the program holds
+    dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells:
+                   "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", or "auto", by what the program
+                   holds
     block_delete : leave out the lines that start with "/"
 
     Raises InputError for a value that is not one of these.
@@ -59,7 +64,8 @@ class Reading:
         object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
 
     def changed(self) -> dict[str, Any]:
-        """The settings that are not the usual ones, ready for JSON; `Reading.saved` makes the record of them again."""
+        """The settings that are not the usual ones, ready for JSON; `Reading.saved` makes the record of them
+        again."""
         return {
             field.name: list(value) if isinstance(value := getattr(self, field.name), tuple) else value
             for field in dataclasses.fields(self)

@@ -7,9 +7,10 @@
     SET_VELOCITY_LIMIT  VELOCITY and ACCEL of Klipper, along the path
     $110= to $122=      speeds [mm/min] and accelerations of grbl's axes
 
-A factor is one of F and holds block by block. Limits are those of a machine, which is one for the whole motion: of all that were in
-force on a move the lowest holds throughout, which keeps each of them, and is said first where they change on the way. A limit along the
-path is one of every axis: on a diagonal the axes' own let the path have up to sqrt(3) of it. Limits above the machine's change nothing.
+A factor is one of F and holds block by block. Limits are those of a machine, which is one for the whole
+motion: of all that were in force on a move the lowest holds throughout, which keeps each of them, and is said
+first where they change on the way. A limit along the path is one of every axis: on a diagonal the axes' own
+let the path have up to sqrt(3) of it. Limits above the machine's change nothing.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
 
 SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", "M201", "M204"
-# From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x and y are above 17 mm/s.
+# From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x
+# and y are above 17 mm/s.
 PER_MINUTE = 1000.0
 _AXES = "xyze"
 EVERY_AXIS = "xyz"

@@ -1,8 +1,9 @@
-"""Codes that set something of the control and move nothing: which they are, and which words of their line are theirs.
+"""Codes that set something of the control and move nothing: which they are, and which words of their line are
+theirs.
 
-RS274NGC knows none of them; what a control does with them, nobody can read from the program. So each is an `Assumption`, counted in a
-note, and refused by `--strict`. A line such as `M203 X500 Y500 E5000` or `M73 P50 R70` has words that look like others: they are the
-setting's where it stands first on its line.
+RS274NGC knows none of them; what a control does with them, nobody can read from the program. So each is an
+`Assumption`, counted in a note, and refused by `--strict`. A line such as `M203 X500 Y500 E5000` or `M73 P50
+R70` has words that look like others: they are the setting's where it stands first on its line.
 
     code                                                  words of its line that are its own, if it stands first
     settings of the axes of a 3-D printer (M92 M201 ...)  all
@@ -21,7 +22,8 @@ AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
 EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 
-# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with what they limit.
+# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
+# what they limit.
 SETS_LIMITS = frozenset((201, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
 GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate("xyz")} | {
@@ -92,8 +94,8 @@ _PARKING = frozenset((125, 600, 701, 702))
 _WAITING = frozenset((109, 116, 190, 191, 303))
 _MOVES_FINISHED = 400  # waits until the axes stand
 _CORNERS = frozenset((205, 566))
-# Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that are loaded, shaping, and
-# which carriage follows.
+# Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that
+# are loaded, shaping, and which carriage follows.
 _SCALES = frozenset((92, 206, 218, 221, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666))
 # fmt: off
 _OF_AXES = frozenset((
@@ -110,8 +112,9 @@ _OF_PRINTERS = _OF_AXES | EXTRUDER_MODES | frozenset((
 TEXTS = frozenset((117, 118))  # a message to the end of the line
 MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
 
-# G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates off, polar interpolation off,
-# stored stroke and spindle speed checks, mirror image off, look-ahead of Haas and its smoothness, rotation off.
+# G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates
+# off, polar interpolation off, stored stroke and spindle speed checks, mirror image off, look-ahead of Haas
+# and its smoothness, rotation off.
 _G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 690, 1030, 1130, 1870))
 
 # Codes of the groups that are settings beside some words.
@@ -121,8 +124,8 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A command that sets something: its name ("M204", "$110", `VELOCITY_LIMIT`), its values by letter or key, in small letters, and
-    the word that it stands at."""
+    """A command that sets something: its name ("M204", "$110", `VELOCITY_LIMIT`), its values by letter or
+    key, in small letters, and the word that it stands at."""
 
     name: str
     values: dict[str, float]
@@ -131,7 +134,8 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class CodeSetting:
-    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own, whether it is a full stop.
+    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own,
+    whether it is a full stop.
 
     Nothing is said of one that is read (set_limits.py).
     """
@@ -142,7 +146,8 @@ class CodeSetting:
 
 
 def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | None:
-    """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up to the next code.
+    """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up
+    to the next code.
 
     None for a code that is read, or refused.
     """
@@ -199,8 +204,8 @@ def _said_of(number: int) -> Assumption:
 
 
 def may_be_ignored(name: str) -> bool:
-    """True if a code can be left out because the user knows it to be harmless: not a G code that is read or moves the axes, not the
-    end of a program, not a call."""
+    """True if a code can be left out because the user knows it to be harmless: not a G code that is read or
+    moves the axes, not the end of a program, not a call."""
     letter, number = name[0], name[1:]
     if letter not in "GM" or not number[:1].isdigit():
         return True

@@ -4,12 +4,14 @@
                         G5 just before it: (I, J) = -(P, Q) of that one
     G5.1 X Y I J        quadratic; its inner control point is the start plus (I, J)
     G5.2 X Y P L        control points with weights P; the order L (degree plus one) is 2, 3 or 4, by itself 3. The first control point
-                        is where the machine stands; a P without X and Y, before any other, is its weight. G5.3 ends the list, and the
-                        curve is run: knots are even, with the ends' repeated, as LinuxCNC has them
+                        is where the machine stands; a P without X and Y, before any other, is its weight.
+                        G5.3 ends the list, and the curve is run: knots are even, with the ends' repeated, as
+                        LinuxCNC has them
     G6.2 P K X Y Z R    a knot K in every line, a control point X Y Z with the weight R in all but the last P ones, P the order, 2 to 4,
                         by itself 4, as Fanuc has it. The curve is run with its last knot
 
-G5 to G5.2 are curves in the X Y plane (G17). A curve of several lines is one block, at the line where it begins.
+G5 to G5.2 are curves in the X Y plane (G17). A curve of several lines is one block, at the line where it
+begins.
 """
 
 from __future__ import annotations
@@ -81,8 +83,8 @@ class SplineReader:
         self._reflected: tuple[int, FloatArray] | None = None  # blocks after the last G5, and its -(P, Q)
 
     def read(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
-        """The pieces of the curve that ends on this line, and the line where it begins; None where none ends. `blocks` of the program
-        were read before.
+        """The pieces of the curve that ends on this line, and the line where it begins; None where none ends.
+        `blocks` of the program were read before.
 
         Raises WordFault for words that are missing or contradict each other; an open curve is then given up.
         """
@@ -273,7 +275,8 @@ def _order(block: Block, letter: str) -> int:
 
 
 def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray:
-    """(3,) the control point of a line of G6.2 [mm]; coordinates that it does not name are those of the point before."""
+    """(3,) the control point of a line of G6.2 [mm]; coordinates that it does not name are those of the point
+    before."""
     if not state.absolute:
         raise WordFault(_any_word(block), "control points of G6.2 with G91 are not read; write G90 before it")
     here = state.position

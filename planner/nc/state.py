@@ -2,8 +2,8 @@
 
     machine position = origin of the work system + tool offset + R (programmed coordinate * unit + G92 offset)
 
-R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm and all positions in machine coordinates, so
-that changing an offset moves nothing.
+R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm and all positions in
+machine coordinates, so that changing an offset moves nothing.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ class System:
 
 @dataclass(slots=True)
 class Spindle:
-    """The spindle: speed [1/min], turning (+1 M3, -1 M4, 0), whether S is a surface speed (G96) [m/min or ft/min], and the
-    largest speed then [1/min], 0 where it has no bound."""
+    """The spindle: speed [1/min], turning (+1 M3, -1 M4, 0), whether S is a surface speed (G96) [m/min or
+    ft/min], and the largest speed then [1/min], 0 where it has no bound."""
 
     speed: float = 0.0
     turning: int = 0
@@ -85,8 +85,8 @@ class Spindle:
 
 @dataclass(slots=True)
 class CycleSeries:
-    """Canned cycles one after the other: the motion code, the words of that code in force, and the level before the first of them,
-    all as programmed."""
+    """Canned cycles one after the other: the motion code, the words of that code in force, and the level
+    before the first of them, all as programmed."""
 
     code: int
     words: dict[str, float]
@@ -118,7 +118,8 @@ class State:
     retract_given : a G98 or G99 was read
     series       : canned cycles in force
     cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
-    actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
+    actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it
+                   from; or None
     strict       : nothing is assumed (`Reading.strict`)
     fanuc        : G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
     seconds_meant : the unit of dwells is known
@@ -215,8 +216,8 @@ class State:
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of the machine for a program: offsets, positions and tools, all zero without a machine; a feed [mm/s] where the program
-    gives none."""
+    """Settings of the machine for a program: offsets, positions and tools, all zero without a machine; a feed
+    [mm/s] where the program gives none."""
 
     path_control: PathControl = PathControl.BLEND
     systems: dict[int, FloatArray] = field(default_factory=dict)

@@ -1,7 +1,10 @@
-"""A program written out as NC text, for those that were read from something else (HPGL): the reader reads the same program again.
+"""A program written out as NC text, for those that were read from something else (HPGL): the reader reads the
+same program again.
 
-The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T words for the events, of
-which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to `DECIMALS`, a tenth of what the reader may be off.
+The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T
+                            words for the events, of
+which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to `DECIMALS`, a tenth of what
+the reader may be off.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
 def program_text(program: Program, feeds: FloatArray, tolerance: float) -> str:
     """The NC text of a program in the plane z = 0.
 
-    feeds     : (B,) feed of each block [mm/s]; looked at where a block moves at a feed, and finite and not negative there
+    feeds     : (B,) feed of each block [mm/s]; looked at where a block moves at a feed, and finite and not
+                negative there
     tolerance : contour error budget [mm], for G64 P
     """
     words = [f"({program.source.rpartition('/')[2].translate(_NO_COMMENT)}, written by feedrate-planner)"]

@@ -1,23 +1,26 @@
 """Motion in step with the spindle: G33, G33.1 and the threading cycle G76.
 
-The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan starts and ends at rest:
-with full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out, whose lengths the machine's
-acceleration and jerk give (geometry/run_in.py, which refuses a cut without room for them; the verdict looks at the feed between).
-LinuxCNC accelerates in the synchronised move, too. G33.1 taps: along the thread and back to its start.
+The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan
+starts and ends at rest: with full stops at both ends of the cut the feed is reached behind the run-in and
+held up to the run-out, whose lengths the machine's acceleration and jerk give (geometry/run_in.py, which
+refuses a cut without room for them; the verdict looks at the feed between). LinuxCNC accelerates in the
+synchronised move, too. G33.1 taps: along the thread and back to its start.
 
 The threading cycle G76: from its words to passes.
 
-G76 cuts a thread on a lathe, from the drive line (x0, z0) to the depth K below the thread's peak at x0 + I, in passes of the depths
+G76 cuts a thread on a lathe, from the drive line (x0, z0) to the depth K below the thread's peak at x0 + I,
+in passes of the depths
 
     d_n = J n^(1/R)  while below K,   then K once and for each of the H spring passes
 
-so that with R = 2 every pass takes the same section of chip. In the direction s = sign(I) of x and t of z, pass d is the last pass
-moved back by K - d, at the compound angle Q along z:
+so that with R = 2 every pass takes the same section of chip. In the direction s = sign(I) of x and t of z,
+pass d is the last pass moved back by K - d, at the compound angle Q along z:
 
     from  z0 + t d tan Q  to  z1 - t (K - d) tan Q,   cut at x0 + s (|I| + d),   cleared at x0 - s (K - d)
 
-Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the peak line of the pass and its depth; on them the
-pitch along z stays P. Lengths are in programmed units. In diameter mode (G7) I, J and K are diameters too.
+Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the peak line of the pass and its
+depth; on them the pitch along z stays P. Lengths are in programmed units. In diameter mode (G7) I, J and K
+are diameters too.
 """
 
 from __future__ import annotations
@@ -112,7 +115,8 @@ def passes(thread: Thread) -> Iterator[Cut]:
 
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
-    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that are missing or wrong."""
+    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that
+    are missing or wrong."""
     word, value = block.motion_word(), block.value
     for letter, what in _NEEDED.items():
         if letter not in value:
@@ -232,7 +236,8 @@ def _say(state: State, block: Block, findings: Findings) -> None:
 
 
 def _feed(state: State, block: Block, pitch: float) -> float:
-    """The feed [mm/s] of so many programmed units in a turn. Raises WordFault if the spindle has no speed that is known."""
+    """The feed [mm/s] of so many programmed units in a turn. Raises WordFault if the spindle has no speed
+    that is known."""
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
     if spindle.surface_speed:
         raise block.fault(

@@ -1,8 +1,10 @@
-"""The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 switch it on and off on a machine with kinematics.
+"""The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 switch it on and off on a
+machine with kinematics.
 
-While it is on, x, y, z of the program are those of the controlled point p of machine/kinematics/chain.py: the tool's tip as seen
-from the workpiece, with the tool's length L in z. While it is off they are the joints q. The switch moves nothing: what stands
-still are the joints. L is the length of the tool offset in force, else `tool_length` of the machine file.
+While it is on, x, y, z of the program are those of the controlled point p of machine/kinematics/chain.py: the
+tool's tip as seen from the workpiece, with the tool's length L in z. While it is off they are the joints q.
+The switch moves nothing: what stands still are the joints. L is the length of the tool offset in force, else
+`tool_length` of the machine file.
 
 The program that is planned is one of p throughout. A move with the switch off is
 
@@ -48,7 +50,8 @@ _JOINT_PLACES = {280: "G28", 300: "G30", 530: "G53"}  # one-shots whose coordina
 
 
 class Switch(NamedTuple):
-    """On or off from a block on: the word that switched it on, "" where it is off, and the tool's length [mm]."""
+    """On or off from a block on: the word that switched it on, "" where it is off, and the tool's length
+    [mm]."""
 
     block: int
     line: int
@@ -73,7 +76,8 @@ class ToolPointSwitch:
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
     def take(self, state: State, table: BlockTable, block: Block) -> None:
-        """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a tool off its axis."""
+        """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a
+        tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
             raise block.fault(
@@ -95,7 +99,8 @@ class ToolPointSwitch:
             self.switches.append(Switch(table.blocks, block.line, now, length))
 
     def check(self, state: State, block: Block, before: FloatArray) -> None:
-        """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes stand at 0.
+        """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes
+        stand at 0.
 
         before : (6,) place of the further axes before the block
         """
@@ -142,8 +147,8 @@ class ToolPointSwitch:
 
 
 def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | None) -> Program:
-    """The program as one of the controlled point throughout (module text), if the tool centre point is on somewhere while rotary axes
-    are off 0; else the program itself.
+    """The program as one of the controlled point throughout (module text), if the tool centre point is on
+    somewhere while rotary axes are off 0; else the program itself.
 
     Raises InputError for feed moves while it is off and a rotary axis is off 0, and for tools of two lengths.
     """
@@ -289,7 +294,8 @@ class _Pieces:
         )
 
     def _chords(self, begin: FloatArray, end: FloatArray) -> FloatArray:
-        """(n, A) ends in p of the chords of a straight line of the joints; the path leaves none of them by more than `within`."""
+        """(n, A) ends in p of the chords of a straight line of the joints; the path leaves none of them by
+        more than `within`."""
         count = 1
         while True:
             share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]

@@ -1,16 +1,21 @@
-"""Roughing cycles of lathes, G71, G72 and G73: from the profile of a part to the passes that lead to it, as Fanuc and Haas have them.
+"""Roughing cycles of lathes, G71, G72 and G73: from the profile of a part to the passes that lead to it, as
+Fanuc and Haas have them.
 
-Points are complex numbers, z + i x in radii [mm]. The profile leads from A, where the tool stands, to its first point and along lines
-and arcs. Moved by the finishing allowance w + i u / 2 (not offset: its corners stay as they are) it is the last pass of every cycle.
+Points are complex numbers, z + i x in radii [mm]. The profile leads from A, where the tool stands, to its
+first point and along lines and arcs. Moved by the finishing allowance w + i u / 2 (not offset: its corners
+stay as they are) it is the last pass of every cycle.
 
     G71    passes along z at the levels x = C - n d, n = 1, 2 ..., while they lie outside of the profile's first point; C is A moved
-           by the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45 degrees and goes back fast
+           by the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45
+           degrees and goes back fast
     G72    the same with x and z exchanged
     G73    the profile itself, n times, moved by the allowance + (i, k) (n - pass) / (n - 1): from the full (i, k) to nothing
 
-The way to a level and to the first point is fast if the profile's first move is (G0), else at the feed. All cycles end at A.
+The way to a level and to the first point is fast if the profile's first move is (G0), else at the feed. All
+cycles end at A.
 
-Sources: the formats as Haas describes them (haascnc.com, G71, G73) and Hurco's and Fanuc's programmers' manuals (G71 U R, G71 P Q U W).
+Sources: the formats as Haas describes them (haascnc.com, G71, G73) and Hurco's and Fanuc's programmers'
+         manuals (G71 U R, G71 P Q U W).
 """
 
 from __future__ import annotations
@@ -32,7 +37,8 @@ class ContourFault(ValueError):
 
 @dataclass(frozen=True)
 class Leg:
-    """A move of a profile to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or clockwise (-1) in (z, x)."""
+    """A move of a profile to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or
+    clockwise (-1) in (z, x)."""
 
     end: complex
     turning: int = 0
@@ -45,7 +51,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class Contour:
-    """A profile: where the tool stands before it, whether its first move is fast, and its legs; the first leads to its first point."""
+    """A profile: where the tool stands before it, whether its first move is fast, and its legs; the first
+    leads to its first point."""
 
     start: complex
     fast: bool
@@ -86,7 +93,8 @@ def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterato
 def pattern_repeat(
     contour: Contour, passes: int, shift: complex, allowance: complex
 ) -> Iterator[TurningStep]:
-    """The moves of G73: `passes` times along the profile, the first moved by `shift` more than the last. Raises ContourFault."""
+    """The moves of G73: `passes` times along the profile, the first moved by `shift` more than the last.
+    Raises ContourFault."""
     if not 1 <= passes <= PASSES_MAX:
         raise ContourFault(f"G73 makes 1 to {PASSES_MAX} passes, not {passes}")
     for n in range(passes):
@@ -132,7 +140,8 @@ def _along(contour: Contour, by: complex) -> Iterator[TurningStep]:
 
 
 def _reached(legs: list[Leg], level: float, out: float) -> float:
-    """The real part at which a profile, from its first point on, first reaches a level; its end if it never does."""
+    """The real part at which a profile, from its first point on, first reaches a level; its end if it never
+    does."""
     start = legs[0].end
     for leg in legs[1:]:
         if (leg.end.imag - level) * out >= 0.0:
@@ -176,7 +185,8 @@ def _require_one_way(contour: Contour) -> None:
 
 
 def _directions(start: complex, leg: Leg) -> list[complex]:
-    """Directions of a leg at its ends, and of an arc in the middle of every part of it between two quadrants."""
+    """Directions of a leg at its ends, and of an arc in the middle of every part of it between two
+    quadrants."""
     if not leg.turning:
         return [leg.end - start]
     from_centre = start - leg.centre

@@ -1,17 +1,18 @@
 """Writing a program back with other feeds: F words are put in or replaced, every other byte stays as it is.
 
-An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside it. One is written where
-a block's feed is not the one in force, in those units, and where the source has one on the block's line its number is replaced. A block
-that keeps its programmed feed keeps the source's word, or gets the programmed feed written out where one of ours is in force. Lines
-under G93 and G95, and threads, have no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a
-line, beside G0) stay, they are what the source says.
+An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside
+it. One is written where a block's feed is not the one in force, in those units, and where the source has one
+on the block's line its number is replaced. A block that keeps its programmed feed keeps the source's word, or
+gets the programmed feed written out where one of ours is in force. Lines under G93 and G95, and threads, have
+no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a line, beside G0)
+stay, they are what the source says.
 
-Controls differ in what a feed per minute is where rotary axes move. Such a block can be given under G93 instead, by how often it could
-be run in a minute, in every block anew; the first other one after it has G94 and its feed. A line with a word of its own for the feed
-mode keeps it.
+Controls differ in what a feed per minute is where rotary axes move. Such a block can be given under G93
+instead, by how often it could be run in a minute, in every block anew; the first other one after it has G94
+and its feed. A line with a word of its own for the feed mode keeps it.
 
-Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then takes
-up to 0.1 % longer than asked.
+Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then
+takes up to 0.1 % longer than asked.
 """
 
 from __future__ import annotations
@@ -46,9 +47,10 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     """The program `source` with new feeds.
 
     program : what the reader made of `source`, with the settings that it was read with
-    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed is
-              never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
-    inverse : (B,) how often a block could be run in a minute, to be written under G93; NaN for blocks with a feed
+    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed
+              is never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
+    inverse : (B,) how often a block could be run in a minute, to be written under G93; NaN for blocks with a
+              feed
 
     Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
@@ -80,7 +82,8 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
-    # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them decides
+    # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them
+    # decides
     rows, first, place = np.unique(row, return_index=True, return_inverse=True)
     fastest = np.zeros(len(rows))
     np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
@@ -90,7 +93,8 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
 
 
 class _FeedModes(NamedTuple):
-    """(R,) the feed mode in force on each row, G93, G94 or G95; and the index of a row's own word for it, or -1."""
+    """(R,) the feed mode in force on each row, G93, G94 or G95; and the index of a row's own word for it, or
+    -1."""
 
     in_force: Array
     word: Array
@@ -157,7 +161,8 @@ def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new:
 
 
 def round_down(value: float) -> str:
-    """A positive number in `SIGNIFICANT` digits at most, not above `value`, without exponent: 1234.56 -> "1234"."""
+    """A positive number in `SIGNIFICANT` digits at most, not above `value`, without exponent: 1234.56 ->
+    "1234"."""
     place = math.floor(math.log10(value)) + 1 - SIGNIFICANT  # of the last digit
     digits = math.floor(value * 10.0**-place * (1.0 + 1e-12))  # 0.3 is 0.3, not 0.2999
     text = f"{digits * 10**place}" if place >= 0 else f"{digits / 10**-place:.{-place}f}".rstrip("0")
@@ -201,7 +206,8 @@ def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
 
 
 def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list[Edit]:
-    """Replace the number of the row's F word, or append an F word to the row's words, and behind them the word of a feed mode."""
+    """Replace the number of the row's F word, or append an F word to the row's words, and behind them the
+    word of a feed mode."""
     last = int(words.first[row + 1]) - 1
     at, end = int(words.at[last]), _end(words, last)
     tight = words.data[at - 1 : at].isalnum() or words.data[at - 1 : at] == b"."  # written X1Y2

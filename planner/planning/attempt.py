@@ -18,7 +18,8 @@ class Tried:
     """The outcome of the attempts so far.
 
     best  : the fastest plan; None before there is one
-    path  : the time-optimal motion on a path, and in time with its limits kept between grid points, not delivered yet; None before
+    path  : the time-optimal motion on a path, and in time with its limits kept between grid points, not
+            delivered yet; None before
     joint : whether the best is of the joint search
     steps : of constant jerk, that the joint search has
     left  : whether the joint search has anything to gain

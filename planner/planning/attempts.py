@@ -1,8 +1,10 @@
-"""The attempts of methods `optimal` and `second-order` at a motion, in the order in which they are made (planning/page.py).
+"""The attempts of methods `optimal` and `second-order` at a motion, in the order in which they are made
+(planning/page.py).
 
-The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round has reshaped, with a motion
-that need not be fit for delivery. Where it does not end, or where a small path doubles back within the tolerance, the splines are
-reshaped, and it begins there once more; where it cannot run, or leaves something, the motion on that path is delivered.
+The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round
+has reshaped, with a motion that need not be fit for delivery. Where it does not end, or where a small path
+doubles back within the tolerance, the splines are reshaped, and it begins there once more; where it cannot
+run, or leaves something, the motion on that path is delivered.
 """
 
 from __future__ import annotations
@@ -28,10 +30,10 @@ from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.path_motion import first_motion, kept_on_path, plan_on_path
 from planner.planning.page import best_of
 
-# A motion of more steps than the second that takes no more than the first over what its feed asks for is not searched [-]: on 30,000
-# lines of dense chords the search took half of the computing and found nothing; on a random job of ten blocks it found 9e-4. Nor are
-# the splines of such a motion reshaped because its path doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19
-# for 8e-5 of the time.
+# A motion of more steps than the second that takes no more than the first over what its feed asks for is not
+# searched [-]: on 30,000 lines of dense chords the search took half of the computing and found nothing; on a
+# random job of ten blocks it found 9e-4. Nor are the splines of such a motion reshaped because its path
+# doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19 for 8e-5 of the time.
 LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 SAME_TIME = 1e-4  # less is the gap of the solvers [-]
 # Steps that a motion has on a leg at least (joint/guess.py).
@@ -63,8 +65,8 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended from the first ones, and
-    where the path doubles back."""
+    """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended
+    from the first ones, and where the path doubles back."""
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
     return small and (tried.best is None or (tried.steps <= CHEAP and _doubles_back(job)))
 
@@ -102,8 +104,8 @@ def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether nothing passes, full stops take less time, which is known before, or there is only the motion on a path of a job that is
-    not long."""
+    """Whether nothing passes, full stops take less time, which is known before, or there is only the motion
+    on a path of a job that is not long."""
     if settings.corner != AUTO:
         return False
     stops_sooner = job.line_stop_time < counted_time(tried.best)
@@ -111,7 +113,8 @@ def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bo
 
 
 def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
-    """Method kinematic, and full stops at the ends of all blocks but of lines that go straight on, where that does not pass."""
+    """Method kinematic, and full stops at the ends of all blocks but of lines that go straight on, where that
+    does not pass."""
     best = tried.best
     if not np.isfinite(Limits.of(job.machine, job.toolpath.axes).tangential):  # which its corners do not keep
         rival = KinematicMethod().plan_job(job.faster_than(counted_time(best)))
@@ -138,7 +141,8 @@ class Retry(NamedTuple):
     steps : in the trace, as they begin
     when  : and what
     most  : at most so often
-    worth : how much longer plans are without it in whose trace it shows, on the mean and at worst [-], or what it saves from failing
+    worth : how much longer plans are without it in whose trace it shows, on the mean and at worst [-], or
+            what it saves from failing
     """
 
     steps: tuple[str, ...]
@@ -147,8 +151,8 @@ class Retry(NamedTuple):
     worth: str
 
 
-# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without it; worth as in
-# benchmarks/results/ablation.md.
+# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without
+# it; worth as in benchmarks/results/ablation.md.
 RETRIES = (
     Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
     Retry(
@@ -192,8 +196,9 @@ def _at_feed(job: Job) -> float:
 
 
 def _doubles_back(job: Job) -> bool:
-    """Whether the path turns back on both ends of a block so short that one place is within the tolerance of both: splines that are
-    reshaped find a way without the detour, the search does not find it from the first ones (7 of 320 random jobs, by up to 12 %)."""
+    """Whether the path turns back on both ends of a block so short that one place is within the tolerance of
+    both: splines that are reshaped find a way without the detour, the search does not find it from the first
+    ones (7 of 320 random jobs, by up to 12 %)."""
     path = job.toolpath
     turn = np.sum(path.tangent_end[:-1] * path.tangent_start[1:], axis=1)
     back = (turn < 0.0) & (path.joint[1:-1] != Joint.STOP)

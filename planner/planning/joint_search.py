@@ -1,9 +1,11 @@
-"""The joint search of a job: from a motion along a smoothed path to path and feed found together (joint/), run by run.
+"""The joint search of a job: from a motion along a smoothed path to path and feed found together (joint/),
+run by run.
 
-A run is what lies between two full stops. Long runs are searched one after the other, the windows of each side by side, then short ones
-side by side; what is found does not depend on the number of threads. The motion from which the search begins may keep its limits at
-the points of a coarse grid only: where the search leaves no step of it nothing else is asked of it, and a run on which the search does
-not end is planned by itself in another way (runs_alone.py). Or it keeps them everywhere: then it stays where the search does not end.
+A run is what lies between two full stops. Long runs are searched one after the other, the windows of each
+side by side, then short ones side by side; what is found does not depend on the number of threads. The motion
+from which the search begins may keep its limits at the points of a coarse grid only: where the search leaves
+no step of it nothing else is asked of it, and a run on which the search does not end is planned by itself in
+another way (runs_alone.py). Or it keeps them everywhere: then it stays where the search does not end.
 """
 
 from __future__ import annotations
@@ -46,9 +48,11 @@ from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
 LONG = SIZES.searched_shared
-# Runs that are not found are planned each by itself; with more than this share of the steps on them the job is, as a whole [-].
+# Runs that are not found are planned each by itself; with more than this share of the steps on them the job
+# is, as a whole [-].
 FAILED_MOST = 0.5
-# What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each other [-].
+# What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
+# other [-].
 SEARCHES = (1.0, 1.2, 2.3)
 # Share of the time without prices from which that is said, and from which there are none [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
@@ -58,15 +62,16 @@ Report = Callable[[float], None]
 
 
 class Joint(NamedTuple):
-    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the steps of the motion."""
+    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the
+    steps of the motion."""
 
     plan: Plan | None
     steps: int
 
 
 def searchable(job: Job) -> bool:
-    """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no limits of the user, no
-    range in step with the spindle; and whether the path leaves it anything to find."""
+    """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no
+    limits of the user, no range in step with the spindle; and whether the path leaves it anything to find."""
     machine, toolpath = job.real
     return (
         machine.fir is None
@@ -85,11 +90,13 @@ def joint_plan(
     alone: Callable[[Job], Plan],
     motion: Motion | None = None,
 ) -> Joint:
-    """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where shorter ones do not pass.
+    """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where
+    shorter ones do not pass.
 
     search : how finely, and up to which size
     alone  : plans a run, as a job, on which the search does not end, or the verdict finds something
-    motion : that on the path where it keeps its limits between grid points too: it stays where the search does not end; else None
+    motion : that on the path where it keeps its limits between grid points too: it stays where the search
+             does not end; else None
     """
     stays = motion is not None
     with job.stage("search") as report:
@@ -147,8 +154,8 @@ def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list
 
 
 class InTwo(NamedTuple):
-    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones; else in the first of
-    those from the start."""
+    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones;
+    else in the first of those from the start."""
 
     first: TubeOwn
     finer: tuple[tuple[Cut, TubeOwn], ...]
@@ -176,8 +183,8 @@ def _of_whole(report: Report, begin: float, end: float, share: float) -> None:
 def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun] | None:
-    """The solution on each run; None where more than `FAILED_MOST` of the steps are on runs that are not found as a whole, unless the
-    start `stays` there."""
+    """The solution on each run; None where more than `FAILED_MOST` of the steps are on runs that are not
+    found as a whole, unless the start `stays` there."""
     size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
     found: list[FoundRun | None] = [None for _ in runs]
     stopped = threading.Event()
@@ -215,7 +222,8 @@ def searched_runs(
 def search_run(
     k: int, run: TubeRun, start: Start, solver: TubeSolver | InTwo, within: float = np.inf
 ) -> FoundRun:
-    """The solution of the search along run k from its start; of no use if it takes as long as `within` [s]."""
+    """The solution of the search along run k from its start; of no use if it takes as long as `within`
+    [s]."""
     if run.left:
         return FoundRun(run, Status.ACCEPTABLE, run.left)
     guess = start.guess(k, run)
@@ -235,7 +243,8 @@ def search_run(
 
 
 def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun, Guess, TubeSolution]:
-    """The run with the budgets that the last of the searches had, the steps from which that began, and its solution."""
+    """The run with the budgets that the last of the searches had, the steps from which that began, and its
+    solution."""
     guess = start.guess(k, run)
     found = solver.first.solve(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
@@ -259,8 +268,9 @@ def tabled(
     stays: list[int],
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> tuple[Tables, tuple[str, ...]]:
-    """The active limits of the delivered motion, and the prices of limits and tolerance (sensitivity/found_*.py), of the search where it
-    tells: not on the runs in `stays`, of which a note speaks, and not behind filters.
+    """The active limits of the delivered motion, and the prices of limits and tolerance
+    (sensitivity/found_*.py), of the search where it tells: not on the runs in `stays`, of which a note
+    speaks, and not behind filters.
 
     start : what holds the motion that stays there
     alone : what holds runs that are planned each by itself

@@ -38,12 +38,14 @@ class Start(RunsInTime):
         return self._guesses[k]
 
     def with_reserve(self, run: TubeRun, leg: Array, found: TubeSolution) -> TubeRun:
-        """A run whose budgets leave room for the chords of the motion that was found along it, and no more; leg (N,) of its steps."""
+        """A run whose budgets leave room for the chords of the motion that was found along it, and no more;
+        leg (N,) of its steps."""
         job = self._job
         return with_reserve(run, job.toolpath, job.machine, reserve_for(run, leg, found, job.machine.dt))
 
     def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
-        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts of it can stay."""
+        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts
+        of it can stay."""
         guess = guess_from(run, *self.window(k, run), cut)
         inner = self.departure[k] + np.cumsum(guess.h[:-1])
         seen = self.motion.at(inner, 1.0)
@@ -61,7 +63,8 @@ class Start(RunsInTime):
         along = dataclasses.replace(self.seen, **columns)
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
-        # Blocks so short that the motion is nearest to both of their ends at the same time share the time of their neighbours.
+        # Blocks so short that the motion is nearest to both of their ends at the same time share the time of
+        # their neighbours.
         apart = LEAST_APART * (end - begin) / len(run)
         seen = np.append(True, np.diff(t) > apart)
         seen[1:] &= t[1:] < end - apart

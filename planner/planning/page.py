@@ -39,19 +39,22 @@ from planner.planning.job.trace import Log
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.result import prices_of
 
-# Runs on which the verdict finds something are planned each by itself where they are no more than this share of all [-].
+# Runs on which the verdict finds something are planned each by itself where they are no more than this share
+# of all [-].
 ALONE_SHARE = 0.1
-# Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the mean as seven were, for
-# 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
+# Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the
+# mean as seven were, for 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
 
 
 class Method(ABC):
     """A way to plan a job. Its repr is its row label in every table.
 
-    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that closed forms use), see
-              `Job.with_share`; they are tried beside (1, 1), and the fastest plan is taken
-    measures_filters : whether filters make its motions slower only where they are measured to leave the tolerance
+    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that
+              closed forms use), see `Job.with_share`; they are tried beside (1, 1), and the fastest plan is
+              taken
+    measures_filters : whether filters make its motions slower only where they are measured to leave the
+                       tolerance
     keeps_tangential : whether its motions keep the machine's limit of the tangential acceleration
     """
 
@@ -61,7 +64,8 @@ class Method(ABC):
 
     @property
     def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the verdict says the rest."""
+        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the
+        verdict says the rest."""
         return True
 
     @abstractmethod
@@ -82,8 +86,8 @@ class Method(ABC):
         progress  : called with the stage's name and the fraction done (0 to 1)
         log       : called with every step of the planning, e.g. a `Trace` (trace.py)
 
-        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep. An unsolved problem is
-        the status of the plan.
+        Raises InputError for a program that cannot be planned, and for a limit that the method does not keep.
+        An unsolved problem is the status of the plan.
         """
         job = job_of(program, machine, tolerance, Stages(progress, log))
         if not self.keeps_tangential and np.isfinite(Limits.of(machine, job.toolpath.axes).tangential):
@@ -119,8 +123,8 @@ def job_of(program: Program, machine: Machine, tolerance: float | None, stages: 
 
 
 def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:
-    """Whether filters behind the setpoints make the plan slower, as far as is known: then less of the tolerance for the path may be
-    faster."""
+    """Whether filters behind the setpoints make the plan slower, as far as is known: then less of the
+    tolerance for the path may be faster."""
     if job.machine.fir is None or best.making is None:
         return False
     return not method.measures_filters or not passed(best) or best.making.filtered
@@ -129,7 +133,8 @@ def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:
 def within_tolerance(job: Job, method: Method) -> Plan:
     """The plan of a job, of which the chords between samples keep the tolerance too (delivery/periods.py).
 
-    A motion that takes longer than `job.most` is not planned again: with less tolerance it would hardly be faster.
+    A motion that takes longer than `job.most` is not planned again: with less tolerance it would hardly be
+    faster.
     """
     made = method.plan_job(job)
     if made.verdict is None or (made.verdict.passed and (inside(made) or not method.keeps_tolerance)):
@@ -141,7 +146,8 @@ def within_tolerance(job: Job, method: Method) -> Plan:
 
 
 def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan:
-    """The plan of the attempts that apply, in turn; the last one that makes a plan when there is none always does."""
+    """The plan of the attempts that apply, in turn; the last one that makes a plan when there is none always
+    does."""
     tried = Tried()
     for attempt in attempts:
         if attempt.applies(job, settings, tried):
@@ -152,8 +158,8 @@ def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan
 
 
 def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
-    """The plan with the runs on which its verdict finds something planned each by itself, and all others as they are; None where these
-    are not few, or what comes of it does not pass."""
+    """The plan with the runs on which its verdict finds something planned each by itself, and all others as
+    they are; None where these are not few, or what comes of it does not pass."""
     machine, toolpath = job.real
     making, verdict, stops = made.making, made.verdict, full_stops(job.toolpath)
     if (

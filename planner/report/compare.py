@@ -1,7 +1,7 @@
 """Several methods on one job: each is planned and judged, and whatever comes of it is its row.
 
-The best is the fastest motion that passed with every quantity limited. A motion without a jerk limit (method second-order) is listed
-beside it, and is the best only if no other passed.
+The best is the fastest motion that passed with every quantity limited. A motion without a jerk limit (method
+second-order) is listed beside it, and is the best only if no other passed.
 """
 
 from __future__ import annotations
@@ -42,11 +42,13 @@ class Row:
     cycle_time    : [s]; None without a motion, as the following fields
     worst         : for each quantity the largest ratio to its limit, and the name of that limit ("jerk.y")
     free          : quantities that this method does not limit
-    contour_error, vertex_error : [mm]
-    after_filters : the larger of both behind the filters of the machine [mm]; None without filters, or where it is not known
+    contour_error, vertex_error : [mm] after_filters : the larger of both behind the filters of the machine
+    [mm]; None without filters, or where it is not known
     corner_ratio  : the largest ratio of eq. 18-19 at the programmed corners [-]; None without corners
-    gain          : median of the speed there over eq. 20 of the paper's corner [-]; None where it is not defined
-    ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm]; None without modes
+    gain          : median of the speed there over eq. 20 of the paper's corner [-]; None where it is not
+                    defined
+    ringing       : largest amplitude of a linear axis at which a vibration mode rings after the motion [mm];
+                    None without modes
     planning_time : computing time without reading, sampling and verification [s]
     summary       : the content of `summary.json`
     shown         : samples of the motion for a page (html/comparison_page.py); None unless asked for
@@ -94,8 +96,8 @@ def compare(
     methods   : names, or methods with settings of your own, one name alone too; None for all that have names
     the others : as in `planner.plan`
 
-    Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a method cannot do is its
-    row.
+    Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a
+    method cannot do is its row.
     """
     from planner.planning.methods.registry import DEFAULT_MACHINE
 
@@ -200,7 +202,8 @@ def _ringing(verdict: Verdict) -> float | None:
 
 
 def best_of(rows: list[Row]) -> Row | None:
-    """The fastest method that passed, among those that limit every quantity if there is one; None if none passed."""
+    """The fastest method that passed, among those that limit every quantity if there is one; None if none
+    passed."""
     passed = [row for row in rows if row.passed]
     candidates = [row for row in passed if not row.free] or passed
     return min(candidates, key=lambda row: row.cycle_time or np.inf, default=None)

@@ -114,13 +114,15 @@ def comparison_csv(rows: list[Row]) -> str:
 
 
 def write_comparison(path: Path, rows: list[Row], about: dict[str, Any]) -> None:
-    """Write the comparison as JSON or CSV, the whole file or nothing. Raises InputError if it cannot be written."""
+    """Write the comparison as JSON or CSV, the whole file or nothing. Raises InputError if it cannot be
+    written."""
     made = json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False) + "\n"
     write_whole(path, readable(comparison_csv(rows) if path.suffix == ".csv" else made))
 
 
 def about_job(source: str, machine: Machine, tolerance: float | None) -> dict[str, Any]:
-    """The values that all rows have in common. `tolerance` [mm] is None if the program or the machine sets it."""
+    """The values that all rows have in common. `tolerance` [mm] is None if the program or the machine sets
+    it."""
     return {
         "program": source,
         "machine": machine.model_dump(mode="json", exclude_none=True),

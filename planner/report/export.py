@@ -1,8 +1,9 @@
 """The files of a plan, and the plan in numbers.
 
-`trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program is an NC text
-(`planner.report.planned`), the program itself if no other file has it, `summary.json`, and pictures if asked for. They take their
-places together (`planner.report.replace`), and trajectory and summary carry the same `run_id`.
+`trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program is an
+NC text (`planner.report.planned`), the program itself if no other file has it, `summary.json`, and pictures
+if asked for. They take their places together (`planner.report.replace`), and trajectory and summary carry the
+same `run_id`.
 """
 
 from __future__ import annotations
@@ -48,10 +49,11 @@ def write_plan(
     report      : write a page that opens in a browser, too (report/html/page.py)
     force       : replace files of these names even if no run wrote them
 
-    Returns the names of the files. The `notes` of the summary are those of the plan, followed by what was left out and why.
+    Returns the names of the files. The `notes` of the summary are those of the plan, followed by what was
+    left out and why.
 
-    Raises InputError if the directory cannot be written, or if a file is in the way that no run wrote. Raises ValueError for a plan
-    without a trajectory.
+    Raises InputError if the directory cannot be written, or if a file is in the way that no run wrote. Raises
+    ValueError for a plan without a trajectory.
     """
     if plan.trajectory is None:
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
@@ -98,7 +100,8 @@ def write_plan(
 
 
 def program_to_keep(plan: Plan) -> dict[str, bytes]:
-    """The program of a plan as a file, by name, if it was given as a text or as points: no other file has it. Empty otherwise."""
+    """The program of a plan as a file, by name, if it was given as a text or as points: no other file has it.
+    Empty otherwise."""
     if plan.program.text is not None:
         return {KEPT_TEXT: plan.program.text}
     return {KEPT_POINTS: points_file(plan.program)} if plan.program.source == SOURCE else {}
@@ -115,8 +118,8 @@ def check_places(
 ) -> None:
     """Raise InputError if `write_plan` could not write into a directory.
 
-    That is so if one of its files is among the `inputs` (program and machine), or exists and no run wrote it. A `planned.ngc` that is
-    the program itself stays as it is and is no reason.
+    That is so if one of its files is among the `inputs` (program and machine), or exists and no run wrote it.
+    A `planned.ngc` that is the program itself stays as it is and is no reason.
     """
     names = [f"trajectory.{file_format}", SUMMARY]
     names += [CSV_METADATA] * (file_format == "csv") + ["toolpath.png", "profiles.png"] * plots
@@ -129,7 +132,8 @@ def check_places(
 
 
 def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
-    """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from it."""
+    """The metadata of a trajectory file. `planner verify` reads machine, tolerance and `not_limited` from
+    it."""
     trajectory = plan.trajectory
     assert trajectory is not None
     return json_ready(

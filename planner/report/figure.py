@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
 
 
-# Okabe and Ito (2008), without black; then, for machines with many limits and pages with many methods, the four that are farthest from
-# all before them to people with and without red-green blindness, and seen on light and dark ground (tests/report/test_colours.py).
+# Okabe and Ito (2008), without black; then, for machines with many limits and pages with many methods, the
+# four that are farthest from all before them to people with and without red-green blindness, and seen on
+# light and dark ground (tests/report/test_colours.py).
 COLOURS = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#0000F0", "#901818", "#6060F0", "#30D878",
 )  # fmt: skip
@@ -39,7 +40,8 @@ PRICES = (0.02, "#f6c667"), (0.5, "#e8743b"), (1.0, "#7a1f5c")  # share of the d
 CIVIDIS = (
     "#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838",
 )  # fmt: skip
-# The same where they have to be seen against a light or a dark page: without its bright or its dark end, at equal steps.
+# The same where they have to be seen against a light or a dark page: without its bright or its dark end, at
+# equal steps.
 LOW_TO_HIGH = {
     "light": ("#00224e", "#3b496c", "#77766f", "#ad9650", "#d9a900"),
     "dark": ("#4a7ccc", "#6f86b0", "#9a978f", "#cdb969", "#fee838"),
@@ -180,8 +182,9 @@ SHARE = 0.12  # length of a line, of the largest extent of the path [-]
 
 
 def tool_lines(plan: Plan, most: int) -> FloatArray | None:
-    """(n, 2, 3) the tip and a point on the tool on feed moves, at up to `most` places that are as far from each other along the path
-    [mm]; None where the trajectory is not one of the tip. The plan must have a trajectory."""
+    """(n, 2, 3) the tip and a point on the tool on feed moves, at up to `most` places that are as far from
+    each other along the path [mm]; None where the trajectory is not one of the tip. The plan must have a
+    trajectory."""
     trajectory = plan.trajectory
     if plan.joints is None or trajectory is None:
         return None

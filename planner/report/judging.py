@@ -81,7 +81,8 @@ class FileSays:
     tolerance   : the tolerance it was planned with [mm], or None
     not_limited : quantities that its plan did not limit
     reading     : how its program was read
-    program     : the file of its program; "<text>" and the like where it had none; None where the file does not say
+    program     : the file of its program; "<text>" and the like where it had none; None where the file does
+                  not say
     wrong       : names of entries that no plan writes so
     """
 
@@ -115,7 +116,8 @@ class FileSays:
         )
 
     def program_at(self, trajectory: Path) -> Path:
-        """Where the program is that the file names. Raises InputError if it names none, or if that is not there."""
+        """Where the program is that the file names. Raises InputError if it names none, or if that is not
+        there."""
         found = None if self.program is None else Path(program_file(trajectory.parent, self.program))
         if found is None or not os.path.isfile(found):
             where = "names no program" if found is None else f"names the program {found}, which is not there"
@@ -157,7 +159,8 @@ class FileSays:
 
 
 def program_file(directory: Path, source: str) -> str:
-    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as points."""
+    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as
+    points."""
     kept = [directory / name for name in KEPT if (directory / name).exists()]
     return str(kept[0]) if kept and source.startswith("<") else source
 

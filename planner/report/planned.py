@@ -1,7 +1,7 @@
 """`planned.ngc`: the program of a plan with the planned feeds as F words, read back before it is written.
 
-An NC program changes only in its F words. A plotter file is written as a new NC program, and a program with parameters, loops or
-calls is expanded first: one line of it may be executed at many feeds.
+An NC program changes only in its F words. A plotter file is written as a new NC program, and a program with
+parameters, loops or calls is expanded first: one line of it may be executed at many feeds.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ _MOTION = (
 )  # fmt: skip
 
 
-# Where more than this share of the blocks last less than a period, a control is better off with the original [-].
+# Where more than this share of the blocks last less than a period, a control is better off with the original
+# [-].
 MANY_SHORT = 0.5
 # A path that was written with seven decimals and read back is off by less than this [mm].
 SAME_PATH = 1e-6
@@ -48,13 +49,13 @@ class LeftOut(Exception):
 
 
 def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[bytes, list[str]]:
-    """The program file of a plan, with an F word where the planned feed changes, and notes on blocks for which a control gains nothing
-    from it.
+    """The program file of a plan, with an F word where the planned feed changes, and notes on blocks for
+    which a control gains nothing from it.
 
     planned : what the blocks are planned to take, if it is known already
 
-    Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the same motion, for example
-    because a line would become too long.
+    Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the
+    same motion, for example because a line would become too long.
     """
     assert plan.trajectory is not None
     source, data = plan.program.source, source_text(plan)
@@ -81,8 +82,8 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
 
 
 def _per_minute(plan: Plan, planned: PlannedBlocks) -> FloatArray | None:
-    """(B,) how often a block on which rotary axes move could be run in a minute at its highest planned feed, NaN for the others; None
-    without rotary axes."""
+    """(B,) how often a block on which rotary axes move could be run in a minute at its highest planned feed,
+    NaN for the others; None without rotary axes."""
     toolpath = plan.toolpath
     rotary = [axis in ROTARY_AXES for axis in toolpath.axes]
     if not any(rotary):
@@ -126,7 +127,8 @@ def _is_source(plan: Plan, text: bytes) -> bool:
 
 
 def source_text(plan: Plan) -> bytes | None:
-    """The NC text of the program, if it was given as a text, or read from a file that is still there; None for points."""
+    """The NC text of the program, if it was given as a text, or read from a file that is still there; None
+    for points."""
     data = plan.program.text
     if data is None:
         try:
@@ -147,7 +149,8 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
 
 
 def _expanded(data: bytes, plan: Plan, feeds: FloatArray, often: FloatArray | None) -> bytes:
-    """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does not."""
+    """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does
+    not."""
     from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
 
     source = plan.program.source
@@ -176,7 +179,8 @@ def _read_back(text: bytes, plan: Plan, how: str) -> Program:
 
 
 def _finite(feeds: FloatArray) -> FloatArray:
-    """Feeds that can be written: a block that takes no measurable time gets the feed of the one before, or after."""
+    """Feeds that can be written: a block that takes no measurable time gets the feed of the one before, or
+    after."""
     known = np.flatnonzero(np.isfinite(feeds))
     if not len(known):
         return np.zeros_like(feeds)
@@ -193,7 +197,8 @@ def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
 
 
 def _same(one: Program, other: Program, names: tuple[str, ...], within: float = 0.0) -> bool:
-    """Whether two programs have the same blocks and splines; the latter's points [mm] and weights may be `within` of each other."""
+    """Whether two programs have the same blocks and splines; the latter's points [mm] and weights may be
+    `within` of each other."""
     splines = np.array_equal(one.splines.block, other.splines.block) and all(
         np.allclose(getattr(one.splines, n), getattr(other.splines, n), rtol=0.0, atol=within)
         for n in ("points", "weights")

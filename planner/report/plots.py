@@ -1,6 +1,8 @@
-"""Pictures of a plan, made for paper: fine lines at 200 dpi, units on every axis, colours that colour-blind readers tell apart.
+"""Pictures of a plan, made for paper: fine lines at 200 dpi, units on every axis, colours that colour-blind
+readers tell apart.
 
-The tool path coloured by feed (report/plots.py), and the profiles over time against their limits (report/profiles_figure.py).
+The tool path coloured by feed (report/plots.py), and the profiles over time against their limits
+(report/profiles_figure.py).
 
 The tool path coloured by feed (viridis), over the programmed path.
 
@@ -67,8 +69,9 @@ DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
 
 
 def toolpath_figure(plan: Plan) -> Figure:
-    """The motion coloured by feed over the programmed path; rapids are dashed. Of a program with the tool centre point on the motion is
-    that of the tip, and the tool's direction is drawn at places of its feed moves."""
+    """The motion coloured by feed over the programmed path; rapids are dashed. Of a program with the tool
+    centre point on the motion is that of the tip, and the tool's direction is drawn at places of its feed
+    moves."""
     trajectory = plan.trajectory
     assert trajectory is not None
     motion = three(trajectory)
@@ -125,7 +128,8 @@ def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
 
 
 def one_per_pixel(points: FloatArray) -> Array:
-    """Indices (k,) of the first and the last of the points (n, 2 or 3), and of every point that enters another pixel (or voxel)."""
+    """Indices (k,) of the first and the last of the points (n, 2 or 3), and of every point that enters
+    another pixel (or voxel)."""
     pixel = max(float(np.ptp(points, axis=0).max()) / PIXELS, 1e-9)
     while True:
         pixels = np.floor((points - points.min(axis=0)) / pixel).astype(np.int32)

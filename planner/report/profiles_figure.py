@@ -31,7 +31,8 @@ QUANTITIES = ("acceleration", "jerk")
 
 
 def profiles_figure(plan: Plan) -> Figure:
-    """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits, over time."""
+    """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits,
+    over time."""
     trajectory = plan.trajectory
     assert trajectory is not None
     motion = MotionColumns(plan, trajectory, plan.joints)
@@ -93,7 +94,8 @@ def _feed_row(panel: Axes, motion: MotionColumns, t: FloatArray) -> None:
 
 
 def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
-    """A strip whose colour names what is active, of several the dearest; returns the legend, the largest share first."""
+    """A strip whose colour names what is active, of several the dearest; returns the legend, the largest
+    share first."""
     grid, trajectory = plan.grid, plan.trajectory
     assert grid is not None
     assert trajectory is not None
@@ -135,7 +137,8 @@ def majority(t: FloatArray, kind: Array, kinds: int, end: float) -> Array:
 
 
 def draw_profile(panel: Axes, t: FloatArray, values: FloatArray, colour: str) -> None:
-    """Draw values (T,) over t (T,) [s] as a curve; of many the band between the least and the largest value of each column."""
+    """Draw values (T,) over t (T,) [s] as a curve; of many the band between the least and the largest value
+    of each column."""
     if len(t) <= 4 * COLUMNS:
         panel.plot(t, values, color=colour)
         return

@@ -1,13 +1,15 @@
 """Output files that take their place when all of them are written, `summary.json` last.
 
-The files of a run are written into a hidden directory inside the output directory, forced to disk, and renamed into
-their places in the order of `OUTPUTS`; files of the run before that the new one lacks go in between. A kill before the
-renames leaves the old set, after them the new one, and between two of them whole files of two runs, which can be seen:
-the `run_id` of the trajectory is then not that of `summary.json`, or one of the two is missing.
+The files of a run are written into a hidden directory inside the output directory, forced to disk, and
+renamed into their places in the order of `OUTPUTS`; files of the run before that the new one lacks go in
+between. A kill before the renames leaves the old set, after them the new one, and between two of them whole
+files of two runs, which can be seen: the `run_id` of the trajectory is then not that of `summary.json`, or
+one of the two is missing.
 
-Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their SHA-256, and a
-file that stands alone is known by how it begins. A lock on the directory makes a second run wait, and what is hidden
-there under the lock is the leftover of a killed run. Windows and file systems without such locks do without.
+Nothing is replaced or removed that a run did not write: `summary.json` vouches for its files by their
+SHA-256, and a file that stands alone is known by how it begins. A lock on the directory makes a second run
+wait, and what is hidden there under the lock is the leftover of a killed run. Windows and file systems
+without such locks do without.
 """
 
 from __future__ import annotations
@@ -157,8 +159,8 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
 def check_file(
     path: Path, inputs: Iterable[Path] = (), *, suffixes: tuple[str, ...] = (), force: bool = False
 ) -> None:
-    """Raise InputError if a file cannot be written: for another suffix than `suffixes`, a directory, an input, or a file
-    that no command wrote while `force` is not set."""
+    """Raise InputError if a file cannot be written: for another suffix than `suffixes`, a directory, an
+    input, or a file that no command wrote while `force` is not set."""
     if suffixes and path.suffix not in suffixes:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(suffixes)}", source=str(path))
     with _writing(path):

@@ -1,10 +1,12 @@
-"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under `told`,
-and the report and the card of a notebook show. Nothing else puts these figures into words.
+"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints,
+`summary.json` holds under `told`, and the report and the card of a notebook show. Nothing else puts these
+figures into words.
 
-What a plan says beside its motion: the active limits, what more of them would save, and the corners where tolerance saves most.
+What a plan says beside its motion: the active limits, what more of them would save, and the corners where
+                                    tolerance saves most.
 
-The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the terminal and numbers for
-`summary.json`.
+The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the
+terminal and numbers for `summary.json`.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ Rows = list[tuple[str, str]]
 
 
 def plan_rows(plan: Plan) -> Rows:
-    """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing time, how it was solved."""
+    """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing
+    time, how it was solved."""
     rows: Rows = []
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
@@ -136,7 +139,8 @@ def held_by_text(grid: GridHistory) -> str:
 
 
 def held_by_rows(grid: GridHistory, prices: PriceList | None) -> list[tuple[str, int, str]]:
-    """The active limits, for how many per cent of the time, and what more of it saves: "" where that is not known or nothing."""
+    """The active limits, for how many per cent of the time, and what more of it saves: "" where that is not
+    known or nothing."""
     return [(name, percent, _saves(prices, name)) for name, percent in grid.percents()]
 
 
@@ -182,7 +186,8 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
 
 
 def _by_line(corners: DearCorners) -> str:
-    """The time that more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop passes again are added up."""
+    """The time that more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop
+    passes again are added up."""
     passed: dict[int, list[float]] = {}
     for line, saved in zip(corners.line.tolist(), corners.saved.tolist(), strict=True):
         passed.setdefault(line, []).append(saved / MILLISECOND)
@@ -238,7 +243,8 @@ def _price_summary(prices: PriceList) -> dict[str, Any]:
 
 
 def beside_rows(beside: Sequence[Beside], cycle_time: float, dwell: float) -> list[tuple[str, str]]:
-    """Rows of the table of a plan: dwells, what takes time beside the motion, the total, and what is not in it.
+    """Rows of the table of a plan: dwells, what takes time beside the motion, the total, and what is not in
+    it.
 
     cycle_time : of the motion [s]
     dwell      : of it, as the program sets it [s]

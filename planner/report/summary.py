@@ -87,7 +87,8 @@ def info_summary(info: ProgramInfo) -> dict[str, Any]:
 
 
 def tool_point_summary(point: ToolPoint | None) -> dict[str, Any] | None:
-    """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the joints."""
+    """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the
+    joints."""
     return None if point is None else dataclasses.asdict(point)
 
 
@@ -98,7 +99,8 @@ def versions() -> dict[str, str]:
 
 
 def uniform(tolerance: FloatArray) -> float | None:
-    """The contour tolerance (n,) if it is the same at every joint; None where the program changes it (G64 P)."""
+    """The contour tolerance (n,) if it is the same at every joint; None where the program changes it (G64
+    P)."""
     return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
 
 

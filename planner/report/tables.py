@@ -42,7 +42,8 @@ ASSUMED_SHOWN = 8
 
 
 def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
-    """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing time, how it was solved.
+    """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing
+    time, how it was solved.
 
     notes : printed below, without what `assumed_lines` says first; None for those of the plan
     """
@@ -55,7 +56,8 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
 
 
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
-    """The assumptions about a program that may change geometry or time: the first lines of what a command prints; at most so many."""
+    """The assumptions about a program that may change geometry or time: the first lines of what a command
+    prints; at most so many."""
     return [Text(f"assumed: {text}", style="yellow") for text in first_of(assumptions, most)]
 
 
@@ -70,7 +72,8 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
 
 
 def corners_table(corners: CornerCheck) -> Table | None:
-    """Eq. 18-20 at every programmed corner; of many corners those closest to the limits. None without corners."""
+    """Eq. 18-20 at every programmed corner; of many corners those closest to the limits. None without
+    corners."""
     if not len(corners):
         return None
     speed, budget = corners.told()

@@ -1,4 +1,5 @@
-"""Trajectory files: three formats out; trajectory_reader.py reads them, and `read_trajectory` can be had from here too.
+"""Trajectory files: three formats out; trajectory_reader.py reads them, and `read_trajectory` can be had from
+here too.
 
 A trajectory file is a table, one row per sample:
 
@@ -6,8 +7,9 @@ A trajectory file is a table, one row per sample:
     of an extruder  e [mm of filament] ve ae je,
     line (of the NC program), block (its index; several blocks can come from one line)
 
-Of a program with the tool centre point on, the axes are the joints, s and feed are those of the tip, and its place follows as
-tip_x, tip_y, tip_z [mm]. The feed is what F means (word_feed.py); s is the length in all axes, an angle counting at a radius.
+Of a program with the tool centre point on, the axes are the joints, s and feed are those of the tip, and its
+place follows as tip_x, tip_y, tip_z [mm]. The feed is what F means (word_feed.py); s is the length in all
+axes, an angle counting at a radius.
 
 as Parquet (`.parquet`), CSV (`.csv`: one header line, shortest digits that read back to the same float64) or
 NumPy (`.npz`: one array per column). Metadata (machine, tolerance, units, versions, `run_id`) is in the
@@ -16,10 +18,11 @@ in `trajectory.meta.json` beside it; always as JSON.
 
 Pulse files: one row per pulse, all axes in the order of time.
 
-    t [s], axis (its letter), direction (+1, -1), count (of that axis after the pulse, 0 at the start), line (of the NC program)
+    t [s], axis (its letter), direction (+1, -1), count (of that axis after the pulse, 0 at the start), line
+    (of the NC program)
 
-as Parquet (`.parquet`; the schema's key `planner` holds pulses per mm and the trajectory's `run_id` as JSON) or CSV (`.csv`). The file
-appears as a whole: it is written beside its place, forced to disk and renamed.
+as Parquet (`.parquet`; the schema's key `planner` holds pulses per mm and the trajectory's `run_id` as JSON)
+or CSV (`.csv`). The file appears as a whole: it is written beside its place, forced to disk and renamed.
 """
 
 from __future__ import annotations
@@ -56,10 +59,13 @@ def write_trajectory(
     joints_of: Joints | None = None,
     feed_of: Feeds | None = None,
 ) -> None:
-    """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its metadata.
+    """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its
+    metadata.
 
-    joints_of : the joints of a motion of the tip, of any of its samples; None where the trajectory is that of the axes
-    feed_of   : the feed of any of its samples as F words mean it (word_feed.py); None for that along the path in all axes
+    joints_of : the joints of a motion of the tip, of any of its samples; None where the trajectory is that of
+                the axes
+    feed_of   : the feed of any of its samples as F words mean it (word_feed.py); None for that along the path
+                in all axes
 
     Raises InputError for another suffix.
     """
@@ -81,7 +87,8 @@ def write_trajectory(
 def units(
     axes: tuple[str, ...], *, extruder: bool = False, tip: bool = False, feed: str = "mm/s"
 ) -> dict[str, str]:
-    """The unit of every column, by its name; `extruder`: there are columns of one; `tip`: there are those of the tool's tip."""
+    """The unit of every column, by its name; `extruder`: there are columns of one; `tip`: there are those of
+    the tool's tip."""
     said = {"t": "s"}
     for axis in (*axes, EXTRUDER) if extruder else axes:
         length = "deg" if axis in ROTARY_AXES else "mm"
@@ -145,7 +152,8 @@ def _end_to_end(parts: list[dict[str, Array]]) -> dict[str, Array]:
 
 
 def _table(columns: dict[str, Array]) -> Any:
-    """The columns as pyarrow's table. `pa.table(columns)` is the same, but looks for pandas first, which takes 0.4 s."""
+    """The columns as pyarrow's table. `pa.table(columns)` is the same, but looks for pandas first, which
+    takes 0.4 s."""
     import pyarrow as pa
 
     return pa.table(
@@ -173,9 +181,9 @@ def _write_groups(file: BinaryIO, groups: Iterator[dict[str, Array]], text: str)
     for columns in groups:
         table = _table(columns).replace_schema_metadata({"planner": text})
         if writer is None:
-            # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level
-            # then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take longer and save nothing;
-            # dictionaries make it larger.
+            # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its
+            # fastest level then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take
+            # longer and save nothing; dictionaries make it larger.
             writer = parquet.ParquetWriter(
                 file,
                 table.schema,

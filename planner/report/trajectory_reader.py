@@ -1,7 +1,7 @@
 """Trajectory files, read: those of this package (trajectory_file.py), and files made elsewhere.
 
-Only `t` and the positions are required. Positions may also be one NumPy array (T, n) that is named by its axes, `xyz`. Columns of
-other names are left alone.
+Only `t` and the positions are required. Positions may also be one NumPy array (T, n) that is named by its
+axes, `xyz`. Columns of other names are left alone.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ KNOWN = {"t", "s", "feed", "line", "block"} | {
 # Smallest step between samples of a file made elsewhere [s]: below it finite differences of float64 positions
 # are noise.
 TIME_STEP_MIN = 1e-9
-# Largest magnitude of a value, whatever its unit: third derivatives of larger positions, squared, are no numbers any more.
+# Largest magnitude of a value, whatever its unit: third derivatives of larger positions, squared, are no
+# numbers any more.
 VALUE_MAX = 1e30
 NUMBER_MAX = 2.0**31 - 1.0  # of a line or a block
 
@@ -78,9 +79,10 @@ def trajectory_file(path: Path) -> Path:
 def read_trajectory(path: str | Path) -> TrajectoryFile:
     """Read a trajectory file, written by this package or by another program.
 
-    Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks are divided differences
-    of the other columns, at rest before the first sample and after the last; a missing `s` is the length of the polyline through the
-    samples, a missing `feed` the speed on it. Missing `line` and `block` are 0 and -1, "unknown".
+    Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks
+    are divided differences of the other columns, at rest before the first sample and after the last; a
+    missing `s` is the length of the polyline through the samples, a missing `feed` the speed on it. Missing
+    `line` and `block` are 0 and -1, "unknown".
 
     Raises InputError naming the file and the column.
     """
@@ -111,7 +113,8 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
 
 
 def trajectory_of_columns(given: Mapping[str, Any], source: str) -> TrajectoryFile:
-    """A trajectory of the columns of a file, or of arrays (T,) and (T, n), by their names; the rest as in `read_trajectory`.
+    """A trajectory of the columns of a file, or of arrays (T,) and (T, n), by their names; the rest as in
+    `read_trajectory`.
 
     source : where they come from, for messages
     """
@@ -275,8 +278,8 @@ def _extruder(columns: dict[str, Array], t: FloatArray) -> FloatArray:
 def _levels(
     columns: dict[str, Array], axes: tuple[str, ...], t: FloatArray
 ) -> tuple[list[FloatArray], list[int]]:
-    """(T, A) positions and their three derivatives, what is missing as differences of the last level that is there; and
-    the orders that are there."""
+    """(T, A) positions and their three derivatives, what is missing as differences of the last level that is
+    there; and the orders that are there."""
     levels: list[FloatArray] = []
     there: list[int] = []
     for order, prefix in enumerate(PREFIXES):
@@ -289,7 +292,8 @@ def _levels(
 
 
 def _times(source: str, given: Array) -> tuple[FloatArray, float, float, list[str]]:
-    """Times from 0 [s], what of their rounding remains for all and for the last (trajectory_room.py), and notes on it."""
+    """Times from 0 [s], what of their rounding remains for all and for the last (trajectory_room.py), and
+    notes on it."""
     if len(given) < 2:
         raise InputError(f"{len(given)} samples; at least 2 are needed", source=source)
     late = np.flatnonzero(np.diff(given.astype(np.float64)) < TIME_STEP_MIN)
@@ -317,8 +321,10 @@ def divided_difference(t: FloatArray, values: FloatArray, order: int) -> FloatAr
     values : (T, A) samples
     order  : 1, 2 or 3
 
-    At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first sample and after the last
-    the values are held, as a machine at rest holds them. Exact for polynomials of degree 1, 2 and 3 on equal steps.
+    At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first
+                 sample and after the last
+    the values are held, as a machine at rest holds them. Exact for polynomials of degree 1, 2 and 3 on equal
+    steps.
     """
     after = 1 if order < 3 else 2
     steps = np.diff(t)

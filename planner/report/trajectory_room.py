@@ -1,15 +1,17 @@
-"""How large a trajectory file will be in memory, before it is read: what its headers say, held against its own size.
+"""How large a trajectory file will be in memory, before it is read: what its headers say, held against its
+own size.
 
-An archive of 2 MB may say that it unpacks to gigabytes of zeros. What is judged are times that increase, and positions: those of plans
-take half of their bytes in a Parquet file, a standstill of an hour a hundredth.
+An archive of 2 MB may say that it unpacks to gigabytes of zeros. What is judged are times that increase, and
+positions: those of plans take half of their bytes in a Parquet file, a standstill of an hour a hundredth.
 
 To how many digits a column of numbers was written, and times that lie on a grid.
 
-A column in float32, or printed with p digits, is not what was computed: its numbers are off by up to half a unit of the last digit.
-Third differences at 1 ms multiply that by 8e9, so that whoever judges accelerations and jerks by positions has to know it.
+A column in float32, or printed with p digits, is not what was computed: its numbers are off by up to half a
+unit of the last digit. Third differences at 1 ms multiply that by 8e9, so that whoever judges accelerations
+and jerks by positions has to know it.
 
-Times are nearly always k dt. Where every time but the last is within its rounding of k dt, with one dt of few digits, they are taken
-as that. The last period may be shorter.
+Times are nearly always k dt. Where every time but the last is within its rounding of k dt, with one dt of few
+digits, they are taken as that. The last period may be shorter.
 """
 
 from __future__ import annotations
@@ -36,8 +38,8 @@ _NUMBER = 8  # bytes
 
 
 def npz_shapes(stream: BinaryIO) -> dict[str, tuple[int, ...]]:
-    """The shape of each array of a .npz file by its header. Raises ValueError for another file, and for a header that the archive
-    has not the bytes of."""
+    """The shape of each array of a .npz file by its header. Raises ValueError for another file, and for a
+    header that the archive has not the bytes of."""
     if not zipfile.is_zipfile(stream):
         raise ValueError("a single array (.npy), or no archive of arrays")
     shapes: dict[str, tuple[int, ...]] = {}
@@ -66,8 +68,8 @@ def npz_shapes(stream: BinaryIO) -> dict[str, tuple[int, ...]]:
 
 
 def require_room(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raise InputError where columns of these shapes are no trajectory, or one that is too long to be judged, or that would take far
-    more memory than its file."""
+    """Raise InputError where columns of these shapes are no trajectory, or one that is too long to be judged,
+    or that would take far more memory than its file."""
     lengths = {name: shape[0] for name, shape in shapes.items() if shape}
     if len(set(lengths.values())) > 1:
         raise InputError(f"the columns differ in length: {lengths}", source=str(path))
@@ -98,8 +100,8 @@ FLOAT64 = 4e-16  # relative rounding of a product, twice
 
 
 def rounding(column: Array) -> float:
-    """Largest rounding error of the numbers of a column (T,), from the digits they are written with, in its unit; 0 if they show
-    none."""
+    """Largest rounding error of the numbers of a column (T,), from the digits they are written with, in its
+    unit; 0 if they show none."""
     if column.dtype.kind == "f" and column.dtype.itemsize < 8:
         return float(np.spacing(np.abs(column).max(initial=0))) / 2.0
     numbers = np.unique(np.abs(column.astype(np.float64)))
@@ -123,7 +125,8 @@ def _has(numbers: FloatArray, decade: FloatArray, digits: int) -> bool:
 def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
     """Times t (T,) [s] from 0, replaced by k dt if they agree with it within their rounding.
 
-    Returns the times [s], the rounding they were written with [s], and what remains of it for all times and for the last alone [s].
+    Returns the times [s], the rounding they were written with [s], and what remains of it for all times and
+    for the last alone [s].
     """
     times = t.astype(np.float64)
     written = max(rounding(t), float(np.spacing(np.abs(times).max())) / 2.0)
@@ -144,7 +147,8 @@ def on_grid(t: Array) -> tuple[FloatArray, float, float, float]:
 
 
 def _roundest(times: FloatArray, error: float) -> float | None:
-    """The dt of fewest decimals for which times (n,) are 1 dt, 2 dt, ... up to `error`; None if there is none [s]."""
+    """The dt of fewest decimals for which times (n,) are 1 dt, 2 dt, ... up to `error`; None if there is none
+    [s]."""
     k = np.arange(1, len(times) + 1)
     low, high = float(((times - error) / k).max()), float(((times + error) / k).min())
     for decimals in range(DECIMALS_MAX):

@@ -1,30 +1,34 @@
 """The feed that F words mean, for everything that is shown or written.
 
-Inside, the feed is ds/dt of the path in all axes, an angle counting as a length at a radius (docs/language.md). F is that of x, y, z
-together, which is that of the tool's tip where the tool centre point is on; where they stand, that of u, v, w; where these stand too,
-that of the rotary axes in degrees. That is what a picture, a table and a trajectory file have as feed, beside F itself.
+Inside, the feed is ds/dt of the path in all axes, an angle counting as a length at a radius
+(docs/language.md). F is that of x, y, z together, which is that of the tool's tip where the tool centre point
+is on; where they stand, that of u, v, w; where these stand too, that of the rotary axes in degrees. That is
+what a picture, a table and a trajectory file have as feed, beside F itself.
 
 F words that let an ordinary control keep to a planned motion, and the time of each block in it.
 
-A control holds F in the middle of a block and puts its own ramps at the ends. Of the planned feed it is told an upper envelope: runs
-of blocks, each with the highest planned feed in it. Three things follow.
+A control holds F in the middle of a block and puts its own ramps at the ends. Of the planned feed it is told
+an upper envelope: runs of blocks, each with the highest planned feed in it. Three things follow.
 
-* Planned again, the program takes the planned time: the planned motion keeps all its F words, and nothing faster than it was there.
+* Planned again, the program takes the planned time: the planned motion keeps all its F words, and nothing
+  faster than it was there.
 * A control that can follow the plan is not slower than it; one without a jerk limit may be faster.
-* Blocks of a run share one F word. Controls join short blocks into one move only where F does not change between them (LinuxCNC's
-  naive CAM detector), and give every move a servo period at least.
+* Blocks of a run share one F word. Controls join short blocks into one move only where F does not change
+  between them (LinuxCNC's naive CAM detector), and give every move a servo period at least.
 
-A run ends where the next block's highest feed is off by more than `SPREAD`, but not before `RUN_PERIODS` interpolation periods. The
-feed changes by little in less, and moves between two F words should last longer than a control's period.
+A run ends where the next block's highest feed is off by more than `SPREAD`, but not before `RUN_PERIODS`
+interpolation periods. The feed changes by little in less, and moves between two F words should last longer
+than a control's period.
 
-The motion passes a joint between two samples, k the last before it. Along the programmed path the joint divides the
-distance between the two samples; with g = the share of it that lies before the joint, v0 and v1 the feeds at both samples
-and the acceleration constant between them, it is passed at the share tau of the period that solves
+The motion passes a joint between two samples, k the last before it. Along the programmed path the joint
+divides the distance between the two samples; with g = the share of it that lies before the joint, v0 and v1
+the feeds at both samples and the acceleration constant between them, it is passed at the share tau of the
+period that solves
 
     g (v0 + v1) / 2  =  v0 tau + (v1 - v0) tau^2 / 2.
 
-A joint is missed by less than a period, most where the motion stops there, and what one block gains its neighbour
-loses. Blocks that have no sample of their own are timed by the same formula.
+A joint is missed by less than a period, most where the motion stops there, and what one block gains its
+neighbour loses. Blocks that have no sample of their own are timed by the same formula.
 """
 
 from __future__ import annotations
@@ -103,7 +107,8 @@ class WordFeed:
         return found
 
 
-# A highest feed within this share of the programmed one is the programmed one [-]: solvers stay a little away from their limits.
+# A highest feed within this share of the programmed one is the programmed one [-]: solvers stay a little away
+# from their limits.
 SAME = 1e-3
 # F words are this much above the planned feed [-]: they are written rounded down to four digits.
 ABOVE = 1e-3
@@ -115,7 +120,8 @@ RUN_PERIODS = 20
 
 @dataclass(frozen=True, eq=False)
 class PlannedBlocks:
-    """The planned times and feeds of the M segments of a path: (M,) time [s], dwells not included, and (M,) highest feed [mm/s]."""
+    """The planned times and feeds of the M segments of a path: (M,) time [s], dwells not included, and (M,)
+    highest feed [mm/s]."""
 
     duration: FloatArray
     highest: FloatArray
@@ -165,7 +171,8 @@ def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Arr
 
 
 def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(M,) planned time on each segment [s], dwells not included. With the dwells they add up to the cycle time."""
+    """(M,) planned time on each segment [s], dwells not included. With the dwells they add up to the cycle
+    time."""
     return planned_blocks(trajectory, toolpath).duration
 
 
@@ -180,10 +187,10 @@ def planned_blocks(trajectory: Trajectory, toolpath: Toolpath) -> PlannedBlocks:
 class BlockWatch:
     """Times and highest feeds of the blocks of a path, from a trajectory that comes chunk by chunk.
 
-    The highest feed of a block is that at its samples, half-way between them, as far as feeds and accelerations at both tell, and at
-    its joints. Its mean at least; twice that where both joints are passed at less than half of it, as between two full stops without a
-    sample: from rest to rest no jerk-limited motion is faster. The segments of a spline share its time by their lengths, and have its
-    highest feed.
+    The highest feed of a block is that at its samples, half-way between them, as far as feeds and
+    accelerations at both tell, and at its joints. Its mean at least; twice that where both joints are passed
+    at less than half of it, as between two full stops without a sample: from rest to rest no jerk-limited
+    motion is faster. The segments of a spline share its time by their lengths, and have its highest feed.
     """
 
     def __init__(self, toolpath: Toolpath):
@@ -225,7 +232,8 @@ class BlockWatch:
 
 
 def _look_between(part: Trajectory, segment: Array, highest: FloatArray, first: bool) -> None:
-    """Take in the feeds of samples at segments (n,) and half-way between them; the first one is new if it is the `first` of all."""
+    """Take in the feeds of samples at segments (n,) and half-way between them; the first one is new if it is
+    the `first` of all."""
     feed, push = part.feed, (part.velocity * part.acceleration).sum(axis=1)
     push = np.divide(push, feed, out=np.zeros_like(feed), where=feed > 0)
     np.maximum.at(highest, segment[not first :], feed[not first :])
@@ -245,7 +253,8 @@ def _passed(
     t, feed = part.t, part.feed
     k = np.searchsorted(segment, joint) - 1  # the last sample before the joint
     here, there = segment[k], segment[k + 1]
-    # Coordinates of the samples along the programmed path: reckoned back from the end of their segment, and on from its start.
+    # Coordinates of the samples along the programmed path: reckoned back from the end of their segment, and
+    # on from its start.
     before = along[here + 1] - np.linalg.norm(part.position[k] - toolpath.end[here], axis=1)
     after = along[there] + np.linalg.norm(part.position[k + 1] - toolpath.start[there], axis=1)
     distance = after - before

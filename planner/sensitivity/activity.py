@@ -1,11 +1,11 @@
 """Which limit is active where, and for what share of the cycle time.
 
-A time-optimal motion is nearly always at some limit: with a larger limit it would be faster there, at once or after the rest of the
-motion has adapted (sensitivity/prices.py says by how much). A limit is active in an interval if its ratio is within `HELD` of 1. Those
-that are active together count in full each, so that shares may add up to more than 1: a path that is followed at F along the edge of
-the tolerance is at both all the time, and the prices tell which of them costs time. Of the bounds on the feed itself
-(F, velocities) the lowest is active. "none" is the time in which no limit is reached,
-"rest" that of the dwells.
+A time-optimal motion is nearly always at some limit: with a larger limit it would be faster there, at once or
+after the rest of the motion has adapted (sensitivity/prices.py says by how much). A limit is active in an
+interval if its ratio is within `HELD` of 1. Those that are active together count in full each, so that shares
+may add up to more than 1: a path that is followed at F along the edge of the tolerance is at both all the
+time, and the prices tell which of them costs time. Of the bounds on the feed itself (F, velocities) the
+lowest is active. "none" is the time in which no limit is reached, "rest" that of the dwells.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.sensitivity.records import GridHistory
 
-# An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with jerk limits are within
-# 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 % (pentagon, zig-zag, arcs, spiral); more does not help.
+# An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with
+# jerk limits are within 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 %
+# (pentagon, zig-zag, arcs, spiral); more does not help.
 HELD = 1e-2
 NONE, REST = "none", "rest"
 
 
 def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray, end: float) -> GridHistory:
-    """The profile of a solution of P points, which are passed at the times t (P,) [s], up to the `end` [s], with the active limits.
-    Raises NotSolvedError if there is no solution."""
+    """The profile of a solution of P points, which are passed at the times t (P,) [s], up to the `end` [s],
+    with the active limits. Raises NotSolvedError if there is no solution."""
     names = (*active_names(problem), NONE, REST)
     none, rest = len(names) - 2, len(names) - 1
     moving = problem.interval

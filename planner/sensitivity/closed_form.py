@@ -1,12 +1,13 @@
-"""Corners that a method rounds each by itself: their shape, and their speed next to eq. (19), (20) for this very shape.
+"""Corners that a method rounds each by itself: their shape, and their speed next to eq. (19), (20) for this
+very shape.
 
     v = sqrt(X / kappa_max),    X = min(A, (eps - eps_ap) / (dt^2/8 + sum T^2/24))
 
-with A as in corners/budget.py. The planned speed at the apex never exceeds it, and reaches it where normal acceleration or
-the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is largest between straight legs
-(docs/papers.md C); on arcs it is the curvature at the same place. Whether the delivered motion keeps eq. (18)-(20), at all corners
-and for all
-methods, is the verifier's business (verifier/error_allocation.py), which shares nothing with this.
+with A as in corners/budget.py. The planned speed at the apex never exceeds it, and reaches it where normal
+acceleration or the error budget is what limits. kappa_max is the curvature at the corner's joint, where it is
+largest between straight legs (docs/papers.md C); on arcs it is the curvature at the same place. Whether the
+delivered motion keeps eq. (18)-(20), at all corners and for all methods, is the verifier's business
+(verifier/error_allocation.py), which shares nothing with this.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ STRAIGHT = 1e-9  # [1/mm] a curvature below this is none: a radius of a thousand
 
 
 def corner_table(samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution) -> CornerTable:
-    """The planned speeds at all rounded corners, beside the closed form. Raises NotSolvedError if there is no solution."""
+    """The planned speeds at all rounded corners, beside the closed form. Raises NotSolvedError if there is no
+    solution."""
     apex = corner_apexes(samples)
     ratio, which = constraint_ratios(problem, solution)
     before = ratio[apex - 1] > ratio[apex]  # the interval that ends at the apex may be the one that limits it
@@ -39,8 +41,8 @@ def corner_apexes(samples: PathSamples) -> Array:
 
 
 def corners_at(samples: PathSamples, apex: Array, feed: FloatArray, limited_by: Array) -> CornerTable:
-    """The table of the corners with their apexes at given grid points; without those that are straight at the apex, as a blend between
-    arcs that turn to different sides can be: eq. (19) is no bound there.
+    """The table of the corners with their apexes at given grid points; without those that are straight at the
+    apex, as a blend between arcs that turn to different sides can be: eq. (19) is no bound there.
 
     apex       : (C,) indices of grid points
     feed       : (C,) planned speed there [mm/s]

@@ -1,20 +1,25 @@
-"""The prices of corners: how much of the cycle time hangs on the size of each rounded corner, and on its error budget.
+"""The prices of corners: how much of the cycle time hangs on the size of each rounded corner, and on its
+error budget.
 
-1. Every corner is grown to scale by a little, its legs giving way, and the Lagrangian on the corresponding grid tells what that does
+1. Every corner is grown to scale by a little, its legs giving way, and the Lagrangian on the corresponding
+grid tells what that does
    to the time: dT/d(size) of each corner, from one evaluation of the path, or two where it has arcs;
-2. the multipliers of the chord (and filter) error bounds are dT/d(ln budget) of each corner;
-3. the path is rounded again with a little more tolerance, or acceleration; by how much that changes sizes and budgets, shared legs
+2. the multipliers of the chord (and filter) error bounds are dT/d(ln budget) of each corner; 3. the path is
+rounded again with a little more tolerance, or acceleration; by how much that changes sizes and budgets,
+shared legs
    included, times 1. and 2. is the price.
 
-Growing to scale is what Bezier corners do. Corner shapes that limits and filters design ("fir", "kinematic") bend while they grow:
-there acceleration and jerk are priced with the shape as it is, and the tolerance to within 10 % (kinematic) or a third (fir).
+Growing to scale is what Bezier corners do. Corner shapes that limits and filters design ("fir", "kinematic")
+bend while they grow: there acceleration and jerk are priced with the shape as it is, and the tolerance to
+within 10 % (kinematic) or a third (fir).
 
-Single corners are not solved for again. What accelerations let through a corner goes with the root of its size, so
+Single corners are not solved for again. What accelerations let through a corner goes with the root of its
+size, so
 
     saved = -dT/dtol 2 tol (sqrt(1 + more/tol) - 1),
 
-against plans made again, for 10 um at each of 40 corners of five jobs, mostly within 10 % at a tolerance of 50 um; mostly within 15 %
-at 10 um, where three corners soon hit another limit and saved two thirds of it.
+against plans made again, for 10 um at each of 40 corners of five jobs, mostly within 10 % at a tolerance of
+50 um; mostly within 15 % at 10 um, where three corners soon hit another limit and saved two thirds of it.
 """
 
 from __future__ import annotations
@@ -43,7 +48,8 @@ from planner.sensitivity.savings import more_of
 
 STEP_OF_LEG = 1e-2  # of differences, at most: a share of the free part of a leg [-]
 CANDIDATES = 30  # corners whose own price is looked at
-# Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round (corners/sharing.py).
+# Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round
+# (corners/sharing.py).
 REACH = 12
 TIGHT = 1e-3  # legs with a smaller free share are shared by their corners, to rounding of that sharing [-]
 BUDGETS = (
@@ -68,12 +74,14 @@ class CornerPrices:
     segment: FloatArray
 
     def by_acceleration(self, axis: str) -> float:
-        """dT/d(ln acceleration) of an axis, as far as it acts through sizes and budgets of the corners [s]."""
+        """dT/d(ln acceleration) of an axis, as far as it acts through sizes and budgets of the corners
+        [s]."""
         machine = more_of(self.machine, ACCELERATION.called(axis))(STEP)
         return float(self._change(machine, self.path.toolpath.tolerance).sum()) / STEP
 
     def by_tolerance(self) -> FloatArray:
-        """(R+1,) contribution of each corner to dT/d(tolerance of all corners) [s/mm]; `between` is that of the segments."""
+        """(R+1,) contribution of each corner to dT/d(tolerance of all corners) [s/mm]; `between` is that of
+        the segments."""
         before = self.path.toolpath.tolerance
         step = STEP * float(before.mean())
         return self._change(self.machine, before + step) / step
@@ -106,13 +114,15 @@ class CornerPrices:
         return dearest_of(toolpath, at[joint], price, saved)
 
     def _shares_leg(self) -> Array:
-        """(R+1,) True for the corners that can take something from a neighbour: a leg beside them has next to nothing free."""
+        """(R+1,) True for the corners that can take something from a neighbour: a leg beside them has next to
+        nothing free."""
         path = self.path
         tight = path.legs.length - path.d_out[:-1] - path.d_in[1:] < TIGHT * path.legs.length
         return np.append(tight, False) | np.insert(tight, 0, False)
 
     def _change(self, machine: Machine, tolerance: FloatArray) -> FloatArray:
-        """(R+1,) change of the time by every corner if the path is rounded for another machine and another tolerance (M+1,) [s]."""
+        """(R+1,) change of the time by every corner if the path is rounded for another machine and another
+        tolerance (M+1,) [s]."""
         path = self.path
         toolpath = dataclasses.replace(path.toolpath, tolerance=tolerance)
         new = round_corners(toolpath, machine, path.corner, blend_tangents=True)
@@ -121,7 +131,8 @@ class CornerPrices:
 
 
 def _apart(joint: Array, shared: Array) -> list[list[int]]:
-    """Indices `shared` into ascending joints, in batches whose members change nothing at one another's corners."""
+    """Indices `shared` into ascending joints, in batches whose members change nothing at one another's
+    corners."""
     batches: list[list[int]] = []
     for k in shared:
         for batch in batches:
@@ -141,14 +152,16 @@ def corner_prices(
     machine: Machine,
     now: Lagrangian,
 ) -> CornerPrices:
-    """Grow every corner a little (module text, 1.) and sort the multipliers of the error bounds by corner (2.).
+    """Grow every corner a little (module text, 1.) and sort the multipliers of the error bounds by corner
+    (2.).
 
     now : the Lagrangian of the solution on its own grid
     """
     joints = np.arange(len(path.d))
     corner, leg = samples.element < 0, np.maximum(samples.element, 0)
     growth, total = _growth(path), np.zeros(len(joints))
-    # Between straight legs it does not matter at which end a leg gives way; on arcs the ends differ, and take turns.
+    # Between straight legs it does not matter at which end a leg gives way; on arcs the ends differ, and take
+    # turns.
     turns = (joints % 2 == 0, joints % 2 == 1) if path.legs.table["round"].any() else (joints >= 0,)
     for own in turns:
         by = np.where(own, growth, 0.0)
@@ -163,7 +176,8 @@ def corner_prices(
         share = np.divide(first, first + second, out=np.zeros(len(first)), where=first + second > 0)
         total[:-1] += share * on_leg
         total[1:] += (1.0 - share) * on_leg
-    # A bound of an error belongs to the interval on its right if that is in a corner, else to the one on its left.
+    # A bound of an error belongs to the interval on its right if that is in a corner, else to the one on its
+    # left.
     left, right = interval_sides(samples)
     side = np.where(corner[right], right, left)
     names = [k for k, name in enumerate(problem.bound_names) if name in BUDGETS]
@@ -179,8 +193,8 @@ def corner_prices(
 
 
 def _growth(path: SmoothPath) -> FloatArray:
-    """(R+1,) by what share to grow the corners, less where the legs have next to nothing to give; legs without a free part do not
-    count, their corners grow over each other."""
+    """(R+1,) by what share to grow the corners, less where the legs have next to nothing to give; legs
+    without a free part do not count, their corners grow over each other."""
     taken = path.d_out[:-1] + path.d_in[1:]
     free = path.legs.length - taken
     gives = (free > FREE_PART_MIN * path.legs.length) & (taken > 0)

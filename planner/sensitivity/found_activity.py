@@ -1,7 +1,8 @@
-"""The active limits where geometry and feed were found together: step by step, from the search's steps (joint/shares.py).
+"""The active limits where geometry and feed were found together: step by step, from the search's steps
+(joint/shares.py).
 
-A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each. Shown is the one that has the
-largest price there. Where the motion of the start stays, it is what held that.
+A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each.
+Shown is the one that has the largest price there. Where the motion of the start stays, it is what held that.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ def found_history(
     start: GridHistory | None,
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> GridHistory | None:
-    """The active limits of a motion of runs `found` along a toolpath, of which the start's stays on those in `kept`; None where the start's part
-    in it does not tell.
+    """The active limits of a motion of runs `found` along a toolpath, of which the start's stays on those in
+    `kept`; None where the start's part in it does not tell.
 
     motion : as it is delivered
     start  : what held the start's motion

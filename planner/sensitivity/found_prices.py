@@ -1,15 +1,18 @@
-"""The prices of limits and tolerance where geometry and feed were found together, from the multipliers of that search (joint/price.py).
+"""The prices of limits and tolerance where geometry and feed were found together, from the multipliers of
+that search (joint/price.py).
 
-Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So nothing is solved again. A
-limit acts at every step through its price there; the tolerance, and accelerations once more, through what eq. (20) leaves for the path,
+Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So
+                                   nothing is solved again. A
+limit acts at every step through its price there; the tolerance, and accelerations once more, through what eq.
+(20) leaves for the path,
 
     dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
 
 Finite changes are foretold as prices.py says.
 
-Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as on a path (path_prices.py); where
-an axis can follow only a part of ten per cent more feed, in the direction that the motion has, that part is what counts. Where the
-start's motion stays nothing is priced.
+Where the programmed feed and an axis velocity hold together, more of one alone is worth nothing, as on a path
+(path_prices.py); where an axis can follow only a part of ten per cent more feed, in the direction that the
+motion has, that part is what counts. Where the start's motion stays nothing is priced.
 """
 
 from __future__ import annotations
@@ -32,7 +35,8 @@ from planner.sensitivity.records import PlacePrices, PriceList
 from planner.sensitivity.savings import more_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
-# By how much a plan made again is faster or slower for no other reason [share of the time] (benchmarks/solvers/found_prices.py).
+# By how much a plan made again is faster or slower for no other reason [share of the time]
+# (benchmarks/solvers/found_prices.py).
 UNREST = 2e-4
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
 TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5
@@ -42,7 +46,8 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + K + 5) of joint/price.py, and the same without feed and velocities where these hold together
+    step, alone          : (N, 3 A + K + 5) of joint/price.py, and the same without feed and velocities where
+                           these hold together
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
@@ -74,12 +79,14 @@ class RunPrices:
         return np.asarray(self.alone[:, 3 * len(self.found.run.axis) + price.FEED])
 
     def of_axis(self, quantity: int, axis: int) -> float:
-        """dT/d(ln limit) of a quantity (`QUANTITIES`) of an axis of the toolpath, where more of it alone is worth something [s]."""
+        """dT/d(ln limit) of a quantity (`QUANTITIES`) of an axis of the toolpath, where more of it alone is
+        worth something [s]."""
         axes = self.found.run.axis
         return float(self.alone[:, quantity * len(axes) + np.flatnonzero(axes == axis)].sum())
 
     def feed_saves(self, ratio: float) -> FloatArray:
-        """(N,) time saved by `ratio` of the feed, as far as the axes can follow it in the direction that the motion has [s]."""
+        """(N,) time saved by `ratio` of the feed, as far as the axes can follow it in the direction that the
+        motion has [s]."""
         steps = self.found.steps
         assert steps is not None
         h = steps.h[:, None]
@@ -88,7 +95,8 @@ class RunPrices:
         return np.asarray(-self.of_feed() * (1.0 - 1.0 / np.clip(follows, 1.0, ratio)))
 
     def nearer_end(self) -> Array:
-        """(N,) vertices nearest to the steps, on their legs; no end of the run unless it has one leg alone."""
+        """(N,) vertices nearest to the steps, on their legs; no end of the run unless it has one leg
+        alone."""
         offset, legs = self.found.run.offset, len(self.found.run)
         begin, end = offset[self.leg], offset[self.leg + 1]
         nearer = self.leg + (self.middle - begin > end - self.middle)
@@ -98,7 +106,8 @@ class RunPrices:
 def found_prices(
     toolpath: Toolpath, machine: Machine, found: list[FoundRun], cycle_time: float
 ) -> PriceList | None:
-    """The prices of the runs along a toolpath whose search tells them, of a motion of `cycle_time` [s]; None if there are none."""
+    """The prices of the runs along a toolpath whose search tells them, of a motion of `cycle_time` [s]; None
+    if there are none."""
     runs = [
         RunPrices(toolpath, one, one.price, one.place)
         for one in found
@@ -125,7 +134,8 @@ def found_prices(
 def _of_limits(
     toolpath: Toolpath, machine: Machine, runs: list[RunPrices]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The limits of the axes and of the state by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
+    """The limits of the axes and of the state by name, in mm or rad and s, and dT/d(ln limit) of these and of
+    the feed [s]."""
     limit, slope = {}, {FEED.name: fsum(float(run.of_feed().sum()) for run in runs)}
     for quantity, kind in enumerate(QUANTITIES):
         values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]
@@ -156,8 +166,10 @@ def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], cha
 class _OfTolerance:
     """dT/d(tolerance) [s/mm].
 
-    together : (M+1,) at the joints, where it is raised at all of them; what steps pay goes to the nearer end of their leg
-    alone    : (M+1,) of a joint alone, with the segments beside it whose budget, the larger of their joints', grows; 0 of full stops
+    together : (M+1,) at the joints, where it is raised at all of them; what steps pay goes to the nearer end
+               of their leg
+    alone    : (M+1,) of a joint alone, with the segments beside it whose budget, the larger of their joints',
+               grows; 0 of full stops
     """
 
     def __init__(self, toolpath: Toolpath, machine: Machine, runs: list[RunPrices]):

@@ -7,14 +7,14 @@ accelerations, the other way: the more a corner could use, the more of its budge
 error that goes with it (eq. (20)); both in sensitivity/corner_prices.py.
 
 Slopes need no second solution. They are derivatives at the plan, of the problem that its motion solves: with
-the corners, the splines and the `limit_scale` that it has (planning/optimal/tighten.py). Where two limits hold
-together and both must give (equal axes at 45 degrees) the time has a kink and the price is a slope between
-the left one and the right one. Prices of the programmed feed and of axis velocities are those of more of
-them: where both are equal, neither alone is worth anything.
+the corners, the splines and the `limit_scale` that it has (planning/optimal/tighten.py). Where two limits
+hold together and both must give (equal axes at 45 degrees) the time has a kink and the price is a slope
+between the left one and the right one. Prices of the programmed feed and of axis velocities are those of more
+of them: where both are equal, neither alone is worth anything.
 
 Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of
-reshaping (planning/optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a multiplier,
-added up at the nearest joint of the program. Accelerations are priced with the path as it is.
+reshaping (planning/optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a
+multiplier, added up at the nearest joint of the program. Accelerations are priced with the path as it is.
 
 **Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is
 solved again with what saves `WORTH` of the time (savings.py), which is right to within a few per cent.
@@ -48,8 +48,9 @@ from planner.sensitivity.records import PriceList
 from planner.sensitivity.savings import Change, more_of, solved_again
 
 WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
-# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]: 2.5e-4 with 1e-4 more or less
-# of the tolerance (pentagon), 1e-3 with more jerk (bracket: 5e-4 was too little for jerk.y).
+# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]:
+# 2.5e-4 with 1e-4 more or less of the tolerance (pentagon), 1e-3 with more jerk (bracket: 5e-4 was too little
+# for jerk.y).
 UNREST = 1e-3
 CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
 

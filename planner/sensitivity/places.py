@@ -1,13 +1,15 @@
 """Where more of a limit, of the feed or of the tolerance would save time: the prices of a plan by place.
 
-The Lagrangian is a sum over the intervals of the grid (feedrate/lagrangian.py), so what changes on one segment alone, an F word or the
-limits there, is priced by the multipliers of its own points and intervals. For a finite change, straight lines in one over the limit
-are taken, as for the limits of the whole program (sensitivity/path_prices.py):
+The Lagrangian is a sum over the intervals of the grid (feedrate/lagrangian.py), so what changes on one
+segment alone, an F word or the limits there, is priced by the multipliers of its own points and intervals.
+For a finite change, straight lines in one over the limit are taken, as for the limits of the whole program
+(sensitivity/path_prices.py):
 
     feed    -2 sum mu_i (1 - sqrt(X_i / X'_i))             X, X' the bounds of feed^2 without and with more of the programmed feed
     limits  (sum lam g + 2 sum mu_i) (1 - 1/(1 + more))     all bounds at once: of feed, velocity, acceleration and jerk
 
-with multipliers lam of the rows g and mu of the bounds. A neighbour that cannot follow makes the true saving smaller.
+with multipliers lam of the rows g and mu of the bounds. A neighbour that cannot follow makes the true saving
+smaller.
 """
 
 from __future__ import annotations
@@ -78,8 +80,8 @@ def bounds_with(
 
 
 def bounds_but_speeds(samples: PathSamples, machine: Machine) -> FloatArray | None:
-    """(P,) bounds of feed^2 by all limits but programmed feed and axis velocities [mm2/s2]; None with limits of one's own, whose bounds
-    are not apart from each other."""
+    """(P,) bounds of feed^2 by all limits but programmed feed and axis velocities [mm2/s2]; None with limits
+    of one's own, whose bounds are not apart from each other."""
     if machine.own:
         return None
     return bounds_of(samples, machine, [limit for limit in LIMITS if limit not in SPEEDS])

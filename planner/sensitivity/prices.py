@@ -33,7 +33,8 @@ MORE_TOLERANCE = 0.01  # ... and of the tolerance [mm]
 STEP = 1e-4  # relative steps of differences [-]: far above rounding, far below what bends a curve
 DEAREST = 10  # corners that are listed
 TOLERANCE = "tolerance"
-# T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with acceleration, with jerk.
+# T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with
+# acceleration, with jerk.
 POWER = {
     **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
     **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},

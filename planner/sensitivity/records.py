@@ -55,14 +55,16 @@ class CornerTable:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
-    """The profile at the grid points of the solver, and the limits that are active at each of them (sensitivity/activity.py).
+    """The profile at the grid points of the solver, and the limits that are active at each of them
+    (sensitivity/activity.py).
 
     t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
-    active       : (P,) index in `active_names` of the limit that is shown for the interval to the right of each point: of those that
-                   are active there the one with the largest price, or the closest
+    active       : (P,) index in `active_names` of the limit that is shown for the interval to the right of
+                   each point: of those that are active there the one with the largest price, or the closest
     reached      : (P, K) which of the K of `active_names` are active there
     active_names : names of limits, then "none" and "rest"
-    share        : (K,) fraction of the cycle time in which each is active [-]; those that are active together count in full each
+    share        : (K,) fraction of the cycle time in which each is active [-]; those that are active together
+                   count in full each
     """
 
     t: FloatArray
@@ -74,14 +76,16 @@ class GridHistory:
     share: FloatArray
 
     def ranked(self) -> list[tuple[str, float]]:
-        """Names and fractions of the cycle time, to `SHARE_DIGITS`: the limits, largest fraction first, then "none" and "rest"."""
+        """Names and fractions of the cycle time, to `SHARE_DIGITS`: the limits, largest fraction first, then
+        "none" and "rest"."""
         share = np.round(self.share, SHARE_DIGITS)
         limits, others = np.flatnonzero(share[:-2]), len(share) - 2 + np.flatnonzero(share[-2:])
         order = [*limits[np.argsort(-share[limits], kind="stable")], *others]
         return [(self.active_names[k], float(share[k])) for k in order]
 
     def percents(self) -> list[tuple[str, int]]:
-        """Those of `ranked` in whole per cent, halves up, from 1 % on; "nothing" and "dwells" for "none" and "rest"."""
+        """Those of `ranked` in whole per cent, halves up, from 1 % on; "nothing" and "dwells" for "none" and
+        "rest"."""
         found = [(WORDS.get(name, name), math.floor(100.0 * share + 0.5)) for name, share in self.ranked()]
         return [(name, percent) for name, percent in found if percent]
 
@@ -120,7 +124,8 @@ class PlacePrices:
 
     feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
     limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
-    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves time; None where it is not known
+    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves time; None where it is
+                not known
     """
 
     feed: FloatArray
@@ -137,13 +142,16 @@ class PlacePrices:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PriceList:
-    """The prices of limits and tolerance: derivatives of the cycle time T, negative where more of a limit saves time.
+    """The prices of limits and tolerance: derivatives of the cycle time T, negative where more of a limit
+    saves time.
 
-    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of one's own
-                dT/d(least bound on the path), in their own units, with the bound elsewhere in proportion
+    limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of
+                one's own dT/d(least bound on the path), in their own units, with the bound elsewhere in
+                proportion
     feed      : dT/d(ln feed override) [s]
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
-    saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE` more "tolerance" [s]
+    saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE`
+                more "tolerance" [s]
     ranges    : least and most time that a new plan may save [s]
     hints     : names whose saving is told by its range only; `saved` is its middle, and a hint only
     corners   : the corners with the largest savings; None where they are not known
@@ -165,6 +173,7 @@ class PriceList:
         return f"<PriceList: more would save {most or 'nothing'}>"
 
     def ranked(self) -> list[tuple[str, float]]:
-        """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving first."""
+        """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving
+        first."""
         worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
         return sorted(worth, key=lambda entry: -entry[1])

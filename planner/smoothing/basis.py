@@ -1,7 +1,7 @@
 """Quintic B-splines in the form the kernels use: on every span, six polynomials of a local parameter.
 
-A spline over the knots k_0 <= ... <= k_{n+5} with the control points c_0 .. c_{n-1} is, on the span k_i <= u <= k_{i+1} with
-h = k_{i+1} - k_i and tau = (u - k_i)/h in [0, 1],
+A spline over the knots k_0 <= ... <= k_{n+5} with the control points c_0 .. c_{n-1} is, on the span k_i <= u
+<= k_{i+1} with h = k_{i+1} - k_i and tau = (u - k_i)/h in [0, 1],
 
     p(u) = sum_b N_b(tau) c_{i-5+b},     N_b(tau) = sum_m basis[span, b, m] tau^m,     b, m = 0..5.
 
@@ -30,7 +30,8 @@ class Knots(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def clamped(breaks):
-    """Knots (n + 6,) of splines that begin and end at their first and last control point, from the spans' ends (S + 1,)."""
+    """Knots (n + 6,) of splines that begin and end at their first and last control point, from the spans'
+    ends (S + 1,)."""
     knots = np.empty(len(breaks) + 2 * DEGREE)
     for i in range(len(knots)):
         knots[i] = breaks[min(max(i - DEGREE, 0), len(breaks) - 1)]

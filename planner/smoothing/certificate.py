@@ -1,9 +1,10 @@
 """The proof that a curve is inside the tolerance: a bound for every part of every span, not samples.
 
-On the part of a span between neighbouring sites and vertices the curve is a polynomial, which lies in the convex hull of its six
-Bezier points. If these are within r of the chord that the part belongs to, so is the part, since what is within r of a chord is
-convex. The largest such r, plus the chord's sagitta on arcs, bounds the deviation of the path from the curve and back; vertices lie
-on it because neighbouring parts share their ends.
+On the part of a span between neighbouring sites and vertices the curve is a polynomial, which lies in the
+convex hull of its six Bezier points. If these are within r of the chord that the part belongs to, so is the
+part, since what is within r of a chord is convex. The largest such r, plus the chord's sagitta on arcs,
+bounds the deviation of the path from the curve and back; vertices lie on it because neighbouring parts share
+their ends.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ class Certificate(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _part_error(basis, control, i, a, b, chord, bezier):
-    """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction, length) [mm]; `bezier`
-    (6, A) is overwritten."""
+    """Largest distance of the Bezier points of span i between tau = a and b from a chord (start, direction,
+    length) [mm]; `bezier` (6, A) is overwritten."""
     chord_start, along, length = chord
     axes = control.shape[1]
     step = b - a

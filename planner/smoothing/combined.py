@@ -1,26 +1,29 @@
-"""Path and feed improved together: a convex step, the time-optimal motion's limits linearised in the control points and in the time.
+"""Path and feed improved together: a convex step, the time-optimal motion's limits linearised in the control
+points and in the time.
 
-Let p(u(t)) be a motion along a spline. Its control points move by dc, and what took dt takes (1 + theta) dt. To first order, with v, a
-and j what the motion has now, velocity, acceleration and jerk of an axis are then
+Let p(u(t)) be a motion along a spline. Its control points move by dc, and what took dt takes (1 + theta) dt.
+To first order, with v, a and j what the motion has now, velocity, acceleration and jerk of an axis are then
 
     v + B1.dc - v theta
     a + B2.dc - 2 a theta - v theta'
     j + B3.dc - 3 j theta - 3 a theta' - v theta'',
 
-B1, B2 and B3 the time derivatives of the basis functions along the motion, and the time changes by the integral of theta. The feed is
-(v.e) + e.(B1.dc) - (v.e) theta with its direction e, and the acceleration across the path likewise. With theta a spline over the same
-knots all that is linear in dc and theta. A step minimises
+B1, B2 and B3 the time derivatives of the basis functions along the motion, and the time changes by the
+integral of theta. The feed is (v.e) + e.(B1.dc) - (v.e) theta with its direction e, and the acceleration
+across the path likewise. With theta a spline over the same knots all that is linear in dc and theta. A step
+minimises
 
     integral of theta + 1/2 |w|^2/v^2 + pull/2 (sum_k (B3.dc_k / jerk_k)^2 + SLOWER theta^2) dt
 
-subject to the limits and to the corridor, whose sites stay balls (sites.py). The second term counts where the motion goes at the
-programmed feed v: w is what B1.dc has across the path, and the speed with it is v + |w|^2/(2 v); without it a wavy path seems to cost
-nothing. The third keeps the step where the first order holds. Limits are kept at places inside the intervals of the grid, and a share
-may grow there by what the interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step
-must not promise what it cannot have there.
+subject to the limits and to the corridor, whose sites stay balls (sites.py). The second term counts where the
+motion goes at the programmed feed v: w is what B1.dc has across the path, and the speed with it is v +
+|w|^2/(2 v); without it a wavy path seems to cost nothing. The third keeps the step where the first order
+holds. Limits are kept at places inside the intervals of the grid, and a share may grow there by what the
+interval leaves of the limit, its ends included: the motion keeps its limits at grid points, and the step must
+not promise what it cannot have there.
 
-Long runs are improved window by window (combined_solver.py); the longest in ranges of windows, side by side, with `DEGREE` control
-points between them that stay, and then in one window around each gap, as in relax.py.
+Long runs are improved window by window (combined_solver.py); the longest in ranges of windows, side by side,
+with `DEGREE` control points between them that stay, and then in one window around each gap, as in relax.py.
 """
 
 from __future__ import annotations
@@ -106,7 +109,8 @@ class CombinedRun(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _sites_of_window(sites, lo, hi, spans):
-    """The sites that the control points lo .. hi - 1 move, their spans counted from the control point lo - DEGREE, or 0."""
+    """The sites that the control points lo .. hi - 1 move, their spans counted from the control point lo -
+    DEGREE, or 0."""
     a = first_not_before(sites.span, max(lo - DEGREE, 0))
     b = first_not_before(sites.span, min(hi, spans))
     span, place, weights, target, along, slide, radius = sites_between(sites, a, b)
@@ -115,7 +119,8 @@ def _sites_of_window(sites, lo, hi, spans):
 
 @njit(cache=True, error_model="numpy")
 def _moving(control, sites):
-    """(A,) axes in which a curve moves or is not where its sites want it: a step does nothing in the others."""
+    """(A,) axes in which a curve moves or is not where its sites want it: a step does nothing in the
+    others."""
     found = np.zeros(control.shape[1], np.bool_)
     for k in range(control.shape[1]):
         still = control[0, k]
@@ -138,7 +143,8 @@ def _moved(run, y):
 
 @njit(cache=True, error_model="numpy")
 def _free(n, axes, fixed):
-    """(n, A+1) True for what a step may change; fixed : control points that stay at the first and at the last end."""
+    """(n, A+1) True for what a step may change; fixed : control points that stay at the first and at the last
+    end."""
     free = np.ones((n, axes + 1), np.bool_)
     for end in range(2):
         held = 0 if fixed[end] == 1 else HELD
@@ -153,7 +159,8 @@ def _free(n, axes, fixed):
 
 @njit(cache=True, error_model="numpy")
 def _improve_window(run, radius, lo, hi, y):
-    """The step y (n, A+1) of a run's control points lo .. hi - 1 while the others stay, overwritten; returns the iterations.
+    """The step y (n, A+1) of a run's control points lo .. hi - 1 while the others stay, overwritten; returns
+    the iterations.
 
     radius : (J,) of the sites
     """
@@ -175,7 +182,8 @@ def _improve_window(run, radius, lo, hi, y):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def improve_range(run, radius, begin, end, y):
-    """The step y (n, A+1) of a run's control points begin .. end - 1, window by window, overwritten; returns the iterations."""
+    """The step y (n, A+1) of a run's control points begin .. end - 1, window by window, overwritten; returns
+    the iterations."""
     lo, total = begin, 0
     while True:
         hi = end if end - lo <= WINDOW + OVERLAP else lo + WINDOW
@@ -187,8 +195,8 @@ def improve_range(run, radius, begin, end, y):
 
 @njit(cache=True, error_model="numpy")
 def _tighten(run, radius, y):
-    """A step y (n, A+1) again around sites where the curve leaves the tolerance beside them; both it and the radii (J,) of these sites
-    are overwritten. Returns the iterations."""
+    """A step y (n, A+1) again around sites where the curve leaves the tolerance beside them; both it and the
+    radii (J,) of these sites are overwritten. Returns the iterations."""
     n, total = len(run.control), 0
     for _ in range(run.again):
         certificate = certify(run.corridor, run.knots, run.sites.place, _moved(run, y))
@@ -230,7 +238,8 @@ def _begin(q, corridor, splines, runs, used, motion, limits, aim):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _finish(q, run, radius, y, total, splines, found):
-    """Write run q after a step of so many iterations into the columns of `Improved`, which hold what was before."""
+    """Write run q after a step of so many iterations into the columns of `Improved`, which hold what was
+    before."""
     control, used, gain, iterations = found
     iterations[q] = total + _tighten(run, radius, y)
     moved, begin, site = _moved(run, y), control_first(splines, q), splines.site_first[q]

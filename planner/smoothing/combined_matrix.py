@@ -1,7 +1,8 @@
 """The Newton matrix of combined_solver.py, put together span by span.
 
-What a span adds couples its six control points: blocks (k, m) of 6 x 6 for every two columns k <= m of the step y (n, A+1), of which
-those with k = m are only kept above their diagonal. They are summed for a whole span before they go into the banded matrix.
+What a span adds couples its six control points: blocks (k, m) of 6 x 6 for every two columns k <= m of the
+step y (n, A+1), of which those with k = m are only kept above their diagonal. They are summed for a whole
+span before they go into the banded matrix.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ CONTRACT = {"contract"}  # the compiler may multiply and add in one instruction
 
 
 class Balls(NamedTuple):
-    """J sites of a window (sites.py) as the interior-point method sees them: g = (|e|^2/r^2 - 1)/2 <= 0 with a slack s and a multiplier
-    z each. At first they miss it, with g + s > 0."""
+    """J sites of a window (sites.py) as the interior-point method sees them: g = (|e|^2/r^2 - 1)/2 <= 0 with
+    a slack s and a multiplier z each. At first they miss it, with g + s > 0."""
 
     span: Array  # (J,) counted from the first control point of the window, like the next of `Sites`
     weights: FloatArray  # (J, 6)
@@ -41,7 +42,8 @@ class Balls(NamedTuple):
 
 
 class SpanBlocks(NamedTuple):
-    """The sum over one span, and where it goes in the banded matrix (interior_point.py) from the first row of the span on."""
+    """The sum over one span, and where it goes in the banded matrix (interior_point.py) from the first row of
+    the span on."""
 
     values: FloatArray  # (pairs of columns, 6, 8) one after the other, the last two columns of each 0
     source: Array  # (T,) places in `values`
@@ -135,7 +137,8 @@ def _add_scaled(values, at, block, weight):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_products(basis, p, order, theta, products):
-    """Into products (2, 48) the blocks of the basis functions of this order with themselves, and with theta (6,)."""
+    """Into products (2, 48) the blocks of the basis functions of this order with themselves, and with theta
+    (6,)."""
     for a in range(ORDER):
         for b in range(ORDER):
             of_order = basis[p, order * ORDER + a]
@@ -145,8 +148,8 @@ def put_products(basis, p, order, theta, products):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_row(values, along, p, kind, weight, theta, products):
-    """Add the square of a row of place p, of this kind, times its weight to `SpanBlocks`; its theta (6,) and `put_products`, all over
-    its factor."""
+    """Add the square of a row of place p, of this kind, times its weight to `SpanBlocks`; its theta (6,) and
+    `put_products`, all over its factor."""
     axes = along.shape[2]
     columns = axes + 1
     _add_square(values, block_of(axes, axes, columns), theta, weight)
@@ -164,8 +167,8 @@ def add_row(values, along, p, kind, weight, theta, products):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_objective(values, basis, along, p, pull, own, cost):
-    """Add the objective's part of place p to `SpanBlocks`: `pull` (A,) of the squared jerks, `own` of theta squared, and `cost` of what
-    the velocity has across the path, squared."""
+    """Add the objective's part of place p to `SpanBlocks`: `pull` (A,) of the squared jerks, `own` of theta
+    squared, and `cost` of what the velocity has across the path, squared."""
     axes, of_place = along.shape[2], basis[p]
     columns, first, third = axes + 1, of_place[ORDER : 2 * ORDER], of_place[3 * ORDER :]
     _add_square(values, block_of(axes, axes, columns), of_place[:ORDER], own)
@@ -181,7 +184,8 @@ def add_objective(values, basis, along, p, pull, own, cost):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_balls(balls, j, i, values):
-    """Add z G + z/s grad g grad g' of the sites of `Balls` from j on that are on span i, or before it, to `SpanBlocks`; the next j."""
+    """Add z G + z/s grad g grad g' of the sites of `Balls` from j on that are on span i, or before it, to
+    `SpanBlocks`; the next j."""
     span, _, _, way, slide, radius, _, normal, slack, multiplier = balls[:10]
     axes, square = normal.shape[1], balls.square
     while j < len(span) and span[j] <= i:

@@ -1,5 +1,5 @@
-"""Places on a run at which the limits of its motion are kept (combined.py), what the motion does there, and what a step of path and
-feed together minimises and gains.
+"""Places on a run at which the limits of its motion are kept (combined.py), what the motion does there, and
+what a step of path and feed together minimises and gains.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ HELD = 0.8  # of the programmed feed: from there on the feed is held [-]
 
 @njit(cache=True, error_model="numpy")
 def sideways(places, p):
-    """The cost of a square of the velocity across the path at a place [s3/mm2] (combined.py): where the feed is held."""
+    """The cost of a square of the velocity across the path at a place [s3/mm2] (combined.py): where the feed
+    is held."""
     axes = places.jet.shape[2]
     share = places.share[p, 3 * axes]
     return places.weight[p] / (share * places.limit[p, 3 * axes]) ** 2 if share > HELD else 0.0
@@ -75,8 +76,8 @@ EDGE = 0.5 - np.sqrt(3.0) / 6.0  # of them from the ends of the interval [-]: Ga
 
 
 class Places(NamedTuple):
-    """P places on a run, some inside each interval of the grid, and the motion there. Its R limits are velocity, acceleration and
-    jerk of each axis, the feed, and the acceleration across the path."""
+    """P places on a run, some inside each interval of the grid, and the motion there. Its R limits are
+    velocity, acceleration and jerk of each axis, the feed, and the acceleration across the path."""
 
     span: Array  # (P,)
     weight: FloatArray  # (P,) time that each stands for [s]
@@ -91,8 +92,9 @@ class Places(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _put_shares(jet, tangent, acc, limits, bound, along, share, limit):
-    """Directions along (2, A), shares (R,) and limits (R,) of a place with `jet` (3, A), the curve's tangent (A,) of length 1, and acc
-    along the path; limits (3, A), bound (2,) of feed and of acceleration across the path."""
+    """Directions along (2, A), shares (R,) and limits (R,) of a place with `jet` (3, A), the curve's tangent
+    (A,) of length 1, and acc along the path; limits (3, A), bound (2,) of feed and of acceleration across the
+    path."""
     axes = len(tangent)
     feed, across = 0.0, 0.0
     for k in range(axes):
@@ -118,8 +120,8 @@ def _count(motion, n):
 
 @njit(cache=True, error_model="numpy")
 def places_of_run(knots, control, motion, bound, limits, first, last):
-    """The `Places` of the grid intervals first .. last - 1 of a `SplineMotion` that is given at both ends of each; bound (I, 2) of feed
-    and of acceleration across the path, limits (3, A)."""
+    """The `Places` of the grid intervals first .. last - 1 of a `SplineMotion` that is given at both ends of
+    each; bound (I, 2) of feed and of acceleration across the path, limits (3, A)."""
     axes = control.shape[1]
     kinds = 3 * axes + 2
     count = 0

@@ -1,8 +1,10 @@
-"""Limits of a motion along a spline, linear in its control points and in its time (combined.py): the rows of combined_solver.py.
+"""Limits of a motion along a spline, linear in its control points and in its time (combined.py): the rows of
+combined_solver.py.
 
-A row is a number times what one axis does at a place, or what happens along or across the path there (a kind), plus three
-numbers times theta and its derivatives. `weigh`, `predict` and `move` are the three passes of an iteration over all rows. With both
-slacks s and multipliers z of a row, value + s = upper and s - value = lower up to what is missing, they are those of Mehrotra (1992):
+A row is a number times what one axis does at a place, or what happens along or across the path there (a
+kind), plus three numbers times theta and its derivatives. `weigh`, `predict` and `move` are the three passes
+of an iteration over all rows. With both slacks s and multipliers z of a row, value + s = upper and s - value
+= lower up to what is missing, they are those of Mehrotra (1992):
 
     ds = -missing -+ slope,      dz = (aim - ds_predicted dz_predicted - z ds)/s - z.
 """
@@ -26,8 +28,8 @@ from planner.smoothing.combined_matrix import (
     scatter,
 )
 
-# Rows of which the motion uses less than this share are left out [-]: velocities of the axes, accelerations, jerks, and the last two of
-# `Places.bound`. Others do not become active in a step.
+# Rows of which the motion uses less than this share are left out [-]: velocities of the axes, accelerations,
+# jerks, and the last two of `Places.bound`. Others do not become active in a step.
 NEAR = np.array([0.8, 0.6, 0.2, 0.8])
 LEAST_SLACK = 0.05  # of a start [-]
 
@@ -61,7 +63,8 @@ class RowState(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def rows_of_window(places, first, last, lo):
-    """The `Rows` of the places first .. last - 1 of which the motion uses more than `NEAR`; control points count from `lo`."""
+    """The `Rows` of the places first .. last - 1 of which the motion uses more than `NEAR`; control points
+    count from `lo`."""
     axes, kinds = places.jet.shape[2], places.share.shape[1]
     begin, kind = np.zeros(last - first + 1, np.int64), np.empty((last - first) * kinds, np.int64)
     factor = np.empty((len(kind), 6))
@@ -107,8 +110,8 @@ def _put_row(places, p, kind, factor):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_moves(span, basis, along, y, moves):
-    """The step y (n, A+1) at the places (P,) of `Rows`, into moves (P, K + 3): all kinds of rows, and theta with its
-    derivatives."""
+    """The step y (n, A+1) at the places (P,) of `Rows`, into moves (P, K + 3): all kinds of rows, and theta
+    with its derivatives."""
     axes = along.shape[2]
     at = 3 * axes
     for p in range(len(span)):
@@ -135,7 +138,8 @@ def _put_moves(span, basis, along, y, moves):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _add_forces(span, basis, along, force, out):
-    """out (n, A+1) += the derivative by the step of the sum of force (P, K + 3) times `_put_moves`; the force becomes 0."""
+    """out (n, A+1) += the derivative by the step of the sum of force (P, K + 3) times `_put_moves`; the force
+    becomes 0."""
     axes = along.shape[2]
     at = 3 * axes
     for p in range(len(span)):
@@ -159,7 +163,8 @@ def _add_forces(span, basis, along, force, out):
 
 @njit(cache=True, error_model="numpy")
 def first_state(rows, y, product):
-    """The `RowState` at the step y (n, A+1): slacks that are at least `LEAST_SLACK`, and multipliers with this product with them."""
+    """The `RowState` at the step y (n, A+1): slacks that are at least `LEAST_SLACK`, and multipliers with
+    this product with them."""
     factor, kinds, P = rows.factor, 3 * rows.along.shape[2] + 2, len(rows.span)
     sides, moves = np.zeros((len(factor), 10)), np.empty((P, kinds + 3))
     _put_moves(rows.span, rows.basis, rows.along, y, moves)
@@ -176,9 +181,9 @@ def first_state(rows, y, product):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def weigh(rows, state, lengths, balls, band, residual, push):
-    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls` (combined_solver.py) to the
-    matrix `band`, and the rows to `residual` (n, A+1), what multipliers pull, and to `push`, what drives a step without a barrier.
-    Returns sum(s z) and the most that is missing."""
+    """Take the last step, of `lengths` of slacks and of multipliers; then add rows and the sites of `balls`
+    (combined_solver.py) to the matrix `band`, and the rows to `residual` (n, A+1), what multipliers pull, and
+    to `push`, what drives a step without a barrier. Returns sum(s z) and the most that is missing."""
     first, span, basis, along, kinds_of, factor, theta, products = rows
     sides, _, pull, ahead = state
     (primal, dual), axes = lengths, along.shape[2]
@@ -213,9 +218,9 @@ def weigh(rows, state, lengths, balls, band, residual, push):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def predict(rows, state, step, barrier, bent, seen):
-    """The predictor's `step` (n, A+1): into `barrier` and `bent` (n, A+1) the forces of a barrier of 1 and of the terms of
-    second order, into seen (5,) of all constraints the smallest and the largest share of a slack that the step adds, the sums of s z,
-    of it times the share, and times its square."""
+    """The predictor's `step` (n, A+1): into `barrier` and `bent` (n, A+1) the forces of a barrier of 1 and of
+    the terms of second order, into seen (5,) of all constraints the smallest and the largest share of a slack
+    that the step adds, the sums of s z, of it times the share, and times its square."""
     first, span, basis, along, kinds_of, factor = rows[:6]
     sides, moves, of_barrier, of_bent = state
     kinds = 3 * along.shape[2] + 2
@@ -252,8 +257,8 @@ def predict(rows, state, step, barrier, bent, seen):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def move(rows, state, step, aim):
-    """The corrector's `step` (n, A+1) to s z = aim for slacks and multipliers, into the state; the largest share of slacks,
-    and of multipliers, that it takes away."""
+    """The corrector's `step` (n, A+1) to s z = aim for slacks and multipliers, into the state; the largest
+    share of slacks, and of multipliers, that it takes away."""
     first, span, basis, along, kinds_of, factor = rows[:6]
     sides, moves, _, _ = state
     kinds = 3 * along.shape[2] + 2

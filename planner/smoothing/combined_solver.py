@@ -1,4 +1,5 @@
-"""The convex problem of combined.py in one window, by a primal-dual interior-point method with slacks (Mehrotra 1992).
+"""The convex problem of combined.py in one window, by a primal-dual interior-point method with slacks
+(Mehrotra 1992).
 
 Over the step y (n, A+1) of control points and theta,
 
@@ -6,13 +7,13 @@ Over the step y (n, A+1) of control points and theta,
     subject to  -lower <= row.y <= upper for every row, with slacks s- and s+
                 g_j(c + y) <= 0         for every site, g_j = (|e_j|^2/r_j^2 - 1)/2 (interior_point.py), with a slack too
 
-Limits and sites need not hold at the start, nor on the way: what is missing shrinks with every step. H, the rows and the sites couple
-six neighbouring control points only, so that the Newton matrix
+Limits and sites need not hold at the start, nor on the way: what is missing shrinks with every step. H, the
+rows and the sites couple six neighbouring control points only, so that the Newton matrix
 
     H + sum z G + sum (z/s) grad g grad g'
 
-is banded, and everything is linear in n. The passes over the sites, inside whose balls a spline stays (sites.py), are those over the
-rows (combined_rows.py).
+is banded, and everything is linear in n. The passes over the sites, inside whose balls a spline stays
+(sites.py), are those over the rows (combined_rows.py).
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ from planner.smoothing.sites import Sites
 
 @njit(cache=True, error_model="numpy")
 def balls_of(sites, control, y, product):
-    """`Balls` of the sites around the control points (n, A) plus the step y (n, A+1), with this product of slacks and multipliers."""
+    """`Balls` of the sites around the control points (n, A) plus the step y (n, A+1), with this product of
+    slacks and multipliers."""
     J, axes = len(sites.span), control.shape[1]
     offset, none = np.empty((J, axes)), np.zeros(J)
     for j in range(J):
@@ -105,8 +107,8 @@ def _put_slopes(span, weights, normal, y, out):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def weigh_sites(balls, y, lengths, residual, push):
-    """Take the last step, to y (n, A+1), of `lengths` of slacks and of multipliers; then add the sites to `residual` and to `push`
-    (n, A+1) (combined_rows.py). Returns sum(s z) and the most that is missing."""
+    """Take the last step, to y (n, A+1), of `lengths` of slacks and of multipliers; then add the sites to
+    `residual` and to `push` (n, A+1) (combined_rows.py). Returns sum(s z) and the most that is missing."""
     along, dual = lengths
     s, z, q = balls.s, balls.z, balls.q
     see_sites(balls, y)
@@ -222,7 +224,8 @@ def _reach(most):
 
 @njit(cache=True, error_model="numpy")
 def _left_over(problem, residual, reach):
-    """By how much the gap may be too small for a residual (n, A+1), if control points are `reach` [mm] from their optimum [s]."""
+    """By how much the gap may be too small for a residual (n, A+1), if control points are `reach` [mm] from
+    their optimum [s]."""
     total, (n, columns) = 0.0, residual.shape
     for i in range(n):
         for k in range(columns):
@@ -233,8 +236,8 @@ def _left_over(problem, residual, reach):
 
 @njit(cache=True, error_model="numpy")
 def improve_window(problem, start, time, gap, iterations):
-    """The optimum y (n, A+1) of a `CombinedProblem` from `start`, to a gap [s], or what so many iterations reach; `time` of the
-    motion in the window [s]. Also the iterations."""
+    """The optimum y (n, A+1) of a `CombinedProblem` from `start`, to a gap [s], or what so many iterations
+    reach; `time` of the motion in the window [s]. Also the iterations."""
     rows, free = problem.rows, problem.free
     m = 2 * len(rows.kind) + len(problem.sites.span)  # upper bounds of the rows, lower bounds, sites
     y, (n, columns) = start.copy(), start.shape

@@ -1,8 +1,9 @@
-"""The corridor of each run: the programmed path as a chain of chords, each with its tolerance, inside of which a spline is laid.
+"""The corridor of each run: the programmed path as a chain of chords, each with its tolerance, inside of
+which a spline is laid.
 
-A straight leg is one chord, or one for each of its programmed feeds: a spline may slide along a chord, but has to pass the place
-where the feed changes. An arc becomes chords whose sagitta is at most `SAGITTA` of the tolerance. The chain stands for the path only
-where distances are bounded; no motion follows it.
+A straight leg is one chord, or one for each of its programmed feeds: a spline may slide along a chord, but
+has to pass the place where the feed changes. An arc becomes chords whose sagitta is at most `SAGITTA` of the
+tolerance. The chain stands for the path only where distances are bounded; no motion follows it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ APART = 1e-3
 
 
 class Corridor(NamedTuple):
-    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; or those of one run (`run_corridor`)."""
+    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; or those of one run
+    (`run_corridor`)."""
 
     first: Array  # (Q+1,)
     place: Array  # (V,) along the legs from the start of the job [mm]
@@ -73,7 +75,8 @@ def part_of(whole, a, b):
 
 @njit(cache=True, error_model="numpy")
 def _chords(leg, tol, begin, end, changes):
-    """Into how many chords a leg is cut from begin to end, and the index of the first of the feed changes on it."""
+    """Into how many chords a leg is cut from begin to end, and the index of the first of the feed changes on
+    it."""
     if leg.round:
         curvature = abs(leg.radius * leg.rate * leg.rate)
         return int(np.ceil((end - begin) / np.sqrt(8.0 * SAGITTA * tol / curvature))) + 1, 0

@@ -6,7 +6,8 @@ At the place u of the path, passed at u' = du/dt, the axes move with
     acceleration  p_uu u'^2 + p_u u''
     jerk          p_uuu u'^3 + 3 p_uu u' u'' + p_u u'''
 
-(p_u = dp/du), all linear in the control points as long as u(t) stays. From feed v, acceleration a and jerk j along the path, with
+(p_u = dp/du), all linear in the control points as long as u(t) stays. From feed v, acceleration a and jerk j
+along the path, with
 g = |p_u|:  u' = v/g,  u'' = (a - g_u u'^2)/g,  u''' = (j - g_uu u'^3 - 3 g_u u' u'')/g.
 """
 
@@ -21,14 +22,16 @@ from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.sites import control_first, run_control, run_knots
 
-# Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, which are of degree 4.
+# Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, which are of degree
+# 4.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 
 
 class SplineMotion(NamedTuple):
-    """A motion along the splines of Q runs: its grid intervals (I,) on them, run q holds interval[q] : interval[q+1], and what it pays
-    for squared velocity, acceleration and jerk of each axis at the two ends of each."""
+    """A motion along the splines of Q runs: its grid intervals (I,) on them, run q holds interval[q] :
+    interval[q+1], and what it pays for squared velocity, acceleration and jerk of each axis at the two ends
+    of each."""
 
     interval: Array  # (Q+1,)
     span: Array  # (I,) counted within the run
@@ -42,8 +45,8 @@ class SplineMotion(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def third_derivative_bands(splines, weights):
-    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs [1/mm5]: 1/2 c'Hc of the
-    control points c [mm] is the integral [1/mm3]."""
+    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs
+    [1/mm5]: 1/2 c'Hc of the control points c [mm] is the integral [1/mm3]."""
     H = np.zeros((len(weights), len(splines.control), ORDER))
     for q in range(len(splines.fits)):
         knots, begin = run_knots(splines, q), control_first(splines, q)
@@ -53,7 +56,8 @@ def third_derivative_bands(splines, weights):
 
 @njit(cache=True, error_model="numpy")
 def add_third_derivatives(knots, weights, H):
-    """Add the integral of the squared third derivatives times weights (A,) along one run to its bands H (A, n, 6)."""
+    """Add the integral of the squared third derivatives times weights (A,) along one run to its bands H (A,
+    n, 6)."""
     rows = np.empty((4, ORDER))
     for i in range(len(knots.breaks) - 1):
         h = knots.breaks[i + 1] - knots.breaks[i]
@@ -65,8 +69,8 @@ def add_third_derivatives(knots, weights, H):
 
 @njit(cache=True, error_model="numpy")
 def third_derivative_energy(knots, weights, c, first, last):
-    """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1 [1/mm3], from the control points
-    c (n, A) [mm] of the run."""
+    """Integral of the squared third derivatives times weights (A,) over the spans first .. last - 1 [1/mm3],
+    from the control points c (n, A) [mm] of the run."""
     cut, basis = knots
     total = 0.0
     rows = np.empty((4, ORDER))
@@ -93,8 +97,9 @@ def add_square(band, i, row, weight):
 
 @njit(cache=True, error_model="numpy")
 def time_derivatives(rows, tangent, feed, acc, jerk, out):
-    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along the path,
-    from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and `tangent` (3, A) of the curve; returns
+    """out (4, 6) = the basis functions and their time derivatives in a motion with feed, acc and jerk along
+    the path, from the derivatives by the spline's parameter, `rows` (4, 6) of the basis functions and
+    `tangent` (3, A) of the curve; returns
     |p_u|."""
     square, along2, along3, bend = 0.0, 0.0, 0.0, 0.0
     for k in range(tangent.shape[1]):
@@ -118,7 +123,8 @@ def time_derivatives(rows, tangent, feed, acc, jerk, out):
 
 @njit(cache=True, error_model="numpy")
 def _add_prices(knots, control, motion, at, limits, H, Q):
-    """Add what a motion pays at one end of a grid interval, at = (interval, end), to H, and its squared jerks to Q (`motion_bands`)."""
+    """Add what a motion pays at one end of a grid interval, at = (interval, end), to H, and its squared jerks
+    to Q (`motion_bands`)."""
     interval, end = at
     i, weight = motion.span[interval], motion.price[interval, end]
     v, a, jerk = motion.feed[interval, end], motion.acc[interval, end], motion.jerk[interval]
@@ -146,8 +152,8 @@ def _add_prices(knots, control, motion, at, limits, H, Q):
 
 @njit(cache=True, error_model="numpy")
 def motion_bands(splines, motion, limits):
-    """Two bands (A, n, 6) over the control points of all runs that fit: of what the motion pays, and of its squared jerks over their
-    limits, times dt (planning/optimal/reshape.py), both [s/mm2].
+    """Two bands (A, n, 6) over the control points of all runs that fit: of what the motion pays, and of its
+    squared jerks over their limits, times dt (planning/optimal/reshape.py), both [s/mm2].
 
     limits : (2, A) of acceleration [mm/s2] and jerk [mm/s3]
     """

@@ -1,20 +1,23 @@
 """A first spline inside the corridor of each run, with its knots and its sites.
 
-The control points of the first spline are the places of the corridor's chain at the spline's Greville abscissae: a smoothed chain that
-leaves it only at corners, and the less, the denser the knots are. Where it uses more than `ROOM` of the tolerance, knots are added,
-which moves the knots of the whole run a little: on a run of 100,000 corners some site always ends a little beyond `ROOM`. That does no
-harm: what is within `INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are no
-spline, and the run is to be cut there (spline_path.py).
+The control points of the first spline are the places of the corridor's chain at the spline's Greville
+abscissae: a smoothed chain that leaves it only at corners, and the less, the denser the knots are. Where it
+uses more than `ROOM` of the tolerance, knots are added, which moves the knots of the whole run a little: on a
+run of 100,000 corners some site always ends a little beyond `ROOM`. That does no harm: what is within
+`INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are
+no spline, and the run is to be cut there (spline_path.py).
 
-How dense the knots of a long run must be is found in ranges, side by side; with these distances its knots are laid as a whole, and
-made denser only where it uses more than `INSIDE`.
+How dense the knots of a long run must be is found in ranges, side by side; with these distances its knots are
+laid as a whole, and made denser only where it uses more than `INSIDE`.
 
-Knots are near to each other where the path turns much within its tolerance. A control polygon that follows the path leaves it by
-about a quarter of the turning between two knots times their distance. So knots stand at distances
+Knots are near to each other where the path turns much within its tolerance. A control polygon that follows
+the path leaves it by about a quarter of the turning between two knots times their distance. So knots stand at
+distances
 
     h(u) = the longest h with  turning within h around u  *  h <= FITTING * tolerance,
 
-one corner of theta: h = FITTING tol/theta; an arc of radius R: h = sqrt(FITTING tol R), however it is cut into chords. They grow
+one corner of theta: h = FITTING tol/theta; an arc of radius R: h = sqrt(FITTING tol R), however it is cut
+                     into chords. They grow
 by `GROWTH` of the distance from there, and stay below what a motion needs to build up its acceleration.
 """
 
@@ -34,7 +37,8 @@ from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
 from planner.smoothing.corridor import Corridor, part_of, run_corridor
 from planner.smoothing.sites import Sites, Splines, sites_of_run, used_share
 
-# Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56 of the tolerance.
+# Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56
+# of the tolerance.
 FITTING = 2.0
 # Neighbouring spans then differ by a third at most.
 GROWTH = 0.3
@@ -57,12 +61,14 @@ def graded(place, h):
 
 @njit(cache=True, error_model="numpy")
 def spacing(place, turn, tol, longest):
-    """Largest distance between knots (m,) at the turns `turn` [rad] at ascending places (m,) [mm]; `tol` (m,), `longest` [mm]."""
+    """Largest distance between knots (m,) at the turns `turn` [rad] at ascending places (m,) [mm]; `tol`
+    (m,), `longest` [mm]."""
     m = len(place)
     h = np.empty(m)
     begin = 0
     total = 0.0
-    # windows that end at turn k: shrink from the left until they fit; every turn inside takes the window's length
+    # windows that end at turn k: shrink from the left until they fit; every turn inside takes the window's
+    # length
     for k in range(m):
         h[k] = min(longest, FITTING * tol[k] / max(turn[k], TURN_MIN))
     for k in range(m):
@@ -79,8 +85,8 @@ def spacing(place, turn, tol, longest):
 
 @njit(cache=True, error_model="numpy")
 def spread(place, h, begin, end, longest, least):
-    """Breaks (S+1,) from begin to end whose distances follow h at the places and grow by GROWTH from there, at most `longest`;
-    at least `least` spans."""
+    """Breaks (S+1,) from begin to end whose distances follow h at the places and grow by GROWTH from there,
+    at most `longest`; at least `least` spans."""
     # density 1/h integrated in small steps: between two places h is the smaller of the two cones
     count = 0.0
     for sweep in range(2):
@@ -147,8 +153,9 @@ def lay(corridor: Corridor, longest: FloatArray) -> Splines:
 
 @njit(cache=True, error_model="numpy")
 def greville_control(corridor, breaks):
-    """Control points (n, A) [mm] of one run on its chain, at the Greville abscissae: each at the mean of the five knots inside its
-    basis function, where the spline of a straight chain is the chain itself. breaks : (S+1,) [mm]"""
+    """Control points (n, A) [mm] of one run on its chain, at the Greville abscissae: each at the mean of the
+    five knots inside its basis function, where the spline of a straight chain is the chain itself. breaks :
+    (S+1,) [mm]"""
     place, point, knots = corridor.place, corridor.point, clamped(breaks)
     control = np.empty((len(breaks) - 1 + DEGREE, point.shape[1]))
     v = 0
@@ -167,7 +174,8 @@ def greville_control(corridor, breaks):
 
 @njit(cache=True, error_model="numpy")
 def _denser(h, inner, sites, breaks, used):
-    """Distances h (m,) of knots at the places `inner` (m,), smaller around sites that use more than `ROOM`."""
+    """Distances h (m,) of knots at the places `inner` (m,), smaller around sites that use more than
+    `ROOM`."""
     h = h.copy()
     for j in range(len(used)):
         if used[j] > ROOM:
@@ -181,8 +189,8 @@ def _denser(h, inner, sites, breaks, used):
 
 @njit(cache=True, error_model="numpy")
 def _laid(corridor, inner, h, longest):
-    """Breaks, control points and sites of one run whose knots are at the distances h (m,) at the places `inner` (m,), and what the
-    sites use of the tolerance."""
+    """Breaks, control points and sites of one run whose knots are at the distances h (m,) at the places
+    `inner` (m,), and what the sites use of the tolerance."""
     breaks = spread(inner, h, corridor.place[0], corridor.place[-1], longest, SPANS_MIN)
     control = greville_control(corridor, breaks)
     sites = sites_of_run(corridor, knots_at(breaks))
@@ -191,8 +199,8 @@ def _laid(corridor, inner, h, longest):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def needed_distances(whole, longest, first, last):
-    """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline between them by itself
-    uses no more than `ROOM`."""
+    """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline
+    between them by itself uses no more than `ROOM`."""
     corridor = part_of(whole, first, last + 1)
     inner = corridor.place[1:-1]
     h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
@@ -206,8 +214,8 @@ def needed_distances(whole, longest, first, last):
 
 @njit(cache=True, error_model="numpy")
 def _lay_run(corridor, longest, distance):
-    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside. distance : (V,) known ones of
-    knots, infinite where they are not"""
+    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside.
+    distance : (V,) known ones of knots, infinite where they are not"""
     inner = corridor.place[1:-1]
     h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
     room = ROOM

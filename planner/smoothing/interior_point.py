@@ -1,6 +1,8 @@
-"""The convex problem of a spline in a corridor, by a primal-dual interior-point method that never leaves the corridor.
+"""The convex problem of a spline in a corridor, by a primal-dual interior-point method that never leaves the
+corridor.
 
-Over the control points c (n, A), minimise a quadratic form, one banded matrix H_k per axis, with every site j inside its ball:
+Over the control points c (n, A), minimise a quadratic form, one banded matrix H_k per axis, with every site j
+inside its ball:
 
     minimise    1/2 sum_k c_k' H_k c_k
     subject to  g_j = (|e_j|^2 / r_j^2 - 1)/2 <= 0,     e_j = d_j - (1 - slide_j) t_j (t_j . d_j),     d_j = p(u_j) - q_j
@@ -9,14 +11,16 @@ Over the control points c (n, A), minimise a quadratic form, one banded matrix H
 
     (H + sum z_j G_j + sum z_j/(-g_j) grad g_j grad g_j') dc = -(H c + sum mu/(-g_j) grad g_j),
 
-block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the corridor; where the
+block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the
+                               corridor; where the
 method ends early, the path is less smooth than it could be and no less inside.
 
-Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its iterates may be outside,
-and it cannot be called from a compiled kernel.
+Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its
+iterates may be outside, and it cannot be called from a compiled kernel.
 
-Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the diagonal first:
-band[i, d] is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that a compiler makes vector instructions.
+Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the
+diagonal first: band[i, d] is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that
+a compiler makes vector instructions.
 """
 
 from __future__ import annotations
@@ -33,7 +37,8 @@ from planner.smoothing.sites import Sites, site_distance
 
 @njit(cache=True, error_model="numpy")
 def factorise(band):
-    """band (n, width) becomes its factor R with R'R = band, the diagonal inverted; False where it is not positive definite."""
+    """band (n, width) becomes its factor R with R'R = band, the diagonal inverted; False where it is not
+    positive definite."""
     n, width = band.shape
     row = np.zeros(2 * width)  # the second half stays 0
     for i in range(n):
@@ -226,8 +231,8 @@ def _step_length(sites, step, g, e, slope):
 
 @njit(cache=True, error_model="numpy")
 def minimise_in_corridor(problem, start, accuracy, iterations):
-    """The optimum of a `Problem` from control points (n, A) strictly inside the corridor, to an `Accuracy`; the last iterate, which is
-    inside, where `iterations` are too few or rounding stops the search."""
+    """The optimum of a `Problem` from control points (n, A) strictly inside the corridor, to an `Accuracy`;
+    the last iterate, which is inside, where `iterations` are too few or rounding stops the search."""
     sites, free = problem.sites, problem.free
     axes, n, _ = problem.H.shape
     m = len(sites.span)

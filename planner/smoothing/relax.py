@@ -1,14 +1,16 @@
-"""Smooth curves inside the corridor: each run relaxed to the least integral of its squared third derivative, and proved to be inside.
+"""Smooth curves inside the corridor: each run relaxed to the least integral of its squared third derivative,
+and proved to be inside.
 
-Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed is known yet;
-planning/optimal/reshape.py weights them by what the time-optimal motion pays for.
+Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed
+is known yet; planning/optimal/reshape.py weights them by what the time-optimal motion pays for.
 
-A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are tightened by as much as the bound
-is too large, and relaxed again.
+A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are
+tightened by as much as the bound is too large, and relaxed again.
 
-A long run is relaxed in ranges, side by side, with `DEGREE` control points between them that stay; then in one window around each
-gap. Control points further away than that are none of a range's business, so that it does not matter which one is first. The
-ranges depend on the run alone: the result is the same on any number of threads.
+A long run is relaxed in ranges, side by side, with `DEGREE` control points between them that stay; then in
+one window around each gap. Control points further away than that are none of a range's business, so that it
+does not matter which one is first. The ranges depend on the run alone: the result is the same on any number
+of threads.
 """
 
 from __future__ import annotations
@@ -48,19 +50,21 @@ from planner.smoothing.windows import (
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
 FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
-# An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to rounding, which would then
-# decide what the spline is.
+# An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to
+# rounding, which would then decide what the spline is.
 STRAIGHT = 1e-4
 USED = 0.9995  # of the tolerance that sites may use at first [-]: the relaxation starts strictly inside of it
-# Of tightening, in windows around the sites that need it; 2 are the rule. A run that needs more gets no spline.
+# Of tightening, in windows around the sites that need it; 2 are the rule. A run that needs more gets no
+# spline.
 ROUNDS = 20
 SPANS_SHARED = SIZES.relaxed_shared
 RANGE = SIZES.relaxed_range
 
 
 class Goal(NamedTuple):
-    """The aim of the control points c of all runs: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to a gap for each run
-    plus the share `relative` of the integral of its squared third derivatives, if H is its form."""
+    """The aim of the control points c of all runs: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to
+    a gap for each run plus the share `relative` of the integral of its squared third derivatives, if H is its
+    form."""
 
     H: FloatArray  # (A, n, 6) lower bands of all runs
     Q: FloatArray  # (A, n, 6)
@@ -71,7 +75,8 @@ class Goal(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """All runs relaxed. A run without a certificate, or that did not fit, has its control points and radii from before."""
+    """All runs relaxed. A run without a certificate, or that did not fit, has its control points and radii
+    from before."""
 
     certified: Array  # (Q,)
     control: FloatArray  # (n, A)
@@ -95,7 +100,8 @@ class Run(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _relaxed_window(window, run, control, radius, goal, gap):
-    """The optimum of a window's control points while the others stay: control points (hi - lo, A), multipliers (site_end - site,)."""
+    """The optimum of a window's control points while the others stay: control points (hi - lo, A),
+    multipliers (site_end - site,)."""
     n, (lo, hi, j0, j1), sites = len(control), window, run.sites
     a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
     origin, free = control[a].copy(), np.zeros(b - a, np.bool_)
@@ -116,8 +122,8 @@ def _relaxed_window(window, run, control, radius, goal, gap):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def relax_range(run, goal, gap, begin, end, control, multiplier):
-    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the multipliers (J,) of their
-    sites. Reads `DEGREE` control points more on both sides."""
+    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the
+    multipliers (J,) of their sites. Reads `DEGREE` control points more on both sides."""
     done = begin
     while done < end:
         lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier)
@@ -129,9 +135,9 @@ def relax_range(run, goal, gap, begin, end, control, multiplier):
 
 @njit(cache=True, error_model="numpy")
 def _relax_run(run, start, prices, goal, gap, only_outside):
-    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or only in windows around the
-    sites where it has no certificate; returns whether the result has a certificate, and the rest of `Relaxed`, with multipliers
-    `prices` (J,) where no window is relaxed."""
+    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or
+    only in windows around the sites where it has no certificate; returns whether the result has a
+    certificate, and the rest of `Relaxed`, with multipliers `prices` (J,) where no window is relaxed."""
     control, radius = start.copy(), run.sites.radius.copy()
     multiplier, ratio_site = prices.copy(), np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
@@ -242,7 +248,8 @@ def relax(
     goal: Goal,
     only_outside: bool = False,
 ) -> Relaxed:
-    """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for any number of threads.
+    """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for
+    any number of threads.
 
     used : (J,) radius that each site may use [mm], the present splines strictly inside
     left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]

@@ -1,7 +1,7 @@
 """Runs: the parts of the path that are replaced by one curve each.
 
-A run reaches from full stop to full stop, or from and to the middle of long straight legs, which stay as they are. A corner influences
-the motion only within one braking distance, plus the knots of a smooth end.
+A run reaches from full stop to full stop, or from and to the middle of long straight legs, which stay as they
+are. A corner influences the motion only within one braking distance, plus the knots of a smooth end.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
 
 
 class SplineRuns(NamedTuple):
-    """Q runs in the order of the path. Run q begins on the leg before its first joint and ends on the leg after its last."""
+    """Q runs in the order of the path. Run q begins on the leg before its first joint and ends on the leg
+    after its last."""
 
     joint_first: Array  # (Q,) joints between legs that it replaces
     joint_last: Array  # (Q,)
@@ -36,8 +37,9 @@ class SplineRuns(NamedTuple):
 
 
 def longest_span(path: SmoothPath, machine: Machine, tol: FloatArray) -> FloatArray:
-    """(R,) the longest that a span may be on each leg [mm]: short enough for the profile to build up its acceleration within a few
-    spans, and no shorter than the tolerance asks for. tol : (R,) tolerance of each leg [mm]"""
+    """(R,) the longest that a span may be on each leg [mm]: short enough for the profile to build up its
+    acceleration within a few spans, and no shorter than the tolerance asks for. tol : (R,) tolerance of each
+    leg [mm]"""
     feed, a, j = _motion(path, machine)
     return np.maximum(
         np.maximum(LONGEST_DELAY * feed * a / j, LONGEST_WAY * feed**2 / a), LONGEST_TOLERANCE * tol

@@ -1,12 +1,14 @@
-"""The splines of a path, one for each run, and their sites: the places at which the distance from the path is bounded.
+"""The splines of a path, one for each run, and their sites: the places at which the distance from the path is
+bounded.
 
-Sites are all vertices of the corridor, each with a ball around it, and between distant ones places on the chords `SITE_SPACING` of a
-span apart, around which the spline may slide along the chord. Site j bounds the weighted distance
+Sites are all vertices of the corridor, each with a ball around it, and between distant ones places on the
+chords `SITE_SPACING` of a span apart, around which the spline may slide along the chord. Site j bounds the
+weighted distance
 
     |e_j| <= radius_j,     e_j = d_j - (1 - slide_j) t_j (t_j . d_j),     d_j = p(u_j) - q_j,
 
-q_j its target and t_j the direction of the chord, along which the spline may leave q_j by radius_j/slide_j; slide = 1 is a ball. What
-happens between sites is up to the certificate (certificate.py).
+q_j its target and t_j the direction of the chord, along which the spline may leave q_j by radius_j/slide_j;
+slide = 1 is a ball. What happens between sites is up to the certificate (certificate.py).
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ from planner.smoothing.basis import DEGREE, ORDER, knots_at
 
 
 class Splines(NamedTuple):
-    """All runs one after the other; run q holds the breaks span_first[q] + q : span_first[q+1] + q + 1, the control points
-    span_first[q] + 5 q : span_first[q+1] + 5 (q+1), and the sites site_first[q] : site_first[q+1]."""
+    """All runs one after the other; run q holds the breaks span_first[q] + q : span_first[q+1] + q + 1, the
+    control points span_first[q] + 5 q : span_first[q+1] + 5 (q+1), and the sites site_first[q] :
+    site_first[q+1]."""
 
     span_first: Array  # (Q+1,)
     breaks: FloatArray  # (S+Q,) along the legs [mm]
@@ -80,7 +83,8 @@ class Sites(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def site_distance(sites, j, control, begin, e):
-    """e_j (module text) into e (A,); returns |e_j| [mm]. `control` holds the control points from number `begin` on."""
+    """e_j (module text) into e (A,); returns |e_j| [mm]. `control` holds the control points from number
+    `begin` on."""
     axes = len(e)
     dot = 0.0
     for k in range(axes):

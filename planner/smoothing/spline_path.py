@@ -24,7 +24,8 @@ from planner.smoothing.sites import Splines, run_control, run_knots
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
-# Gap of the first shape, share of its integral of squared third derivatives [-]: that is only a guess of what the motion wants.
+# Gap of the first shape, share of its integral of squared third derivatives [-]: that is only a guess of what
+# the motion wants.
 RELATIVE_GAP = 0.1
 
 
@@ -32,8 +33,10 @@ RELATIVE_GAP = 0.1
 class SplineShape:
     """The splines of a path with what is needed to change their shape within the tolerance.
 
-    runs, corridor, splines : what the splines replace, the corridor along which they are laid, and the splines
-    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where a run has none
+    runs, corridor, splines : what the splines replace, the corridor along which they are laid, and the
+                              splines
+    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm];
+                 negative where a run has none
     reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
     used       : (J,) radius that each site may use [mm]
     """
@@ -47,8 +50,8 @@ class SplineShape:
 
 
 def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None = None) -> SplineShape:
-    """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed with a certificate
-    (relax.py), and without a cusp. A run that gets none has `fits` False.
+    """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed
+    with a certificate (relax.py), and without a cusp. A run that gets none has `fits` False.
 
     known : the splines of the same legs with other full stops: runs that are the same are taken over
 
@@ -100,7 +103,8 @@ class _Same(NamedTuple):
     def put(
         self, into: FloatArray, first: Array, values: FloatArray, old_first: Array, more: int = 0
     ) -> None:
-        """Copy the rows of these runs from `values` to `into`; run q holds first[q] + more q : first[q+1] + more (q+1) of them."""
+        """Copy the rows of these runs from `values` to `into`; run q holds first[q] + more q : first[q+1] +
+        more (q+1) of them."""
         for q, k in zip(self.new, self.old, strict=True):
             begin = old_first[k] + more * k
             into[first[q] + more * q : first[q + 1] + more * (q + 1)] = values[
@@ -109,7 +113,8 @@ class _Same(NamedTuple):
 
 
 def _same_runs(runs: SplineRuns, known: SplineShape) -> _Same:
-    """The runs that replace the same parts of the same legs, with the same ends, as some that have a spline."""
+    """The runs that replace the same parts of the same legs, with the same ends, as some that have a
+    spline."""
     found = {one: k for k, one in enumerate(zip(*known.runs, strict=True)) if known.splines.fits[k]}
     pairs = [(q, found[one]) for q, one in enumerate(zip(*runs, strict=True)) if one in found]
     new, old = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
@@ -124,15 +129,15 @@ def cusps(splines: Splines) -> Array:
 
 
 def cusp_spans(splines: Splines) -> Array:
-    """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between two places that are
-    looked at: no motion along it has a direction there."""
+    """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between
+    two places that are looked at: no motion along it has a direction there."""
     return np.asarray(_cusp_spans(splines))
 
 
 @njit(cache=True, error_model="numpy")
 def turns_little(poly, control, i, h):
-    """Whether a span has no cusp at first sight: its derivative by tau, sum_m m C_m tau^(m-1), is never more than |C_1|/2 away from
-    C_1, and that is more than twice of a cusp's.
+    """Whether a span has no cusp at first sight: its derivative by tau, sum_m m C_m tau^(m-1), is never more
+    than |C_1|/2 away from C_1, and that is more than twice of a cusp's.
 
     poly    : (6, 6) basis polynomials of span i of length h [mm]
     control : (n, A) control points of its spline [mm]
@@ -179,9 +184,9 @@ def _cusp_spans(splines):
 
 
 def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Array:
-    """(k,) joints of the toolpath where runs are to be cut that do not fit: at each of their places outside of the corridor, without a
-    certificate or with a cusp, of the joints around it the one that turns most, or those on both sides of it (`fence`), which leave
-    a run of a few joints there."""
+    """(k,) joints of the toolpath where runs are to be cut that do not fit: at each of their places outside
+    of the corridor, without a certificate or with a cusp, of the joints around it the one that turns most, or
+    those on both sides of it (`fence`), which leave a run of a few joints there."""
     splines, runs = shape.splines, shape.runs
     lost = np.repeat(~splines.fits, np.diff(splines.span_first))
     spans = np.flatnonzero(lost & (splines.outside | (shape.left < 0.0) | cusp_spans(splines)))
@@ -210,7 +215,8 @@ def _polynomials(splines: Splines, q: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _moving(toolpath: Toolpath) -> Array:
-    """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines either."""
+    """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines
+    either."""
     points = np.vstack([toolpath.start, toolpath.end])
     arcs = np.vstack([toolpath.arcs.e1, toolpath.arcs.e2, toolpath.arcs.drift])
     curves = (np.ptp(toolpath.curves.points, axis=1) > 0.0).any(axis=0)
@@ -227,7 +233,8 @@ def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
 
 
 def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
-    """The path with the splines of the runs that fit in place of their corners, each span as a polynomial (geometry/spline.py)."""
+    """The path with the splines of the runs that fit in place of their corners, each span as a polynomial
+    (geometry/spline.py)."""
     runs, splines = shape.runs, shape.splines
     axes = len(path.toolpath.axes)
     kept = np.flatnonzero(splines.fits)

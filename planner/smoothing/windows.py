@@ -1,5 +1,5 @@
-"""Windows and ranges of a long spline: which of its control points are relaxed at a time, and how those around a site are tightened
-(relax.py)."""
+"""Windows and ranges of a long spline: which of its control points are relaxed at a time, and how those
+around a site are tightened (relax.py)."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class ControlWindow(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def next_window(attempt, done, site, fixed_first, end, span, ratio_site):
-    """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo = end if there is none.
-    At first windows of `WINDOW` after each other, the last of which ended at `done`; then around sites from `site` on whose bound is
-    too large."""
+    """Control points lo, hi of the next window to relax, and the first site after those that it is for; lo =
+    end if there is none. At first windows of `WINDOW` after each other, the last of which ended at `done`;
+    then around sites from `site` on whose bound is too large."""
     if attempt == 0:
         lo = max(done - OVERLAP, fixed_first)
         hi = min(lo + WINDOW, end)
@@ -69,8 +69,9 @@ def window_of(run, lo, hi):
 
 @njit(cache=True, error_model="numpy")
 def tighten_window(window, sites, control, middle, ratio_site):
-    """Smaller radii for a window's sites whose bound is too large, and its control points a little closer to the spline `middle`, which
-    is well inside, so that they are inside again: control points (hi - lo, A) and radii (site_end - site,)."""
+    """Smaller radii for a window's sites whose bound is too large, and its control points a little closer to
+    the spline `middle`, which is well inside, so that they are inside again: control points (hi - lo, A) and
+    radii (site_end - site,)."""
     axes, (lo, hi, site, site_end) = control.shape[1], window
     begin = max(lo - DEGREE, 0)
     near, e = control[begin : hi + DEGREE].copy(), np.empty(axes)
@@ -90,8 +91,8 @@ def tighten_window(window, sites, control, middle, ratio_site):
 
 
 def in_ranges(begin: int, end: int, size: int, window: int, work: Callable[[int, int], None]) -> None:
-    """Work on the control points begin .. end - 1 of a long run in ranges of about `size`, side by side, with `DEGREE` control points
-    between them that stay; then in one window around each of these gaps."""
+    """Work on the control points begin .. end - 1 of a long run in ranges of about `size`, side by side, with
+    `DEGREE` control points between them that stay; then in one window around each of these gaps."""
     count = (end - begin) // size
     cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
     ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
@@ -102,7 +103,8 @@ def in_ranges(begin: int, end: int, size: int, window: int, work: Callable[[int,
 
 
 def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None]) -> None:
-    """Do `work` on lists of `runs` (k,), whose `size` (k,) is in spans, side by side; on one list if there are less than `least`."""
+    """Do `work` on lists of `runs` (k,), whose `size` (k,) is in spans, side by side; on one list if there
+    are less than `least`."""
     shares = _shares(size, threads() if size.sum() >= least else 1)
     tasks = [partial(work, runs[own]) for own in shares]
     if len(tasks) > 1:
@@ -112,7 +114,8 @@ def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None
 
 
 def _shares(size: Array, count: int) -> list[Array]:
-    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list that has least."""
+    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list
+    that has least."""
     lists: list[list[int]] = [[] for _ in range(count)]
     total = [0] * count
     for q in np.argsort(-size, kind="stable").tolist():

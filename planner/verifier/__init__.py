@@ -1,8 +1,8 @@
 """Judging a delivered motion by other code than that which made it.
 
-`verify` sees the programmed path, the machine, the delivered samples and, between them, the motion they were taken from, at times
-that it chooses itself; and nothing else of the package: no sampling of the path, no constraint, no solver. What it checks, and how
-sharp each check is:
+`verify` sees the programmed path, the machine, the delivered samples and, between them, the motion they were
+taken from, at times that it chooses itself; and nothing else of the package: no sampling of the path, no
+constraint, no solver. What it checks, and how sharp each check is:
 
     reading.py    where it looks between the samples
     limits.py     velocity, acceleration, jerk per axis, normal acceleration: on the columns and on differences of the delivered
@@ -20,7 +20,8 @@ sharp each check is:
     filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
     error_allocation.py
-                  eq. 18 and 19 at every programmed corner, and the comparison with eq. 20, on the motion's own curvature
+                  eq. 18 and 19 at every programmed corner, and the comparison with eq. 20, on the motion's
+                  own curvature
     corners.py    the record of that
     excess.py     the kinds of faults, and the spans of time in which limits are exceeded
     exact.py      blocks under G61: the samples run along the path itself

@@ -1,12 +1,13 @@
 """Arcs and curves as the judge sees them: their pieces, and the nearest point of a piece.
 
-An arc or helix is p(x) = center + radius (cos(rate x) e1 + sin(rate x) e2) + drift x. A curve is a rational cubic,
-C(u) = sum b_i P_i / sum b_i with b_i the Bernstein polynomials of degree three times weights 1, w1, w2, 1, and is cut
-at even steps of u into pieces that turn by little. The nearest point solves g(x) = (p(x) - q) . p'(x) = 0 by Newton's
-method: on an arc from the polar angle of q, which it is without drift; on a curve from the nearest of `STARTS` places.
+An arc or helix is p(x) = center + radius (cos(rate x) e1 + sin(rate x) e2) + drift x. A curve is a rational
+cubic, C(u) = sum b_i P_i / sum b_i with b_i the Bernstein polynomials of degree three times weights 1, w1,
+w2, 1, and is cut at even steps of u into pieces that turn by little. The nearest point solves g(x) = (p(x) -
+q) . p'(x) = 0 by Newton's method: on an arc from the polar angle of q, which it is without drift; on a curve
+from the nearest of `STARTS` places.
 
-The distance itself is taken from the vector p(x) - q, never from an expanded square, which loses half the digits; at
-the nearest point an error of x enters it only squared.
+The distance itself is taken from the vector p(x) - q, never from an expanded square, which loses half the
+digits; at the nearest point an error of x enters it only squared.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from planner.verifier.kernel import kernel
 
 CENTER, E1, E2, DRIFT = range(4)  # in `frame` of `ProgramPieces`
 RADIUS, RATE = range(2)  # in `turn`
-# Of the largest angle of a piece that pieces of curves turn by on the mean [-]: their parameter turns them unevenly.
+# Of the largest angle of a piece that pieces of curves turn by on the mean [-]: their parameter turns them
+# unevenly.
 CURVE_TURN = 0.7
 PLACES = 64  # on a curve, at which its turning is looked at
 STARTS = 5  # places on a piece of which the nearest is where Newton's method starts
-# Nearly all random pieces settle within these steps; another place is on the path, too, only not the nearest one.
+# Nearly all random pieces settle within these steps; another place is on the path, too, only not the nearest
+# one.
 NEWTON_STEPS = 8
 SETTLED = 1e-13  # a step of Newton's method below this fraction of the piece is none [-]
 
@@ -56,8 +59,8 @@ def curve_points(points: FloatArray, weight: FloatArray, u: FloatArray) -> tuple
 
 
 def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
-    """(K,) into how many pieces of even steps each curve is cut, so that they turn by `CURVE_TURN` of `angle` on the
-    mean.
+    """(K,) into how many pieces of even steps each curve is cut, so that they turn by `CURVE_TURN` of `angle`
+    on the mean.
 
     points, weight : (K, 4, A), (K, 2) of the curves as of `curve_points`
     angle          : [rad]
@@ -73,7 +76,8 @@ def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
 
 @kernel()
 def reach_bend(pieces: Any, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
-    """Which part of piece i of `ProgramPieces`, of an arc or a curve, is within `radius` of q (A,), as `reach_piece`."""
+    """Which part of piece i of `ProgramPieces`, of an arc or a curve, is within `radius` of q (A,), as
+    `reach_piece`."""
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     x = nearest_on_bend(pieces, i, q)
     distance_sq, g, slope = _apart(pieces, i, q, x)
@@ -184,7 +188,8 @@ def _on_curve(pieces: Any, i: int, u: float, n: int) -> tuple[float, float, floa
 
 @kernel()
 def apart_on_bend(pieces: Any, i: int, q: FloatArray, counts: Array) -> float:
-    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts` (A,)."""
+    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts`
+    (A,)."""
     x, apart_sq = nearest_on_bend(pieces, i, q), 0.0
     arc = pieces.piece[i]["arc"] >= 0
     for n in range(len(q)):

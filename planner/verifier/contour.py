@@ -1,12 +1,13 @@
 """How far the motion and the path are apart, in numbers that are true or None.
 
-The matching (`matching`) decides at the tolerance. A motion that fits is measured by it. Of one that does not it knows less: where
-it went on by a vertex passed too late, a sample may be nearer to the next piece than to those it could be on, and where it was lost
-nothing is known. Such a motion is read again with 4, 16 and 64 times the tolerance, until it fits: among all pieces that can be
-reached in order within that, the nearest to every sample is found, and the checks compare with the tolerance as it is. A motion that
-does not fit then has no distance from the path: None. To fit into a widened tolerance means to use half of it: a detour of all of it
-would leave only its tip to pass the vertex at. What fits there by less than the tolerance as it is came near to two vertices in the
-wrong order, which is a fault (findings.out_of_order).
+The matching (`matching`) decides at the tolerance. A motion that fits is measured by it. Of one that does not
+it knows less: where it went on by a vertex passed too late, a sample may be nearer to the next piece than to
+those it could be on, and where it was lost nothing is known. Such a motion is read again with 4, 16 and 64
+times the tolerance, until it fits: among all pieces that can be reached in order within that, the nearest to
+every sample is found, and the checks compare with the tolerance as it is. A motion that does not fit then has
+no distance from the path: None. To fit into a widened tolerance means to use half of it: a detour of all of
+it would leave only its tip to pass the vertex at. What fits there by less than the tolerance as it is came
+near to two vertices in the wrong order, which is a fault (findings.out_of_order).
 """
 
 from __future__ import annotations
@@ -62,14 +63,16 @@ class Apart:
         allowed: FloatArray = self.pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
         return allowed
 
-    # ---- the motion from the path ------------------------------------------------------------------------------------
+    # ---- the motion from the path
+    # ------------------------------------------------------------------------------------
 
     def contour_error(self) -> float | None:
         """Largest distance of the motion from the path [mm]."""
         return None if not self.fits else max(float(reading.match.worst[5]) for reading in self.readings)
 
     def contour_check(self, toolpath: Toolpath) -> LimitCheck:
-        """The motion's worst distance from the path, as far as it could be followed, against the budget there."""
+        """The motion's worst distance from the path, as far as it could be followed, against the budget
+        there."""
         reading = max(self.readings, key=lambda each: each.match.worst[0])
         ratio, distance, budget, time, piece, _ = reading.match.worst
         ratio, budget = ratio * self.widened, budget / self.widened
@@ -87,7 +90,8 @@ class Apart:
             note=reading.note,
         )
 
-    # ---- the vertices from the motion --------------------------------------------------------------------------------
+    # ---- the vertices from the motion
+    # --------------------------------------------------------------------------------
 
     def near(self, reading: Observed) -> FloatArray:
         """(N+1,) distance of each vertex from the motion [mm]; NaN where it is not known."""
@@ -146,8 +150,9 @@ class Apart:
         return Fault(Kind.VERTEX, "vertex", found, ratio=ratio, time=time, line=line)
 
     def excesses(self) -> list[Excess]:
-        """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose distance is known. Of what the
-        chords between samples add a slower motion has less; what is between the samples is the path's own error."""
+        """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose
+        distance is known. Of what the chords between samples add a slower motion has less; what is between
+        the samples is the path's own error."""
         found = []
         for k, reading in enumerate(self.readings):
             ratio, distance, budget, time, _, _ = reading.match.worst.tolist()
@@ -170,7 +175,8 @@ def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
 def apart(
     readings: list[Observed], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Observed]]
 ) -> Apart:
-    """The readings that measure the motion: `readings` if it fits in them, or those by `read` with wider budgets in which it does."""
+    """The readings that measure the motion: `readings` if it fits in them, or those by `read` with wider
+    budgets in which it does."""
     found = Apart(readings, pieces)
     if found.fits:
         return found
@@ -189,8 +195,8 @@ def apart(
 def lost_after(
     readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces, complete: bool
 ) -> int | None:
-    """NC line of the last block that the motion could be followed along before it was lost, or ended too early; None if it ran
-    them all."""
+    """NC line of the last block that the motion could be followed along before it was lost, or ended too
+    early; None if it ran them all."""
     tallies = [reading.match.tally for reading in readings]
     at = [tally[LOST_AFTER] for tally in tallies if tally[LOST_AFTER] != NOT_LOST]
     if not at and not complete:

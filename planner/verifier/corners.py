@@ -1,8 +1,10 @@
-"""The record of eq. 18-20 at the programmed corners: what the motion does there, beside what the papers let it do.
+"""The record of eq. 18-20 at the programmed corners: what the motion does there, beside what the papers let
+it do.
 
-Checked are eq. 18, the corner's tolerance with the chord error in it, and eq. 19, the speed. Eq. 19 with the motion's own curvature
-follows from the limits of the axes' acceleration (error_allocation.py), so it does not fail without them, and says where they act.
-Eq. 20 is a comparison: a motion may be faster, and no verdict fails for it.
+Checked are eq. 18, the corner's tolerance with the chord error in it, and eq. 19, the speed. Eq. 19 with the
+motion's own curvature follows from the limits of the axes' acceleration (error_allocation.py), so it does not
+fail without them, and says where they act. Eq. 20 is a comparison: a motion may be faster, and no verdict
+fails for it.
 """
 
 from __future__ import annotations
@@ -15,16 +17,19 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 
-# A corner passed at less than this fraction of what eq. 20 and the programmed feed allow counts as a stop [-]: samples 1 ms apart show
-# a motion that rests on a corner as up to 0.025 mm/s at 2e5 mm/s3, where eq. 20 allows 10 to 30 mm/s.
+# A corner passed at less than this fraction of what eq. 20 and the programmed feed allow counts as a stop
+# [-]: samples 1 ms apart show a motion that rests on a corner as up to 0.025 mm/s at 2e5 mm/s3, where eq. 20
+# allows 10 to 30 mm/s.
 STANDS = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerCheck:
-    """One row per programmed corner in the program's order: a joint that turns and at which the program does not stop.
+    """One row per programmed corner in the program's order: a joint that turns and at which the program does
+    not stop.
 
-    All of a row but line, position, theta, budget and feed_paper is NaN where the motion could not be looked at.
+    All of a row but line, position, theta, budget and feed_paper is NaN where the motion could not be looked
+    at.
 
     line             : (C,) source line of the block that ends there
     position         : (C, A) the programmed vertex [mm]
@@ -32,14 +37,19 @@ class CornerCheck:
     budget           : (C,) eps [mm]
     time             : (C,) when the motion is nearest to the vertex [s]
     feed_planned     : (C,) its speed there [mm/s]
-    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf where it runs straight or stands
-    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner: polynomial Bezier pair between long straight legs [mm/s]
+    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf where it
+                       runs straight or stands
+    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner: polynomial Bezier pair between long
+                       straight legs [mm/s]
     feed_programmed  : (C,) the smaller one of the two blocks [mm/s]
     speed_ratio      : (C,) largest feed_planned / feed_closed_form of all readings of the motion [-]
-    miss             : (C,) distance of the vertex from the motion [mm]; from the chords of its samples where there is nothing else
+    miss             : (C,) distance of the vertex from the motion [mm]; from the chords of its samples where
+                       there is nothing else
     chord_error      : (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
-    budget_ratio     : (C,) the largest of miss + chord_error and the distance from the delivered chords, over eps [-]
-    delivered_speed, delivered_budget : (C,) both ratios as the samples and the chords between them show them, alone [-]
+    budget_ratio     : (C,) the largest of miss + chord_error and the distance from the delivered chords, over
+                       eps [-]
+    delivered_speed, delivered_budget : (C,) both ratios as the samples and the chords between them show them,
+                                        alone [-]
     judged           : False if the limit behind eq. (19) is reported only
     """
 
@@ -113,12 +123,13 @@ class CornerCheck:
 
     @property
     def compared(self) -> Array:
-        """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the programmed feed."""
+        """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the
+        programmed feed."""
         return self.looked & ~self.stands & (self.feed_paper < self.feed_programmed)
 
     def told(self) -> tuple[FloatArray, FloatArray]:
-        """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its file say the same; where a
-        corner is broken, the largest of all readings."""
+        """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its
+        file say the same; where a corner is broken, the largest of all readings."""
         return (
             np.where(self.too_fast, self.speed_ratio, self.delivered_speed),
             np.where(self.overdrawn, self.budget_ratio, self.delivered_budget),
@@ -161,7 +172,8 @@ class CornerCheck:
         }
 
     def sentence(self) -> str:
-        """Both in one line: "eq. 18 and 19 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of eq. 20 (median)".
+        """Both in one line: "eq. 18 and 19 hold at 4 of 4 corners, at most 0.9993; 1.54 times the speed of
+        eq. 20 (median)".
 
         Eq. 20 is a comparison, not a check."""
         if not len(self):

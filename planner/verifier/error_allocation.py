@@ -1,38 +1,45 @@
-"""The papers' check at every programmed corner, whatever made the motion: eq. (18)-(20) of paper 002 on the motion's own curvature.
+"""The papers' check at every programmed corner, whatever made the motion: eq. (18)-(20) of paper 002 on the
+motion's own curvature.
 
-At the motion's point nearest to the vertex, in the program's order (matching.py knows when), let v be the speed, t = v/|v|, a_n the
-part of the acceleration a across t, n = a_n/|a_n|, kappa = |a_n| / v^2 the motion's own curvature, all over the linear axes.
+At the motion's point nearest to the vertex, in the program's order (matching.py knows when), let v be the
+speed, t = v/|v|, a_n the part of the acceleration a across t, n = a_n/|a_n|, kappa = |a_n| / v^2 the motion's
+own curvature, all over the linear axes.
 
-**Eq. (19), the speed.** Paper 002 lets a corner be passed at sqrt(A/kappa). With A(n) the most that the machine leaves in the
-direction n,
+**Eq. (19), the speed.** Paper 002 lets a corner be passed at sqrt(A/kappa). With A(n) the most that the
+machine leaves in the direction n,
 
     A(n) = min( sum_k |n_k| a_k,  A_max ),       a_k the axes' acceleration limits, A_max the machine's normal acceleration,
 
     feed / sqrt(A(n)/kappa) = sqrt( |a_n| / A(n) ) <= 1.
 
-Proof: n is a unit vector along a_n, so |a_n| = a_n.n = a.n (t.n = 0) = sum_k a_k(t) n_k <= sum_k a_k |n_k| for every acceleration
-within the axes' limits; and |a_n| <= A_max is the other limit itself. Nothing else was used: it holds for every method, corner,
-path and direction t, so that errors of the velocity cannot break it. The sum is attained where every axis gives all it has, so the
-bound cannot be smaller for all motions; and a motion that takes a corner of curvature kappa as if nothing limited the acceleration
-exceeds it as soon as kappa feed^2 > A(n).
+Proof: n is a unit vector along a_n, so |a_n| = a_n.n = a.n (t.n = 0) = sum_k a_k(t) n_k <= sum_k a_k |n_k|
+       for every acceleration
+within the axes' limits; and |a_n| <= A_max is the other limit itself. Nothing else was used: it holds for
+every method, corner, path and direction t, so that errors of the velocity cannot break it. The sum is
+attained where every axis gives all it has, so the bound cannot be smaller for all motions; and a motion that
+takes a corner of curvature kappa as if nothing limited the acceleration exceeds it as soon as kappa feed^2 >
+A(n).
 
-**Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are samples: over a period dt
-the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples fall, and from a cubic, where the machine runs
-these, by a quarter of that (filtered.py). Hence no chord passes the vertex at more
-than
+**Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are
+samples: over a period dt the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples
+fall, and from a cubic, where the machine runs these, by a quarter of that (filtered.py). Hence no chord
+passes the vertex at more than
 
     miss + kappa feed^2 dt^2 / 8  <=  eps                            (to second order in dt, as in the paper)
 
-if the budget is kept for all phases of the samples. Where there are samples alone, the distance of the vertex from their chords has
-both errors in it. Both are judged: the sum, and the chords that were delivered. What filters behind the drives add is not in here.
+if the budget is kept for all phases of the samples. Where there are samples alone, the distance of the vertex
+from their chords has both errors in it. Both are judged: the sum, and the chords that were delivered. What
+filters behind the drives add is not in here.
 
-**Eq. (20), the gain.** The paper's own corner, the polynomial Bezier pair between straight legs that are long enough, has kappa =
-(2/3) tan^2(theta/2) / eps_ap, and with c = dt^2/8 + sum_i T_i^2/24 (filters of lengths T_i) its budget is used up best by
+**Eq. (20), the gain.** The paper's own corner, the polynomial Bezier pair between straight legs that are long
+enough, has kappa = (2/3) tan^2(theta/2) / eps_ap, and with c = dt^2/8 + sum_i T_i^2/24 (filters of lengths
+T_i) its budget is used up best by
 
     X = min(A, eps / (2c)),     eps_ap = eps - c X,     v20 = sqrt(1.5 X eps_ap) / tan(theta/2)
 
-(X (eps - c X) is a parabola with its top at eps/(2c)), A taken along the bisector u2 - u1. feed / v20 is what the motion gains over
-it. It is no bound: other shapes within eps may be faster, and dense programs need not turn at each of their corners.
+(X (eps - c X) is a parabola with its top at eps/(2c)), A taken along the bisector u2 - u1. feed / v20 is what
+the motion gains over it. It is no bound: other shapes within eps may be faster, and dense programs need not
+turn at each of their corners.
 """
 
 from __future__ import annotations
@@ -65,7 +72,8 @@ AT_ONCE = SIZES.corners_at_once
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Reading:
-    """The motion near each of C vertices: time [s], speed [mm/s], |a_n| and A(n) [mm/s2], distance from the vertex [mm]."""
+    """The motion near each of C vertices: time [s], speed [mm/s], |a_n| and A(n) [mm/s2], distance from the
+    vertex [mm]."""
 
     time: FloatArray
     feed: FloatArray
@@ -91,13 +99,15 @@ def check_corners(
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    readings : of the samples and, where there is a motion, of the motion between them; they know when each vertex is passed
+    readings : of the samples and, where there is a motion, of the motion between them; they know when each
+               vertex is passed
     motion : what the samples were taken from; None to look at the samples alone
     limits : what accelerations that were derived from positions can be off by
     judged : False if the limit of acceleration is reported only
 
-    A corner is not looked at where the motion misses it by so much that its place on the path is not known (`NEAR_MISS`; then `order`
-    or `vertex` says so), and where there are samples alone so far apart that the axes could bow by more than eps between them.
+    A corner is not looked at where the motion misses it by so much that its place on the path is not known
+    (`NEAR_MISS`; then `order` or `vertex` says so), and where there are samples alone so far apart that the
+    axes could bow by more than eps between them.
     """
     corner = np.flatnonzero(toolpath.joint == Joint.CORNER)
     at = np.flatnonzero(pieces.joint["real"])[corner]
@@ -204,10 +214,11 @@ def _overdrawn(check: CornerCheck, k: int) -> str:
 def _nearest_sample(
     trajectory: Trajectory, near_time: FloatArray, vertex: FloatArray, machine: Machine, limits: Limits
 ) -> tuple[_Reading, FloatArray]:
-    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the period between them [s].
+    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the
+    period between them [s].
 
-    Accelerations derived from the positions are means of the motion's, which keep its limits. What the positions' rounding r makes of
-    them over the period h, at most 4 r / h^2, is taken off.
+    Accelerations derived from the positions are means of the motion's, which keep its limits. What the
+    positions' rounding r makes of them over the period h, at most 4 r / h^2, is taken off.
     """
     after = np.clip(trajectory.first_not_before(near_time), 1, max(len(trajectory) - 1, 1))
     after = np.minimum(after, len(trajectory) - 1)  # a single sample is both
@@ -228,7 +239,8 @@ def _nearest_sample(
 def _nearest_point(
     motion: AnyMotion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
 ) -> _Reading:
-    """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method on (p - P).p' = 0."""
+    """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method
+    on (p - P).p' = 0."""
     time, readings = start, []
     for _ in range(NEAREST_STEPS + 1):
         unique, row = np.unique(np.clip(time, 0.0, motion.end), return_inverse=True)
@@ -271,7 +283,8 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
 
 
 def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
-    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least over all directions."""
+    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least
+    over all directions."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits

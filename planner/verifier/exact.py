@@ -1,21 +1,24 @@
 """Blocks under G61 and G61.1: the delivered samples run along the path itself, in its order.
 
-They are matched with the path once more (matching.py), with the budgets that G61 means. With a motion x(t) on the path, |x''| <= a,
-and samples at most h apart:
+They are matched with the path once more (matching.py), with the budgets that G61 means. With a motion x(t) on
+the path, |x''| <= a, and samples at most h apart:
 
     sample   on the path, to `PLACE_ROUNDING` and the digits of the positions
     vertex   passed between two samples at a time u; the chord is at most a h^2 / 8 from x(u) there, and that is what it may miss the
-             vertex by, with the same rounding; at most the tolerance, which counts between samples (contour.py), and that where the
-             acceleration is not judged
+             vertex by, with the same rounding; at most the tolerance, which counts between samples
+             (contour.py), and that where the acceleration is not judged
 
-A motion on the path always fits: its own course is a way through the free space of the matching, since chord and motion are compared
-at the same time. One that leaves the path, or runs it in another order, leaves a block out or is not at its end, is lost. What stays
-within a h^2 / 8 of one place could be run between two samples; that it is left out is not seen.
+A motion on the path always fits: its own course is a way through the free space of the matching, since chord
+                                  and motion are compared
+at the same time. One that leaves the path, or runs it in another order, leaves a block out or is not at its
+end, is lost. What stays within a h^2 / 8 of one place could be run between two samples; that it is left out
+is not seen.
 
-The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a full stop between: the
-corner there may be rounded.
+The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a
+full stop between: the corner there may be rounded.
 
-How far a motion that is lost was off is measured within the tolerance: from the nearest of the pieces that it can be on, in order.
+How far a motion that is lost was off is measured within the tolerance: from the nearest of the pieces that it
+can be on, in order.
 """
 
 from __future__ import annotations
@@ -100,7 +103,8 @@ def _positions(trajectory: Trajectory) -> Iterator[tuple[FloatArray, FloatArray]
 
 
 def _beside(toolpath: Toolpath) -> Array:
-    """(2, M) True for exact segments whose start, and whose end, is passed without a full stop from or to one that is not exact."""
+    """(2, M) True for exact segments whose start, and whose end, is passed without a full stop from or to one
+    that is not exact."""
     free, moving = np.pad(~toolpath.exact, 1), toolpath.joint != Joint.STOP
     return toolpath.exact & np.array([free[:-2] & moving[:-1], free[2:] & moving[1:]])
 
@@ -120,9 +124,11 @@ def _exact_pieces(toolpath: Toolpath, pieces: ProgramPieces) -> Array:
 
 
 def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces:
-    """The pieces with the budgets of the module's text on those that are `exact` (N,), and at the vertices at their ends.
+    """The pieces with the budgets of the module's text on those that are `exact` (N,), and at the vertices at
+    their ends.
 
-    bow : largest distance of a motion from its chord over a period [mm]; inf or NaN where the acceleration is not judged
+    bow : largest distance of a motion from its chord over a period [mm]; inf or NaN where the acceleration is
+          not judged
     """
     piece, joint = pieces.piece.copy(), pieces.joint.copy()
     piece["budget"][exact] = PLACE_ROUNDING
@@ -132,7 +138,8 @@ def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces
 
 
 def _lost_at(reading: Observed, pieces: ProgramPieces) -> int | None:
-    """The first piece of those with these budgets that a motion is not seen to run along to its end; None if it runs along all."""
+    """The first piece of those with these budgets that a motion is not seen to run along to its end; None if
+    it runs along all."""
     match = reading.match
     allowed = pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
     missed = np.flatnonzero(match.passed["near"] > allowed)

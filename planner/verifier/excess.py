@@ -1,4 +1,5 @@
-"""The faults of a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for who made it."""
+"""The faults of a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for
+who made it."""
 
 from __future__ import annotations
 
@@ -64,8 +65,8 @@ class Fault:
 
 
 def first_of(places: Sequence[Any] | Array, fault: Callable[[Any], Fault], of: str) -> list[Fault]:
-    """The faults at the first few of some places (n,), and one that tells how many there are in all, if these are not
-    all of them; `of` says of what."""
+    """The faults at the first few of some places (n,), and one that tells how many there are in all, if these
+    are not all of them; `of` says of what."""
     said = [fault(place) for place in places[:FAULTS_OF_A_KIND]]
     if len(said) < len(places):
         said.append(Fault(said[0].kind, said[0].name, f"{len(places)} {of} in all"))
@@ -80,7 +81,8 @@ def placed(axes: tuple[str, ...], position: FloatArray) -> str:
 # What an error of the chords between samples alone can break.
 OF_CHORDS = frozenset({Kind.CONTOUR, Kind.VERTEX, Kind.CORNER_BUDGET})
 
-# The quantities of limits.py by `Spans.column`, and the power of how much slower a motion is by which each gets less.
+# The quantities of limits.py by `Spans.column`, and the power of how much slower a motion is by which each
+# gets less.
 NAMES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
 POWERS = (1, 2, 3, 1, 2)
 APART = 3  # samples: those that are not further apart are of one span
@@ -110,7 +112,8 @@ class Excess:
 
     @property
     def slower(self) -> float:
-        """By how much slower the motion would have to be there to keep what is allowed [-]; inf where that does not help."""
+        """By how much slower the motion would have to be there to keep what is allowed [-]; inf where that
+        does not help."""
         if self.still >= 1.0:
             return float("inf")
         return float(((self.ratio - self.still) / (1.0 - self.still)) ** (1.0 / self.power))
@@ -129,7 +132,8 @@ class Spans:
     ratio: list[float] = field(default_factory=list)
 
     def take(self, t: FloatArray, over: FloatArray) -> None:
-        """The spans of samples at the times t (n,) [s] with the ratios `over` (n, columns), 0 where nothing is exceeded."""
+        """The spans of samples at the times t (n,) [s] with the ratios `over` (n, columns), 0 where nothing
+        is exceeded."""
         for column in np.flatnonzero(over.any(axis=0)).tolist():
             self.add(column, t, over[:, column])
 
@@ -163,7 +167,7 @@ def above(ratio: FloatArray) -> FloatArray:
 
 
 def of_check(name: str, span: tuple[float, float], ratio: float) -> Excess:
-    """Of one place of which no more is known than the largest ratio of a quantity, "jerk.e" for example, and the `span` [s] that it is
-    of."""
+    """Of one place of which no more is known than the largest ratio of a quantity, "jerk.e" for example, and
+    the `span` [s] that it is of."""
     power = POWERS[NAMES.index(name.partition(".")[0])]
     return Excess(kind=Kind.LIMIT, name=name, begin=span[0], end=span[1], ratio=ratio, power=power)

@@ -1,16 +1,19 @@
-"""The extruder of a 3-D printer, from its delivered places E(t): its limits, and whether it is where the program wants it.
+"""The extruder of a 3-D printer, from its delivered places E(t): its limits, and whether it is where the
+program wants it.
 
 velocity      |dE|/h over each period, which no motion within the limit exceeds.
 
 acceleration, jerk      while the axes move, those along the path times the ratio of the extruder: at a sample the smaller one of
-              r = |dE|/ds over the periods before and after it. Where they differ the program changes it there, its speed steps, and
-              neither is the ratio alone. ds is the chord of the period, or from the columns h (v0 + v1)/2 - h^2 (u1 - u0)/12 with
-              speed v and acceleration u along the path, whichever is longer. While the axes rest, divided differences of E.
+              r = |dE|/ds over the periods before and after it. Where they differ the program changes it
+              there, its speed steps, and neither is the ratio alone. ds is the chord of the period, or from
+              the columns h (v0 + v1)/2 - h^2 (u1 - u0)/12 with speed v and acceleration u along the path,
+              whichever is longer. While the axes rest, divided differences of E.
 
 place         when a joint is passed E is what the program says, but for what the ratio makes of `NEAR` tolerances and of one period at
               the speed there; in the end it is that to rounding.
 
-Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the digits that a file was written with.
+Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the digits that a file was written
+                       with.
 """
 
 from __future__ import annotations

@@ -1,18 +1,20 @@
 """Feed: never above the F word of the block on which the motion is (switches.py).
 
-Every chord of length c over a period h is cut at these places, and its parts c_i, each on a block with the feed F_i, take at least
+Every chord of length c over a period h is cut at these places, and its parts c_i, each on a block with the
+feed F_i, take at least
 
     sum c_i / F_i  <=  h,        the ratio of the check is  sum c_i / (F_i h).
 
-So a slow block is not hidden in a period in which others are run through too: what is run of it, c_i, takes c_i / F_i. Where the
-tolerance lets a motion cut a block off, nothing is run of it. Where speeds were delivered they are compared with the F at their places
-too.
+So a slow block is not hidden in a period in which others are run through too: what is run of it, c_i, takes
+c_i / F_i. Where the tolerance lets a motion cut a block off, nothing is run of it. Where speeds were
+delivered they are compared with the F at their places too.
 
-F is the speed in x, y and z alone where these move, in u, v and w where only those do, else in the rotary axes. Beside a corner the
-parts of a motion in these axes differ from those of its block, so the chord in them alone is compared with F, too.
+F is the speed in x, y and z alone where these move, in u, v and w where only those do, else in the rotary
+axes. Beside a corner the parts of a motion in these axes differ from those of its block, so the chord in them
+alone is compared with F, too.
 
-So far as sampling does not tell where a block begins and ends (`reach` in switches.py) a place belongs to both, and the larger F
-counts.
+So far as sampling does not tell where a block begins and ends (`reach` in switches.py) a place belongs to
+both, and the larger F counts.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class Feeds:
         self._left: Chords | None = None
 
     def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
-        """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for `Switches.take`."""
+        """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for
+        `Switches.take`."""
         self._switches.take(new, skip, first, last)
         new = Chords(*(column[skip:].copy() for column in new))
         if self._left is not None:
@@ -90,8 +93,8 @@ def _judged(
     sample: Array,
     over: FloatArray,
 ) -> int:
-    """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and `over` (n,); vertices before
-    `known` are settled. -> the first one that is left
+    """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and
+    `over` (n,); vertices before `known` are settled. -> the first one that is left
 
     groups : (A,) of the axes (`axis_groups`), (0,) where F counts all of them
     """

@@ -1,36 +1,41 @@
-"""The delivered setpoints behind the machine's own filters: `[fir]`, moving averages in the drive or the control behind them.
+"""The delivered setpoints behind the machine's own filters: `[fir]`, moving averages in the drive or the
+control behind them.
 
-Between the setpoints the machine moves as its file says (`Signal`). A moving average of length T makes of that signal x(t) the mean
-of the last T seconds,
+Between the setpoints the machine moves as its file says (`Signal`). A moving average of length T makes of
+that signal x(t) the mean of the last T seconds,
 
     y(t) = (I(t) - I(t - T)) / T,     I' = x,          y'(t) = (x(t) - x(t - T)) / T,
 
-and several are applied one after the other. Before its start and after its end the motion rests, so the result goes on for the
-delay Td = sum T_i after the end, and arrives exactly where the motion does.
+and several are applied one after the other. Before its start and after its end the motion rests, so the
+result goes on for the delay Td = sum T_i after the end, and arrives exactly where the motion does.
 
-The longest filter comes first: of it the integral is exact, at any time. For the others y is known at times h apart with its
-derivative, and taken as a cubic between them; those y are the next filter's x. A cubic misses a jump a of the second derivative by
-at most h^2 a / 32, and a jump v of the first by h v / 8; a moving average leaves h / T of either, and h <= T/8 (T/32 with "hold").
-A chord that turns by the speed v makes a = v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and T1 is
-the longest filter: some nanometres, and with "hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The
-integrals begin anew in every chunk: no digit is lost in long motions.
+The longest filter comes first: of it the integral is exact, at any time. For the others y is known at times h
+                                apart with its
+derivative, and taken as a cubic between them; those y are the next filter's x. A cubic misses a jump a of the
+second derivative by at most h^2 a / 32, and a jump v of the first by h v / 8; a moving average leaves h / T
+of either, and h <= T/8 (T/32 with "hold"). A chord that turns by the speed v makes a = v/T1, a setpoint that
+jumps by d makes a jump d/T1 of the first derivative, and T1 is the longest filter: some nanometres, and with
+"hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The integrals begin anew in
+every chunk: no digit is lost in long motions.
 
-The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits are judged on the setpoints:
-a mean never exceeds what it is the mean of. A full stop is a vertex like any other: the filtered motion need not rest there.
+The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits
+are judged on the setpoints: a mean never exceeds what it is the mean of. A full stop is a vertex like any
+other: the filtered motion need not rest there.
 
-Nothing but the setpoints is looked at, whether or not the motion that they were taken from can be asked: the verdict of a plan and that
-on its file have the same numbers here.
+Nothing but the setpoints is looked at, whether or not the motion that they were taken from can be asked: the
+verdict of a plan and that on its file have the same numbers here.
 
 What the machine does between two setpoints, as the judge sees it: the signal that its filters get.
 
-With the setpoints p0 and p1 at the ends of a period of length h, their velocities v0 and v1, and the share w of the period,
+With the setpoints p0 and p1 at the ends of a period of length h, their velocities v0 and v1, and the share w
+of the period,
 
     linear   p0 + w (p1 - p0)
     cubic    p0 + w (b + w ((3 c - 2 b - d) + w (b + d - 2 c))),   b = h v0, d = h v1, c = p1 - p0:  the cubic of both ends
     hold     p0
 
-before the first setpoint that one, and after the last one that. The periods need not be equal. Where a velocity was not delivered, it
-is what whoever read the positions derived from them.
+before the first setpoint that one, and after the last one that. The periods need not be equal. Where a
+velocity was not delivered, it is what whoever read the positions derived from them.
 """
 
 from __future__ import annotations
@@ -54,7 +59,8 @@ from planner.verifier.verdict import AfterFilters
 
 NOTE = "after the filters"
 STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are evaluated (module text)
-# In the shortest filter, where setpoints jump: the mean has a kink for each then, which chords between times cut off.
+# In the shortest filter, where setpoints jump: the mean has a kink for each then, which chords between times
+# cut off.
 STEPS_OF_HELD = 32
 CHUNK = SIZES.filtered_at_once
 
@@ -62,7 +68,8 @@ CHUNK = SIZES.filtered_at_once
 def filtered(
     trajectory: Trajectory, interpolation: str, filters: tuple[float, ...], dt: float
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Times (T,) and positions (T, A) of setpoints behind moving averages, chunk by chunk, from their start until they are empty.
+    """Times (T,) and positions (T, A) of setpoints behind moving averages, chunk by chunk, from their start
+    until they are empty.
 
     interpolation : between the setpoints, as in the machine file
     filters       : their lengths [s], one or more
@@ -86,7 +93,8 @@ def filtered(
 
 
 def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray, FloatArray]:
-    """Mean over the last T of a motion at times h apart, and its derivative; from the first time on for which that is known."""
+    """Mean over the last T of a motion at times h apart, and its derivative; from the first time on for which
+    that is known."""
     behind = int(np.ceil(T / h))
     origin = x[0].copy()
     x = x - origin
@@ -144,8 +152,9 @@ def after_filters(
     )
 
 
-# By how much the way between setpoints may leave a motion whose acceleration steps from nothing to a within a period h, over a h^2: a
-# chord by 1/8, and the cubic of both ends by 1/32 (less where the acceleration changes steadily).
+# By how much the way between setpoints may leave a motion whose acceleration steps from nothing to a within a
+# period h, over a h^2: a chord by 1/8, and the cubic of both ends by 1/32 (less where the acceleration
+# changes steadily).
 CHORD_BOW, CUBIC_BOW = 1.0 / 8.0, 1.0 / 32.0
 
 
@@ -168,7 +177,8 @@ class At(NamedTuple):
 
 
 class Signal:
-    """The signal of setpoints, read chunk by chunk from its start to its end; only what is asked for next is kept."""
+    """The signal of setpoints, read chunk by chunk from its start to its end; only what is asked for next is
+    kept."""
 
     def __init__(self, trajectory: Trajectory, interpolation: str):
         self._chunks = trajectory.chunks()
@@ -178,7 +188,8 @@ class Signal:
         self._areas = np.empty((0, 0))
 
     def take(self, begin: float, end: float) -> None:
-        """Keep what the times from `begin` to `end` [s] need, counted from the first setpoint; `begin` never goes back."""
+        """Keep what the times from `begin` to `end` [s] need, counted from the first setpoint; `begin` never
+        goes back."""
         kept = [(self._t, self._p, self._v)] if len(self._t) else []
         last = self._t[-1] if kept else -np.inf
         while last < end and (chunk := next(self._chunks, None)) is not None:
@@ -207,7 +218,8 @@ class Signal:
         return At(place, self._areas[k] + part + beyond * place, origin)
 
     def _between(self, k: Array, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places (n, A) at the shares w (n,) of the periods k (n,), less the origin, and their integrals from the period's begin."""
+        """Places (n, A) at the shares w (n,) of the periods k (n,), less the origin, and their integrals from
+        the period's begin."""
         h = (self._t[k + 1] - self._t[k])[:, None]
         p0, p1 = self._p[k] - self._p[0], self._p[k + 1] - self._p[0]
         place, area = self._of(w[:, None], p0, p1 - p0, h * self._v[k], h * self._v[k + 1])

@@ -17,18 +17,21 @@ from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
 
-# A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a motion times are good to
-# 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop exceeds it by far more.
+# A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a
+# motion times are good to 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop
+# exceeds it by far more.
 STOP_ROUNDING = 1e-3
 
 
 def joint_times(reading: Observed, pieces: ProgramPieces) -> FloatArray:
-    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is nearest, and no earlier than the
-    joint before. That of a joint that is not reached is that of the last one before that is: its own is 0.
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is
+    nearest, and no earlier than the joint before. That of a joint that is not reached is that of the last one
+    before that is: its own is 0.
 
-    A late time hides no fault: a joint is compared with the chords run while the piece before it is possible, so that its time reaches
-    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it delays were passed within
-    it. An error of the tolerance is allowed there anyway.
+    A late time hides no fault: a joint is compared with the chords run while the piece before it is possible,
+                                so that its time reaches
+    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it
+    delays were passed within it. An error of the tolerance is allowed there anyway.
     """
     near: FloatArray = reading.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)
@@ -44,7 +47,8 @@ def measured(readings: list[Observed], group: int) -> FloatArray:
 def excesses(
     readings: list[Observed], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]
 ) -> list[Excess]:
-    """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are of, at the worst place."""
+    """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are
+    of, at the worst place."""
     found = [each for reading in readings for each in reading.worst.over.excesses(not_limited)]
     shown = {each.name for each in found}
     broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]
@@ -52,7 +56,8 @@ def excesses(
     return found + [of_check(check.name, (check.time - back, check.time), check.ratio) for check in broken]
 
 
-# ---- limits and columns ----------------------------------------------------------------------------------------------
+# ---- limits and columns
+# ----------------------------------------------------------------------------------------------
 
 
 def limit_checks(
@@ -128,13 +133,15 @@ def largest_chord_error(readings: list[Observed]) -> float:
     return float(worst.row[rows.GROUPS * worst.at.shape[1] + rows.CHORD, 1])
 
 
-# ---- ends, order, stops -----------------------------------------------------------------------------------------------
+# ---- ends, order, stops
+# -----------------------------------------------------------------------------------------------
 
 
 def end_error(
     readings: list[Observed], toolpath: Toolpath, rounding: FloatArray
 ) -> tuple[float, list[Fault]]:
-    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong with it.
+    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong
+    with it.
 
     rounding : (A,) largest error of a position by its digits [mm]
     """
@@ -192,8 +199,9 @@ def _order(found: str, line: int) -> Fault:
 
 
 def out_of_order(readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
-    """The fault of a motion that is near enough to all of the path, but not in its order: it comes near to a vertex before it has
-    been at the one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
+    """The fault of a motion that is near enough to all of the path, but not in its order: it comes near to a
+    vertex before it has been at the one before. To be asked of a motion that has no other fault of the
+    contour, the vertices or the order."""
     for reading in readings:
         at = int(reading.match.tally[STUCK_AT])
         if at != NOT_LOST:

@@ -1,4 +1,5 @@
-"""The state of knowledge about the numbers of a trajectory: which of them were delivered, and to how many digits."""
+"""The state of knowledge about the numbers of a trajectory: which of them were delivered, and to how many
+digits."""
 
 from __future__ import annotations
 
@@ -21,9 +22,10 @@ DERIVATIVES = ("velocity", "acceleration", "jerk")
 class Given:
     """How much of a trajectory was given, and how exactly; without arguments all of it, in float64.
 
-    columns           : derivatives that were delivered; the others were derived from the positions by whoever read them, and only
-                        the positions are judged for them
-    position_rounding : (A,) largest error of a position by the digits it is written with [mm, rad], or () for none
+    columns           : derivatives that were delivered; the others were derived from the positions by whoever
+                        read them, and only the positions are judged for them
+    position_rounding : (A,) largest error of a position by the digits it is written with [mm, rad], or () for
+                        none
     time_rounding     : the same of every time [s]
     end_rounding      : the same of the last time alone [s]: the others may lie on a grid, and be known by it
     extruder_rounding : largest error of the extruder's place by its digits [mm of filament]
@@ -50,13 +52,14 @@ WHOLE = Given()
 def fit_axes(
     trajectory: Trajectory, given: Given, toolpath: Toolpath
 ) -> tuple[Trajectory, Given, tuple[str, ...]]:
-    """The trajectory and what is given of it, with the program's axes in its order, and what was done, in sentences.
+    """The trajectory and what is given of it, with the program's axes in its order, and what was done, in
+    sentences.
 
-    An axis of the program that it does not move may be missing: it stands where the program has it. An axis that the program does not
-    have may be there if it stands still, and is left out.
+    An axis of the program that it does not move may be missing: it stands where the program has it. An axis
+    that the program does not have may be there if it stands still, and is left out.
 
-    Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the trajectory moves and the
-    program does not have.
+    Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the
+    trajectory moves and the program does not have.
     """
     trajectory, given = _at_radius(trajectory, given, toolpath.radius)
     if trajectory.axes == toolpath.axes:

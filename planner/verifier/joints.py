@@ -1,4 +1,5 @@
-"""Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry along the program.
+"""Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry along the
+program.
 
     joints   the limits of x, y, z as those of limits.py: on the delivered columns, and on divided differences of the positions
     tip      brought back by the chain of kinematics.py, positions alone, and judged like any motion: rotary limits, feed, contour,
@@ -6,19 +7,20 @@
     between  the joints run straight from setpoint to setpoint, and so the tip does not: how far its middle leaves the middle of the
              tips at both ends is added to the contour error
 
-A program's path has tip and angles in one norm, angles at a radius. The tool's direction turns by no more than the norm of what the
-angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the tolerance of the angles is one of the direction, too.
+A program's path has tip and angles in one norm, angles at a radius. The tool's direction turns by no more
+than the norm of what the angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the
+tolerance of the angles is one of the direction, too.
 
 The tip and the direction of the tool from delivered joints, for the verdict.
 
-Written as a chain of frames, from the tool's tip through the head to the machine and through the table to the workpiece, and so by
-other formulas than the planner's: with M1, M2 the matrices of the axes that carry the workpiece (outer, inner) about the points c1, c2,
-a point P of the machine is that of the workpiece
+Written as a chain of frames, from the tool's tip through the head to the machine and through the table to the
+workpiece, and so by other formulas than the planner's: with M1, M2 the matrices of the axes that carry the
+workpiece (outer, inner) about the points c1, c2, a point P of the machine is that of the workpiece
 
     p = c2 + M2^T (c1 + M1^T (P - c1) - c2)
 
-and the tool's tip in the machine is the joints plus the vector from the spindle at rest, turned by the head. Program coordinates have
-the tool's length in z (G43), which turns with neither.
+and the tool's tip in the machine is the joints plus the vector from the spindle at rest, turned by the head.
+Program coordinates have the tool's length in z (G43), which turns with neither.
 """
 
 from __future__ import annotations
@@ -42,7 +44,8 @@ from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verifier.verdict import LimitCheck, Verdict
 from planner.verifier.worst import BACK, SampleBlock, Worst
 
-# Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints [-].
+# Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints
+# [-].
 NOT_JUDGED = 100.0
 
 
@@ -56,8 +59,8 @@ def verify_joints(
     not_limited: tuple[str, ...] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Verdict:
-    """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics]: limits of the
-    linear joints in place of those of the tip's coordinates; errors with what lies between setpoints.
+    """Judge setpoints of the joints against a path of the tip and a machine with a table [kinematics]: limits
+    of the linear joints in place of those of the tip's coordinates; errors with what lies between setpoints.
 
     tool_length : [mm]; None for that of the machine file
     given       : which columns were delivered; None for all
@@ -72,7 +75,8 @@ def verify_joints(
         machine, setpoints, machine.kinematics.tool_length if tool_length is None else tool_length
     )
     given = Given() if given is None else given
-    # of machines with a limit of the normal acceleration that limit is not one of the tip: it moves with the workpiece
+    # of machines with a limit of the normal acceleration that limit is not one of the tip: it moves with the
+    # workpiece
     tip = verify(
         carried.motion(setpoints),
         toolpath,
@@ -213,8 +217,8 @@ def _about(letter: str, angle: FloatArray) -> FloatArray:
 def tip_and_direction(
     data: KinematicsData, length: float, axes: tuple[str, ...], joints: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) controlled point in program coordinates [mm] and (n, 3) unit vector of the tool, seen from the workpiece, for joints
-    (n, A) of the axes [mm, rad] and a tool of that length [mm]."""
+    """(n, 3) controlled point in program coordinates [mm] and (n, 3) unit vector of the tool, seen from the
+    workpiece, for joints (n, A) of the axes [mm, rad] and a tool of that length [mm]."""
     column = dict(zip(axes, np.asarray(joints, dtype=np.float64).T, strict=True))
     turned = {
         letter: _about(letter, -column[letter] if letter in data.reversed else column[letter])

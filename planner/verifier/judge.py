@@ -42,15 +42,17 @@ def verify(
 
     trajectory  : the delivered samples at dt; only its times, positions and their derivatives are used
     toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
-    motion      : what the samples were taken from, to be judged between them too, at times chosen here (reading.py); None to judge the
-                  samples alone
-    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another seed
+    motion      : what the samples were taken from, to be judged between them too, at times chosen here
+                  (reading.py); None to judge the samples alone
+    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another
+                  seed
     given       : which columns of the trajectory were delivered, and with how many digits
     not_limited : quantities of `NOT_LIMITED_NAMES` that are reported and not judged
     progress    : called now and then with the fraction done (0 to 1)
 
-    Raises InputError if the axes differ, if the trajectory has no samples, or if its times can only be milliseconds. Raises ValueError
-    for an unknown name in `not_limited`, and for a toolpath that contradicts itself.
+    Raises InputError if the axes differ, if the trajectory has no samples, or if its times can only be
+    milliseconds. Raises ValueError for an unknown name in `not_limited`, and for a toolpath that contradicts
+    itself.
     """
     _check_input(trajectory, toolpath, not_limited)
     if motion is None:
@@ -144,8 +146,8 @@ def verify(
 
 
 def _both_errors(apart: contour.Apart, toolpath: Toolpath) -> tuple[float | None, float | None]:
-    """The parts of the contour error in linear axes [mm] and in rotary ones [deg]; None without rotary axes, and where it is not
-    known."""
+    """The parts of the contour error in linear axes [mm] and in rotary ones [deg]; None without rotary axes,
+    and where it is not known."""
     if not apart.fits or not set(toolpath.axes) & set(ROTARY_AXES):
         return None, None
     linear, rotary = np.max([reading.apart for reading in apart.readings], axis=0)

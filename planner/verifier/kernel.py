@@ -9,11 +9,13 @@ from planner.base.kernels import njit
 
 
 def kernel(inline: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The compiler's settings for all kernels of the verifier. They work on arrays that their caller owns and allocate nothing.
+    """The compiler's settings for all kernels of the verifier. They work on arrays that their caller owns and
+    allocate nothing.
 
-    Counting references to those arrays at every call was four fifths of the running time, hence `_nrt=False`; so was passing
-    them on the stack, hence `inline` for the innermost functions, which the interpreter then cannot call. Division by zero
-    gives inf, as in numpy. They let go of Python's lock, so that samples and what lies between them are read side by side.
+    Counting references to those arrays at every call was four fifths of the running time, hence `_nrt=False`;
+    so was passing them on the stack, hence `inline` for the innermost functions, which the interpreter then
+    cannot call. Division by zero gives inf, as in numpy. They let go of Python's lock, so that samples and
+    what lies between them are read side by side.
     """
     settings: dict[str, Any] = {
         "forceinline": inline,

@@ -2,15 +2,15 @@
 
 Twice per axis: on the delivered columns, and on divided differences of the delivered positions (worst.py).
 
-The columns must belong to the positions. With |acceleration| <= A over a period h, and |jerk| <= J where jerk is
-limited,
+The columns must belong to the positions. With |acceleration| <= A over a period h, and |jerk| <= J where jerk
+is limited,
 
     |dx/h - (v0 + v1)/2| <= min(A h / 4, J h^2 / 12),      |dv/h - (a0 + a1)/2| <= J h / 4
 
-each up to a rounding of the columns of `RATIO_ROUNDING` times their limit. A and J are the larger of the limit
-and of what was measured, so that a motion beyond a limit is not also called a liar. Without a limit on jerk
-acceleration may jump within every period, and the acceleration column cannot be refuted; nor can the jerk column,
-which may jump anyhow.
+each up to a rounding of the columns of `RATIO_ROUNDING` times their limit. A and J are the larger of the
+limit and of what was measured, so that a motion beyond a limit is not also called a liar. Without a limit on
+jerk acceleration may jump within every period, and the acceleration column cannot be refuted; nor can the
+jerk column, which may jump anyhow.
 
 The row of the feed, |v| over all axes with rotary ones at the radius of the path, is of feed.py. Normal
 acceleration is |a - (a.t) t| with t = v/|v| over x, y and z; its share of the chord error over a period is
@@ -80,8 +80,8 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
 
 
 def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
-    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion can
-    have there [mm]."""
+    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion
+    can have there [mm]."""
     rounding = np.zeros(len(acceleration))
     if len(given.position_rounding):
         rounding = rounding + given.position_rounding
@@ -146,7 +146,8 @@ def _look_at_gaps(
     difference: tuple[FloatArray, FloatArray],
     over: FloatArray,
 ) -> None:
-    """By how much the columns miss the differences (module text), over h, h^2 and h; `over` (n, 1) is 1 / h."""
+    """By how much the columns miss the differences (module text), over h, h^2 and h; `over` (n, 1) is 1 /
+    h."""
     axes, (v_max, a_max, j_max) = len(limits.axes), limits.per_axis
     gap = np.abs(difference[0] - _means(block.velocity)) - difference[1] - RATIO_ROUNDING * v_max
     gap = np.maximum(gap, 0.0) * over

@@ -1,31 +1,34 @@
 """Matching the motion with the programmed path, in order: contour, vertices, completeness, stops and dwells.
 
-The motion is the polyline of the samples q_0 .. q_T (delivered: with the middle of every chord as a sample of its own, or with
-places on the cubics where the machine runs these; dense: the positions between the samples). It fits the program within the budget eps
-if and only if both can be run through from start to end, neither ever going back, at most eps apart all the time: the Frechet distance,
-decided by the free-space sweep of Alt and Godau (Int. J. Comput. Geom. Appl. 5, 1995, doi 10.1142/S0218195995000064) restricted to the
-window of pieces that can be reached, which makes it linear in time:
+The motion is the polyline of the samples q_0 .. q_T (delivered: with the middle of every chord as a sample of
+its own, or with places on the cubics where the machine runs these; dense: the positions between the samples).
+It fits the program within the budget eps if and only if both can be run through from start to end, neither
+ever going back, at most eps apart all the time: the Frechet distance, decided by the free-space sweep of Alt
+and Godau (Int. J. Comput. Geom. Appl. 5, 1995, doi 10.1142/S0218195995000064) restricted to the window of
+pieces that can be reached, which makes it linear in time:
 
     low[i]   the lowest point (fraction) of piece i that can belong to q_k, given everything before; inf if none can
     sample   piece i stays possible for the next sample if the part of it within eps of that sample reaches up to low[i]
     vertex   piece i+1 is entered where the chord from q_k to q_k+1 comes within eps of vertex i+1, not before the place on
              that chord where vertex i was passed
 
-On lines this is exact, since there every cell (chord, piece) of the free space is convex. On arcs the distances are exact, the
-vertices every 22.5 degrees must be passed in order, and between them going back is seen to second order in eps / radius. The
-nearest point plays no part: dense spirals whose turns are closer than eps, reversals and thousands of pieces within eps are
-told apart by order alone.
+On lines this is exact, since there every cell (chord, piece) of the free space is convex. On arcs the
+distances are exact, the vertices every 22.5 degrees must be passed in order, and between them going back is
+seen to second order in eps / radius. The nearest point plays no part: dense spirals whose turns are closer
+than eps, reversals and thousands of pieces within eps are told apart by order alone.
 
-The error reported for a sample is its distance from the nearest of the pieces that it can belong to; the error of a vertex is
-its distance from the chords run while the piece before it was possible.
+The error reported for a sample is its distance from the nearest of the pieces that it can belong to; the
+error of a vertex is its distance from the chords run while the piece before it was possible.
 
-Where nothing within eps is possible any more, the matching goes on as follows, so that a fault is measured, not only found:
-  1. a vertex passed at up to twice its budget is taken as passed (a corner cut too deep; the motion itself is near the path);
-  2. the budget is widened, up to twice, to the least that lets the motion go on (a contour error);
-  3. the first piece ahead within eps is taken, what lies between is lost (a block left out);
-  4. the place on the path is held until one of these works: the motion is lost.
+Where nothing within eps is possible any more, the matching goes on as follows, so that a fault is measured,
+not only found:
+  1. a vertex passed at up to twice its budget is taken as passed (a corner cut too deep; the motion itself is
+  near the path); 2. the budget is widened, up to twice, to the least that lets the motion go on (a contour
+  error); 3. the first piece ahead within eps is taken, what lies between is lost (a block left out); 4. the
+  place on the path is held until one of these works: the motion is lost.
 
-A lost motion has no distance from the path: which part of the path it would have to be near is what is not known. Its samples enter
+A lost motion has no distance from the path: which part of the path it would have to be near is what is not
+                                             known. Its samples enter
 no contour error, and a vertex on lost pieces that no chord was compared with keeps the distance inf.
 """
 
@@ -63,15 +66,15 @@ class Match(NamedTuple):
     """State of the matching after some samples, and what it has found; all arrays are written in place.
 
     track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
-    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to stop:
-             rest = the longest that it can have rested there [s], stop_ratio = how well it stops, <= 1 if within what samples can
-             show
-    tally  : (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was
-             possible when the motion was lost first, or NOT_LOST; 1 while it is lost; the vertex at which the motion did not fit
-             into the budgets first, or NOT_LOST
+    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the
+             motion has to stop: rest = the longest that it can have rested there [s], stop_ratio = how well
+             it stops, <= 1 if within what samples can show
+    tally  : (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the
+             last piece that was possible when the motion was lost first, or NOT_LOST; 1 while it is lost; the
+             vertex at which the motion did not fit into the budgets first, or NOT_LOST
     place  : (3, A) the sample before, the present one, the worst one [mm]
-    worst  : (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece; largest distance of
-             any [mm]
+    worst  : (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece;
+             largest distance of any [mm]
     """
 
     track: Array
@@ -98,8 +101,8 @@ def new_match(pieces: ProgramPieces) -> Match:
 
 
 class Located(NamedTuple):
-    """Where each of n samples lies: its piece (n,), the largest feed (n,) of those it can lie on [mm/s], and the first and the last of
-    these pieces (n,), the last one -2 where the motion is lost."""
+    """Where each of n samples lies: its piece (n,), the largest feed (n,) of those it can lie on [mm/s], and
+    the first and the last of these pieces (n,), the last one -2 where the motion is lost."""
 
     piece: Array
     feed_max: FloatArray
@@ -125,12 +128,13 @@ def match_samples(
     at_stop: AtStop,
     place: Located,
 ) -> None:
-    """Match samples `skip` to the last, in `match`, and write their places; those before belong to the previous call. The first call
-    has skip = 0.
+    """Match samples `skip` to the last, in `match`, and write their places; those before belong to the
+    previous call. The first call has skip = 0.
 
     t, position : (n,) [s], (n, A) [mm]
     parts       : into how many a period is divided: the places between are samples too
-    velocity    : (n, A) of the cubics between samples on which these lie [mm/s]; (0, A) if they lie on the chords
+    velocity    : (n, A) of the cubics between samples on which these lie [mm/s]; (0, A) if they lie on the
+                  chords
     """
     n, axes = position.shape
     before, point = match.place[BEFORE], match.place[POINT]
@@ -173,7 +177,8 @@ def match_samples(
 def _step(
     pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[int, float]:
-    """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie on.
+    """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie
+    on.
 
     Where nothing within the budget is possible, go on as the module's text says.
     """
@@ -228,7 +233,8 @@ def _column(
     widen, widen_vertex : factors on the budgets of samples and vertices
     late                : a vertex counts as passed if any earlier chord came near enough
 
-    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed, and the vertex
+    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece,
+    largest feed, and the vertex
        that was not passed
     """
     track, passed = match.track, match.passed
@@ -269,7 +275,8 @@ def _column(
 def _stray(
     pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
 ) -> tuple[float, int, float]:
-    """Far from where the program should be: take the first piece ahead that fits, or hold the place on the path, lost.
+    """Far from where the program should be: take the first piece ahead that fits, or hold the place on the
+    path, lost.
 
     -> distance [mm], inf if lost; piece, feed [mm/s]
     """

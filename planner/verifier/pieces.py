@@ -1,8 +1,8 @@
 """The programmed path, laid out for the matching: pieces between vertices.
 
-A line is one piece. An arc or helix is cut into pieces of at most `PIECE_ANGLE`, and the points between them are
-vertices like those of the program: the motion has to pass each of them in order, so that a full circle cannot be left
-out although its ends coincide. A curve is cut likewise (bends.py).
+A line is one piece. An arc or helix is cut into pieces of at most `PIECE_ANGLE`, and the points between them
+are vertices like those of the program: the motion has to pass each of them in order, so that a full circle
+cannot be left out although its ends coincide. A curve is cut likewise (bends.py).
 """
 
 from __future__ import annotations
@@ -47,12 +47,15 @@ JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
 
 class ProgramPieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, and the K arcs and curves. Few arrays, since each costs at every call.
+    """N pieces over A axes, the N+1 vertices around them, and the K arcs and curves. Few arrays, since each
+    costs at every call.
 
     vertex : (N+1, A) [mm]
-    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the program
-    piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone; x0, x1 range of the
-             arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a line, -2 - row of a curve; segment
+    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the
+             program
+    piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone;
+             x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a
+             line, -2 - row of a curve; segment
     frame  : (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
     turn   : (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
     """
@@ -69,7 +72,8 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
 
     halved : (M,) segments that are cut into an even number of pieces; None for none
 
-    Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end where they say.
+    Raises ValueError if the toolpath contradicts itself: segments that do not meet, arcs that do not end
+    where they say.
     """
     arcs, is_arc, curves, is_curve = toolpath.arcs, toolpath.arc >= 0, toolpath.curves, toolpath.curve >= 0
     count = np.ones(len(toolpath), dtype=np.int64)
@@ -117,7 +121,8 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
 
 
 def axis_groups(axes: tuple[str, ...]) -> Array:
-    """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the axes of the first group that moves."""
+    """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the axes of the first group
+    that moves."""
     return np.array(
         [("xyz", "uvw", "abc").index(next(g for g in ("xyz", "uvw", "abc") if a in g)) for a in axes]
     )
@@ -161,8 +166,9 @@ def _check_consistent(toolpath: Toolpath, computed_start: FloatArray, computed_e
 def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
     """Which part of piece i lies within `radius` of the point q (A,).
 
-    -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece [mm].
-    Exact on lines; on arcs and curves the distance is, and a and b are to second order about the nearest point.
+    -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece
+    [mm]. Exact on lines; on arcs and curves the distance is, and a and b are to second order about the
+    nearest point.
     """
     if pieces.piece[i]["arc"] != STRAIGHT:
         return reach_bend(pieces, i, q, radius)
@@ -183,7 +189,8 @@ def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> 
 def reach_chord(
     begin: FloatArray, end: FloatArray, pieces: ProgramPieces, i: int, radius: float
 ) -> tuple[float, float, float]:
-    """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of vertex i; as `reach_piece`."""
+    """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of
+    vertex i; as `reach_piece`."""
     vertex = pieces.vertex
     along, length_sq = 0.0, 0.0
     for n in range(len(begin)):
@@ -199,7 +206,8 @@ def reach_chord(
 
 @kernel(inline=True)
 def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[float, float, float]:
-    """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq away (squared)."""
+    """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq
+    away (squared)."""
     nearest = min(max(x, 0.0), 1.0)
     distance = math.sqrt(off_sq + (x - nearest) ** 2 * length_sq)
     if distance > radius:
@@ -214,13 +222,13 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
 def both_apart(
     pieces: ProgramPieces, piece: Array, position: FloatArray, axes: tuple[str, ...]
 ) -> FloatArray:
-    """(2,) largest distance of the linear axes, and of the rotary ones, from the path [mm]; zeros without axes of both
-    kinds.
+    """(2,) largest distance of the linear axes, and of the rotary ones, from the path [mm]; zeros without
+    axes of both kinds.
 
-    The contour error is one of all axes in one norm, angles at a radius. Its vector, from the nearest point of the path
-    to the motion, has a part in the linear axes, the error of the tip where the kinematics carry it there, and one in
-    the rotary axes, of which the tool's direction turns by no more. Neither exceeds the whole, so that a motion within
-    the tolerance keeps both tolerances.
+    The contour error is one of all axes in one norm, angles at a radius. Its vector, from the nearest point
+    of the path to the motion, has a part in the linear axes, the error of the tip where the kinematics carry
+    it there, and one in the rotary axes, of which the tool's direction turns by no more. Neither exceeds the
+    whole, so that a motion within the tolerance keeps both tolerances.
 
     piece    : (n,) the piece that each sample lies on
     position : (n, A) of the samples [mm]

@@ -2,16 +2,18 @@
 
 Where the judge looks between the samples: at times of its own, which nobody can prepare for.
 
-A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the machine are cut into
-cells, and every cell is looked at once, at a time drawn at random from a generator with a fixed seed:
+A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the
+machine are cut into cells, and every cell is looked at once, at a time drawn at random from a generator with
+a fixed seed:
 
     every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
     every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between
-                   the times from cutting corners: with an acceleration a they are off the motion by a h^2/8, which is kept below
+                   the times from cutting corners: with an acceleration a they are off the motion by a h^2/8,
+                                                   which is kept below
                    `BOW` of the tolerance
 
-so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another seed they share no time
-but the motion's first and last.
+so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another
+seed they share no time but the motion's first and last.
 """
 
 from __future__ import annotations
@@ -49,7 +51,8 @@ class Reader:
     dt, cells  : the machine's period [s], and into how many cells it is divided (`motion_between`)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
-    between    : into how many parts the machine's way from sample to sample is divided, and whether it is a cubic
+    between    : into how many parts the machine's way from sample to sample is divided, and whether it is a
+                 cubic
     """
 
     def __init__(
@@ -100,8 +103,9 @@ class Reader:
         samples: Iterator[Trajectory],
         progress: Callable[[float], None],
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the motion is
-        evaluated, the one before is read, and the samples beside it. What is seen does not depend on the threads."""
+        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the
+        motion is evaluated, the one before is read, and the samples beside it. What is seen does not depend
+        on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
         between = Watch(pieces, self.limits, parts=1, note="between the samples")
@@ -143,7 +147,8 @@ class Reader:
 class Comparison:
     """Looks at the asked motion beside the delivered samples; `end` is where it ends [s].
 
-    Between two of its times h apart the motion is within a h^2 / 8 of the chord, where the delivered sample must be.
+    Between two of its times h apart the motion is within a h^2 / 8 of the chord, where the delivered sample
+    must be.
     """
 
     def __init__(self, axes: tuple[str, ...], end: float):
@@ -221,12 +226,14 @@ class AnyMotion(Protocol):
         ...
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record that is returned."""
+        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record that is
+        returned."""
         ...
 
 
 def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
-    """How many cells a period dt [s] needs for a tolerance [mm] under an acceleration [mm/s2] of all axes together."""
+    """How many cells a period dt [s] needs for a tolerance [mm] under an acceleration [mm/s2] of all axes
+    together."""
     gap = float(np.sqrt(8.0 * BOW * tolerance / acceleration))
     return int(
         min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD)
@@ -236,7 +243,8 @@ def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
 def motion_between(
     motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD
 ) -> Iterator[Trajectory]:
-    """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's period [s]."""
+    """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's
+    period [s]."""
     draw = np.random.default_rng(seed)
     edges = np.concatenate([[0.0], motion.t, [motion.end]])
     begin, lasting = edges[:-1], np.diff(edges)

@@ -1,18 +1,21 @@
 """How much the machine's vibration modes ring: during the motion, and when it is over.
 
-Each axis carries an oscillator that is shaken by the setpoints p(t), at rest before. Its deflection y, its position less p, obeys
+Each axis carries an oscillator that is shaken by the setpoints p(t), at rest before. Its deflection y, its
+position less p, obeys
 
     y'' + 2 z w y' + w^2 y = -p''(t),        w = 2 pi frequency,  z = damping ratio, 0 <= z < 1.
 
-Between two samples p is the cubic of their positions and velocities: p'' is straight there, and has exactly the samples' change of the
-velocity and of the position. With p'' = a0 + b x at the time x after the left sample
+Between two samples p is the cubic of their positions and velocities: p'' is straight there, and has exactly
+the samples' change of the velocity and of the position. With p'' = a0 + b x at the time x after the left
+sample
 
     y = -(a0 + b x)/w^2 + 2 z b/w^3 + Re(C exp(P x)),        P = -z w + i w sqrt(1 - z^2),
 
-is exact from sample to sample; peaks between them are seen by steps of no more than `STEP` of the mode's phase. Of a mode that turns so
-fast that a period has more than `MOST_STEPS` of them, |y| <= max |a0 + b x - 2 z b/w| / w^2 + |C|, at either end, takes the place of
-its peaks: it turns more than thirty times there, and comes close to the bound but for its decay. After the end nothing
-shakes it any more, and y = Re(C exp(P x)): |C| is what it still rings with.
+is exact from sample to sample; peaks between them are seen by steps of no more than `STEP` of the mode's
+phase. Of a mode that turns so fast that a period has more than `MOST_STEPS` of them, |y| <= max |a0 + b x - 2
+z b/w| / w^2 + |C|, at either end, takes the place of its peaks: it turns more than thirty times there, and
+comes close to the bound but for its decay. After the end nothing shakes it any more, and y = Re(C exp(P x)):
+|C| is what it still rings with.
 
 The deflection during the motion holds its static part too, a/w^2 under a constant acceleration a.
 """
@@ -45,7 +48,8 @@ class Ringing:
     frequency, damping : the mode's [Hz], [-]
     axes               : their letters
     during             : (A,) largest deflection while the setpoints move [mm], rotary axes [rad]
-    after              : (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary axes [rad]
+    after              : (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary
+                         axes [rad]
     """
 
     frequency: float

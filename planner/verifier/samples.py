@@ -1,26 +1,30 @@
-"""The demands on the samples themselves: at the machine's period (of a motion known by samples alone: not far above it), dense enough,
-with enough digits, in seconds, from rest to rest.
+"""The demands on the samples themselves: at the machine's period (of a motion known by samples alone: not far
+above it), dense enough, with enough digits, in seconds, from rest to rest.
 
-Density. Where the motion cannot be asked, nothing is known of it between two samples h apart but that it keeps the machine's limits,
-if it does: per axis it is within a h^2 / 8 of the chord. At h <= dt that is the machine's own interpolation, and the chord is what it
-makes of the samples. At h > dt the contour is known up to
+Density. Where the motion cannot be asked, nothing is known of it between two samples h apart but that it
+keeps the machine's limits, if it does: per axis it is within a h^2 / 8 of the chord. At h <= dt that is the
+machine's own interpolation, and the chord is what it makes of the samples. At h > dt the contour is known up
+to
 
     bow = (h^2 / 8) |a|,    |a| the norm of the axes' limits,
 
 and is judged only if what was seen and the bow together are within the tolerance.
 
-Digits. Positions good to r and times good to d (at the speed v) make the n-th difference at the period h good to
+Digits. Positions good to r and times good to d (at the speed v) make the n-th difference at the period h good
+to
 
     2^n (r + v d) / h^n,
 
-which `limits` takes off before it judges. Where that is as much as the limit, a motion at twice the limit would pass: the quantity
-cannot be judged by the positions.
+which `limits` takes off before it judges. Where that is as much as the limit, a motion at twice the limit
+would pass: the quantity cannot be judged by the positions.
 
-Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most a h^2 / 2, and
-j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its acceleration too. A file whose last samples are
-missing shows that here, although its end may be as near to the program's as the tolerance asks.
+Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most
+a h^2 / 2, and j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its
+acceleration too. A file whose last samples are missing shows that here, although its end may be as near to
+the program's as the tolerance asks.
 
-Seconds. No program takes 200 times as long as at its programmed feed, but for a column in milliseconds or less.
+Seconds. No program takes 200 times as long as at its programmed feed, but for a column in milliseconds or
+less.
 """
 
 from __future__ import annotations
@@ -41,11 +45,13 @@ from planner.verifier.stops import STILL
 from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
-# A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at samples so many of the
-# machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at least 1000 times.
+# A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at
+# samples so many of the machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at
+# least 1000 times.
 TOO_SLOW, TOO_SPARSE = 200.0, 10.0
 TIME_UNITS = ((1e5, 1e6, "microseconds"), (TOO_SLOW, 1e3, "milliseconds"))
-# A clock that jitters has periods up to so many times the longest one that is right [-]; a sample that is missing makes one of two.
+# A clock that jitters has periods up to so many times the longest one that is right [-]; a sample that is
+# missing makes one of two.
 JITTER = 1.5
 # The rounding of differences is mentioned if it is more than this share of a limit [-].
 WORTH_A_WORD = 1e-3
@@ -69,11 +75,13 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
 
 
 class Delivered:
-    """A summary of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run [mm].
+    """A summary of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run
+    [mm].
 
-    longest : periods up to `JITTER` times it are right [s], of a motion that is known by its samples alone and judged at their own
-              times; None where every period has to be dt
-    ends : t, position, velocity and acceleration of the first two samples and the last two, of fewer than four all
+    longest : periods up to `JITTER` times it are right [s], of a motion that is known by its samples alone
+              and judged at their own times; None where every period has to be dt
+    ends : t, position, velocity and acceleration of the first two samples and the last two, of fewer than
+           four all
     """
 
     def __init__(self, dt: float, given: Given, longest: float | None = None):
@@ -129,10 +137,12 @@ class Delivered:
 def density(
     trajectory: Trajectory, machine: Machine, limits: Limits, budget: float, seen: float | None
 ) -> tuple[list[Fault], list[str]]:
-    """Faults and notes about what is not known between samples that are further apart than the machine's period.
+    """Faults and notes about what is not known between samples that are further apart than the machine's
+    period.
 
     budget : smallest tolerance of the program [mm]
-    seen   : largest distance of samples and chords from the path, and of vertices from them [mm]; None if it is not known
+    seen   : largest distance of samples and chords from the path, and of vertices from them [mm]; None if it
+             is not known
     """
     h = float(np.diff(trajectory.t).max(initial=0.0))
     if h <= machine.dt * (1.0 + RATIO_ROUNDING) + PERIOD_ROUNDING:

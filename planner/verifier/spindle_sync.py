@@ -1,15 +1,17 @@
-"""Moves in step with the spindle: threads. Between run-in and run-out the tool must be where the turns of the spindle want it.
+"""Moves in step with the spindle: threads. Between run-in and run-out the tool must be where the turns of the
+spindle want it.
 
 From rest to the feed F, with the limits a and j of the axes along a straight move, no motion needs more than
 
     d = F T / 2,    T = F / a + a / j   if F > a^2 / j,   else 2 sqrt(F / j)         (the jerk-limited step, symmetric about its middle)
 
-Further than d (1 + `MORE`) from both ends the place s along the move is that of a constant speed, s = F t + c with one c for the move,
-to the contour tolerance eps: at every sample there
+Further than d (1 + `MORE`) from both ends the place s along the move is that of a constant speed, s = F t + c
+with one c for the move, to the contour tolerance eps: at every sample there
 
     | s - F t - c |  <=  eps,      c the mean of the largest and the smallest s - F t.
 
-A speed of (1 - 1e-3) F is a fault on a thread longer than 2000 eps. A move shorter than 2 d (1 + `MORE`) is not judged.
+A speed of (1 - 1e-3) F is a fault on a thread longer than 2000 eps. A move shorter than 2 d (1 + `MORE`) is
+not judged.
 """
 
 from __future__ import annotations
@@ -77,7 +79,8 @@ def _out_of_step(
     held: Array,
     room: FloatArray,
 ) -> FloatArray:
-    """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 where there are no samples between run-in and run-out."""
+    """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 where there are no samples between run-in
+    and run-out."""
     passed = joint_times(reading, pieces)
     begin, end = passed[held], passed[held + 1]
     length, feed, start = toolpath.length[held], toolpath.feed[held], toolpath.start[held]

@@ -1,14 +1,16 @@
 """A full stop as samples show it: whether the motion can rest at its vertex, and for how long.
 
-A motion that rests at the vertex at some time within a period h has, with |acceleration| <= a, over the period a chord of at most
-a h^2 / 2, and the nearer end of the period is at most a (h/2)^2 / 2 away; where jerk is limited to j, at rest the acceleration is zero
-too, and it is j h^3 / 6 and j (h/2)^3 / 6. Per axis, each.
+A motion that rests at the vertex at some time within a period h has, with |acceleration| <= a, over the
+period a chord of at most a h^2 / 2, and the nearer end of the period is at most a (h/2)^2 / 2 away; where
+jerk is limited to j, at rest the acceleration is zero too, and it is j h^3 / 6 and j (h/2)^3 / 6. Per axis,
+each.
 
 Who is d away from where he rests left it, or has still to go, for
 
     tau(d) = the larger of  (6 d / j)^(1/3),  (2 d / a)^(1/2)
 
-at least, the largest of the axes: of a period between samples d0 and d1 away he can rest h - tau(d0) - tau(d1), and no longer. Of a
+at least, the largest of the axes: of a period between samples d0 and d1 away he can rest h - tau(d0) -
+                                   tau(d1), and no longer. Of a
 motion that leaves with the whole jerk, that is how long it rests, wherever the samples fall.
 """
 
@@ -24,8 +26,8 @@ STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding
 
 
 class AtStop(NamedTuple):
-    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2] and jerks [mm/s3], inf where they are not
-    limited, and errors of positions by their digits [mm]."""
+    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2] and jerks
+    [mm/s3], inf where they are not limited, and errors of positions by their digits [mm]."""
 
     acceleration_max: FloatArray
     jerk_max: FloatArray
@@ -43,7 +45,8 @@ def watch_stop(
     parts: int,
     at_stop: AtStop,
 ) -> None:
-    """The chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i, into `passed`."""
+    """The chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i,
+    into `passed`."""
     acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
     slow, away_sq = 0.0, 0.0
     for axis in range(len(point)):
@@ -64,7 +67,8 @@ def watch_stop(
 def longest_rest(
     pieces: ProgramPieces, i: int, before: FloatArray, point: FloatArray, period: float, at_stop: AtStop
 ) -> float:
-    """How long a motion with samples `before` and `point` (A,), a period [s] apart, can rest at vertex i between them [s]."""
+    """How long a motion with samples `before` and `point` (A,), a period [s] apart, can rest at vertex i
+    between them [s]."""
     early, late = 0.0, 0.0
     for axis in range(len(point)):
         rounding = PLACE_ROUNDING + at_stop.rounding[axis]

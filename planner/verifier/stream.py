@@ -58,7 +58,8 @@ class Observed:
         return ", ".join(filter(None, (text, self.note)))
 
     def take(self, t: FloatArray, position: FloatArray, skip: int) -> None:
-        """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` of them were there before."""
+        """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` of them were there
+        before."""
         if not self.samples:
             self.first, self.t_first = position[0].copy(), float(t[0])
         self.last, self.t_last = position[-1].copy(), float(t[-1])
@@ -67,8 +68,8 @@ class Observed:
 
 
 class Watch:
-    """The findings on a motion, chunk by chunk in order. Samples not later than those already read (overlap) are left
-    out.
+    """The findings on a motion, chunk by chunk in order. Samples not later than those already read (overlap)
+    are left out.
 
     parts : into how many a period is divided to be matched
     cubic : between samples the motion runs on cubics, not on chords

@@ -1,24 +1,26 @@
 """On which block the motion is: where it goes over from one to the next.
 
-The motion is on the blocks in their order, and goes over from one to the next where it is nearest to the vertex between them; on a
-straight line that is the vertex. Of several vertices that are within reach of each other those places T_i, in order, count that are
-together nearest to them:
+The motion is on the blocks in their order, and goes over from one to the next where it is nearest to the
+vertex between them; on a straight line that is the vertex. Of several vertices that are within reach of each
+other those places T_i, in order, count that are together nearest to them:
 
     least  sum_i |x(T_i) - V_i|^2,    T_1 <= T_2 <= ...
 
-over the chords of the motion, by dynamic programming over the vertices that each chord can be at (matching.py). A vertex is settled
-once the motion cannot be on the block before it any more. A full stop is passed where the motion rests.
+over the chords of the motion, by dynamic programming over the vertices that each chord can be at
+(matching.py). A vertex is settled once the motion cannot be on the block before it any more. A full stop is
+passed where the motion rests.
 
-What sampling cannot tell: between two samples a motion with |acceleration| <= a is within b = a h^2 / 8 of its chord, and its direction
-within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the farthest that the nearest place of the motion and that
-of the chords can be apart, since the samples next to it are exact). A place nearest to a vertex at the distance d has its direction
-across that to the vertex, so that it is at most
+What sampling cannot tell: between two samples a motion with |acceleration| <= a is within b = a h^2 / 8 of
+                           its chord, and its direction
+within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the farthest that the nearest
+place of the motion and that of the chords can be apart, since the samples next to it are exact). A place
+nearest to a vertex at the distance d has its direction across that to the vertex, so that it is at most
 
     reach  =  min( (d + b) r / (1 - r),  2 h (w + a h) )  +  rounding
 
-away along the motion from where the chords have it; of vertices that are nearest out of order the place together is known to two
-chords. So far from the switch a place belongs to both blocks, and the larger F counts. On a straight line d = 0, and at 100 mm/s,
-4,000 mm/s2 and 1 ms that is 3e-5 mm.
+away along the motion from where the chords have it; of vertices that are nearest out of order the place
+together is known to two chords. So far from the switch a place belongs to both blocks, and the larger F
+counts. On a straight line d = 0, and at 100 mm/s, 4,000 mm/s2 and 1 ms that is 3e-5 mm.
 """
 
 from __future__ import annotations
@@ -33,14 +35,15 @@ from planner.verifier.kernel import kernel
 from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, reach_chord
 from planner.verifier.worst import ROUNDING_ULPS
 
-# cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked at [mm2]; place: where
-# it is passed along the chords from the start [mm]; begin, end: from where the block after it may have begun, and to where the one
-# before it may last; weight, group: of the vertices that are passed together
+# cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked
+# at [mm2]; place: where it is passed along the chords from the start [mm]; begin, end: from where the block
+# after it may have begun, and to where the one before it may last; weight, group: of the vertices that are
+# passed together
 SWITCH = np.dtype(
     [("cost", "f8"), ("place", "f8"), ("begin", "f8"), ("end", "f8"), ("weight", "f8"), ("group", "i8")]
 )
-# first, count, offset: the vertices that were looked at, and where the marks of those that came nearer begin; begin: place of the
-# chord's start [mm]; step, h, error: its length [mm], duration [s], rounding [mm]
+# first, count, offset: the vertices that were looked at, and where the marks of those that came nearer begin;
+# begin: place of the chord's start [mm]; step, h, error: its length [mm], duration [s], rounding [mm]
 CHORD = np.dtype(
     [
         ("first", "i8"),
@@ -52,20 +55,24 @@ CHORD = np.dtype(
         ("error", "f8"),
     ]
 )
-# In `state`: the first vertex that is not settled; first and behind the last of the chords that are kept; marks used.
+# In `state`: the first vertex that is not settled; first and behind the last of the chords that are kept;
+# marks used.
 OPEN, HEAD, TAIL, USED = range(4)
 SURE, TRAVELLED, JUDGED = range(
     3
 )  # in `along`: to where the open vertex is not passed for sure, length run, judged to [mm]
-# Price of a full stop passed where the motion does not rest [budgets]: more than that of all vertices around it.
+# Price of a full stop passed where the motion does not rest [budgets]: more than that of all vertices around
+# it.
 RUN_THROUGH = 1e3
-# How much more firmly the place of a full stop is held than that of other vertices that are passed together with it [-].
+# How much more firmly the place of a full stop is held than that of other vertices that are passed together
+# with it [-].
 FIRM = 1e9
 ROOM = 4096  # chords and marks there is room for at first
 
 
 class Bounds(NamedTuple):
-    """velocity (A,) and digits (A+1,), as in limits.py, and the norm of the largest accelerations [mm/s2], inf where not judged."""
+    """velocity (A,) and digits (A+1,), as in limits.py, and the norm of the largest accelerations [mm/s2],
+    inf where not judged."""
 
     velocity: FloatArray
     digits: FloatArray
@@ -75,7 +82,8 @@ class Bounds(NamedTuple):
 class Chords(NamedTuple):
     """Samples whose feed is still to be judged, the first one as the beginning of a chord.
 
-    t, place, error : (n,) [s]; length of the chords from the start [mm]; largest error of the position by rounding and digits [mm]
+    t, place, error : (n,) [s]; length of the chords from the start [mm]; largest error of the position by
+                      rounding and digits [mm]
     speed           : (n,) as delivered [mm/s], NaN where it was not
     piece, position : (n,), (n, A) where each is, to be told
     """
@@ -113,8 +121,8 @@ class Switches:
         self._kept = Kept(np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, axes)), np.zeros(ROOM, np.bool_))
 
     def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
-        """The next samples, from `skip` on; those before were given already. first, last: (n,) the pieces each can be on (matching.py).
-        place and error of `new` are written here."""
+        """The next samples, from `skip` on; those before were given already. first, last: (n,) the pieces
+        each can be on (matching.py). place and error of `new` are written here."""
         k = skip
         while k < len(new.t):
             k = _passed(
@@ -139,7 +147,8 @@ class Switches:
             _settle(self._pieces, self.switch, self.state, self.along, self._kept, last, self._bounds)
 
     def _make_room(self) -> None:
-        """Leave out chords and marks that are not needed any more; twice the room where they are not half of them."""
+        """Leave out chords and marks that are not needed any more; twice the room where they are not half of
+        them."""
         head, tail = int(self.state[HEAD]), int(self.state[TAIL])
         begin = int(self._kept.chord["offset"][head]) if tail > head else int(self.state[USED])
         used = int(self.state[USED]) - begin
@@ -168,8 +177,8 @@ def _passed(
     can: tuple[Array, Array],
     bounds: Bounds,
 ) -> int:
-    """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind; places and errors into `new`.
-    -> the first sample there was no room for, or their number"""
+    """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind;
+    places and errors into `new`. -> the first sample there was no room for, or their number"""
     n, axes = new.position.shape
     ulp = ROUNDING_ULPS * 2.0**-52
     for k in range(skip, n):
@@ -251,8 +260,8 @@ def _settle(
     last: int,
     bounds: Bounds,
 ) -> None:
-    """The vertices up to `last` are passed where the chords so far have them, with those behind that were looked at; what has been
-    judged stays."""
+    """The vertices up to `last` are passed where the chords so far have them, with those behind that were
+    looked at; what has been judged stays."""
     first, at, head = state[OPEN], state[TAIL] - 1, state[HEAD]
     top = last
     while top + 1 < len(switch) - 1 and switch[top + 1]["cost"] < np.inf:
@@ -303,8 +312,8 @@ def _settle(
 
 @kernel()
 def _pool(switch: Array, first: int, i: int) -> None:
-    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together, at the mean of these
-    places: on a chord that is where they are together nearest."""
+    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed
+    together, at the mean of these places: on a chord that is where they are together nearest."""
     n = i
     while n > first and switch[n]["place"] < switch[n - 1]["place"]:
         begin, weight = n - switch[n - 1]["group"], switch[n]["weight"] + switch[n - 1]["weight"]

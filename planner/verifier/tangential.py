@@ -1,9 +1,10 @@
 """The tangential acceleration |a.t| <= A_t, t = v/|v| of x, y and z, sample by sample.
 
-Twice: on the delivered columns, and by the lengths run between three samples. The mean speeds of two periods, L/h,
-differ by at most A_t (h1 + h2)/2. A length L is at least its chord c. With a normal acceleration of at most N and a
-speed of at least v = c/h - |a| h the direction turns by no more than N h/(2 v) from that of the middle, so that
-L - c <= N^2 h^3/(24 v), which is taken off.
+Twice: on the delivered columns, and by the lengths run between three samples. The mean speeds of two periods,
+       L/h,
+differ by at most A_t (h1 + h2)/2. A length L is at least its chord c. With a normal acceleration of at most N
+and a speed of at least v = c/h - |a| h the direction turns by no more than N h/(2 v) from that of the middle,
+so that L - c <= N^2 h^3/(24 v), which is taken off.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def look_at_tangential(block: SampleBlock, limits: Limits, worst: Worst) -> None
 
 
 def _gained(block: SampleBlock, limits: Limits) -> FloatArray:
-    """(n,) change of the mean speed from one period to the next, as far as it is certain, over the time [mm/s2]."""
+    """(n,) change of the mean speed from one period to the next, as far as it is certain, over the time
+    [mm/s2]."""
     found = np.zeros(len(block.t))
     if len(block.t) < 3:
         return found

@@ -1,16 +1,16 @@
 """The user's limits, sample by sample: the law of each, held against the delivered motion.
 
-The limits come with the machine (`Machine.own`); of each the judge asks its bounds on velocity, acceleration and
-jerk at places, and its value q there, and nothing of what was planned with. Where q is the length of the path,
-with t = v/|v|
+The limits come with the machine (`Machine.own`); of each the judge asks its bounds on velocity, acceleration
+and jerk at places, and its value q there, and nothing of what was planned with. Where q is the length of the
+path, with t = v/|v|
 
     velocity |v|,     acceleration a.t,     jerk j.t + |a - (a.t) t|^2/|v|
 
-of the delivered columns; and the distance of two samples over the time between them, which no motion within the
-bound exceeds. Elsewhere twice, as for the axes (limits.py): the derivatives of q by the time from the columns
-(base/series.py), and the divided differences of q at the delivered positions, which are means of its derivatives,
-against the largest bound of the samples that they are taken from. Off those are taken the rounding of q and of
-the positions, times dq/dx.
+of the delivered columns; and the distance of two samples over the time between them, which no motion within
+the bound exceeds. Elsewhere twice, as for the axes (limits.py): the derivatives of q by the time from the
+columns (base/series.py), and the divided differences of q at the delivered positions, which are means of its
+derivatives, against the largest bound of the samples that they are taken from. Off those are taken the
+rounding of q and of the positions, times dq/dx.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def _place(axes: tuple[str, ...], columns: Any, direction: FloatArray) -> Simple
 
 
 def along_path(block: SampleBlock, *, delivered: bool) -> tuple[FloatArray, FloatArray]:
-    """(3, n) speed, acceleration and jerk along the path, nothing at rest; and the direction (n, A), by the chord
-    to the sample before if no velocity was `delivered`."""
+    """(3, n) speed, acceleration and jerk along the path, nothing at rest; and the direction (n, A), by the
+    chord to the sample before if no velocity was `delivered`."""
     v, a, j = block.velocity, block.acceleration, block.jerk
     if not delivered:
         steps = np.diff(block.position, axis=0, prepend=block.position[:1])

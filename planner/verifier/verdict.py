@@ -23,7 +23,8 @@ class LimitCheck:
     position : (A,) [mm]
     line     : NC line of the block there
     limited  : False if the quantity is reported only ("not limited by this method")
-    note     : how the value was obtained: "column", "differences of position", and "between the samples" for the dense motion
+    note     : how the value was obtained: "column", "differences of position", and "between the samples" for
+               the dense motion
     """
 
     name: str
@@ -46,7 +47,8 @@ class LimitCheck:
         return self.limited and self.ratio > 1.0 + RATIO_ROUNDING
 
     def sentence(self, axes: tuple[str, ...]) -> str:
-        """Value, ratio, limit, time, place and line: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
+        """Value, ratio, limit, time, place and line: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at
+        ..."."""
         return self.fault(Kind.LIMIT, axes).sentence
 
     def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
@@ -60,11 +62,13 @@ class LimitCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ThreadCheck:
-    """How far one move in step with the spindle is from where the turns of the spindle want it (spindle_sync.py).
+    """How far one move in step with the spindle is from where the turns of the spindle want it
+    (spindle_sync.py).
 
     line       : NC line
     feed       : at which the move is to be cut [mm/s]
-    error_mm   : the largest distance from there, between run-in and run-out [mm]; 0 where there are no samples between them
+    error_mm   : the largest distance from there, between run-in and run-out [mm]; 0 where there are no
+                 samples between them
     allowed_mm : the contour tolerance [mm]
     """
 
@@ -109,26 +113,36 @@ class Verdict:
     """The findings of `verify`.
 
     passed           : True if every check holds, apart from quantities that are "not limited"
-    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration (if the machine limits it)
-    contour          : the largest distance of the motion from the path, as far as it could be followed, against the tolerance there
-    vertex           : the largest distance of a programmed vertex from the motion, of those that are known, against the tolerance there
+    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration
+                       (if the machine limits it)
+    contour          : the largest distance of the motion from the path, as far as it could be followed,
+                       against the tolerance there
+    vertex           : the largest distance of a programmed vertex from the motion, of those that are known,
+                       against the tolerance there
     corners          : eq. 18-20 at the programmed corners
-    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path [mm]; None if the
-                       motion could not be followed
-    linear_error_mm  : of programs that move rotary axes: the linear part of the contour error, at the samples [mm]; with the tool
-                       centre point on it is that of the tip. None for other programs, and as for contour_error_mm
+    contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path
+                       [mm]; None if the motion could not be followed
+    linear_error_mm  : of programs that move rotary axes: the linear part of the contour error, at the samples
+                       [mm]; with the tool centre point on it is that of the tip. None for other programs, and
+                       as for contour_error_mm
     angle_error_deg  : its rotary part [deg]; the tool's direction is off by no more
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
-    lost_after       : NC line of the last block along which the motion could be followed; None if it follows the whole program
-    end_error_mm     : distance of the first sample from the start of the program, or of the last from its end, the larger one [mm]
-    chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained in the contour error
+    lost_after       : NC line of the last block along which the motion could be followed; None if it follows
+                       the whole program
+    end_error_mm     : distance of the first sample from the start of the program, or of the last from its
+                       end, the larger one [mm]
+    chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained
+                       in the contour error
     order            : True if the blocks are passed in the order of the program, and none is left out
     lost             : indices of blocks that the motion never visits
     lost_lines       : their NC lines
-    threads          : moves in step with the spindle, in the order of the program, each with how far it is out of step
+    threads          : moves in step with the spindle, in the order of the program, each with how far it is
+                       out of step
     faults           : each failure: what, by how much, when, where, NC line; `str` of one is its sentence
-    excesses         : spans of time in which limits or the tolerance are exceeded, as far as their times are known
-    after_filters    : errors of the motion behind the filters of the machine; None for a machine without filters
+    excesses         : spans of time in which limits or the tolerance are exceeded, as far as their times are
+                       known
+    after_filters    : errors of the motion behind the filters of the machine; None for a machine without
+                       filters
     ringing          : what each vibration mode of the machine does; reported, not judged
     notes            : what could not be judged exactly, and why
     """

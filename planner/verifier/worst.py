@@ -6,10 +6,10 @@ limit only if the motion does, whatever the spacing of the samples:
     d1 = dx / dt,    d2 = 2 (d1' - d1) / (t2 - t0),    d3 = 3 (d2' - d2) / (t3 - t0)
 
 No slack is needed but for rounding. A position carries an error of `ROUNDING_ULPS` units in the last place of
-what it is computed from: the coordinate, the path length run so far and (limit times) the time. To it come the
-digits that a file was written with: those of the position, and those of the time at the speed that the motion
-can have there. The error is carried through the same recursion and taken off: at 1 m of coordinates, 100 m of
-path and 1 ms it is worth 2e-10 mm, 1e-7 mm/s, 4e-4 mm/s2, 2 mm/s3.
+what it is computed from: the coordinate, the path length run so far and (limit times) the time. To it come
+the digits that a file was written with: those of the position, and those of the time at the speed that the
+motion can have there. The error is carried through the same recursion and taken off: at 1 m of coordinates,
+100 m of path and 1 ms it is worth 2e-10 mm, 1e-7 mm/s, 4e-4 mm/s2, 2 mm/s3.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Paper 001's guide: a smooth path as chords so fine that they are the path.
 
-The chords leave the path by a fraction of its tolerance at most (`SAGITTA`), which is taken off the tolerance, and turn by little
-from one to the next. Each chord knows the largest curvature beside it, and how fast the limits of the axes let a point go round a
-circle of this curvature in the osculating plane (paper 001, par. 9 to 17): with the unit vectors T along the path and N towards the
-centre
+The chords leave the path by a fraction of its tolerance at most (`SAGITTA`), which is taken off the
+tolerance, and turn by little from one to the next. Each chord knows the largest curvature beside it, and how
+fast the limits of the axes let a point go round a circle of this curvature in the osculating plane (paper
+001, par. 9 to 17): with the unit vectors T along the path and N towards the centre
 
     |a_k| <= kappa v^2 amplitude_k,   |j_k| <= kappa^2 v^3 amplitude_k,   amplitude_k = sqrt(T_k^2 + N_k^2) = sqrt(1 - n_k^2).
 """
@@ -23,11 +23,12 @@ from planner.corners.elements import ElementIntervals, element_point, to_arc_len
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
-# Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their turning from one to the next
-# [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4.
+# Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their
+# turning from one to the next [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4.
 SAGITTA, TURN = 0.01, 0.1
-# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2 ms to 0.35 s, as filters
-# come, each 1.6 times the one before, by which a chord may be slow for longer than it should.
+# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2
+# ms to 0.35 s, as filters come, each 1.6 times the one before, by which a chord may be slow for longer than
+# it should.
 CUTS = 2e-3 * 1.6 ** np.arange(12)
 STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 
@@ -38,7 +39,8 @@ class ChordGuide(Guide):
 
     programmed : (R,) programmed feed, inf for rapids [mm/s]
     kappa      : (R,) largest curvature of the path at the chord [1/mm]
-    v_acc      : (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13); inf if straight
+    v_acc      : (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13);
+                 inf if straight
     v_jerk     : (R,) the same for their jerks (par. 17)
     tol        : (R,) what filters and interpolation may use of the tolerance [mm]
     corner     : (R,) joint whose rounded corner the chord belongs to, ascending, or -1
@@ -67,8 +69,8 @@ class ChordGuide(Guide):
 def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
     """The same guide with its chords cut beside feeds that are lower than theirs.
 
-    Filters make a lower feed hold on there (`feeds_held`), and a long chord should not have to as a whole: it is cut at the lengths
-    that the lower feed runs in the times `CUTS`.
+    Filters make a lower feed hold on there (`feeds_held`), and a long chord should not have to as a whole: it
+    is cut at the lengths that the lower feed runs in the times `CUTS`.
     """
     change = np.flatnonzero((guide.programmed[1:] != guide.programmed[:-1]) & guide.inner[1:-1]) + 1
     before, after = guide.programmed[change - 1], guide.programmed[change]
@@ -89,10 +91,11 @@ def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
 
 
 def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Speeds (R,) [mm/s] up to which the chords keep the programmed feeds behind filters T1, T2 (S,) [s] of the runs.
+    """Speeds (R,) [mm/s] up to which the chords keep the programmed feeds behind filters T1, T2 (S,) [s] of
+    the runs.
 
-    Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most; so a feed V that is lower
-    than those beside it has to hold on V Td/2 before and behind.
+    Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most;
+    so a feed V that is lower than those beside it has to hold on V Td/2 before and behind.
     """
     speed = guide.programmed.copy()
     edge = np.flatnonzero(~guide.inner[:-1] | (guide.programmed != np.roll(guide.programmed, 1)))

@@ -10,10 +10,12 @@ What is exceeded is mended where it comes from:
 * jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2);
 * feed           a lower programmed feed holds on beside its block, for as long as the filters see it (`feeds_held`).
 
-Should that not come to an end, everything gets slower with the filters at twice their lengths. With filters that are given, all speeds
-are lowered instead of making the filters longer. Both end: slower motions have smaller errors, accelerations and jerks.
+Should that not come to an end, everything gets slower with the filters at twice their lengths. With filters
+that are given, all speeds are lowered instead of making the filters longer. Both end: slower motions have
+smaller errors, accelerations and jerks.
 
-Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2: paper 001's, and what to begin with.
+Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2: paper 001's, and what to
+begin with.
 
     v_acc  = sqrt(a rho)                          normal acceleration                                        (par. 13)
     v_jerk = (j rho^2)^(1/3)                      jerk of a point on a circle                                (par. 17)
@@ -22,17 +24,17 @@ Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, 
     v_sc   = min(v_p, v_acc, v_jerk, v_eps, v_ph)                                                            (par. 29)
     T1 = v_p / a,   T2 = a / j                                                                               (par. 19)
 
-On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)] further inside, sinc x =
-sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
+On a circle the filtered point runs on another one, exactly rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)] further
+inside, sinc x = sin x / x; the second order is larger than that, by 0.9 % at a phase lag of 30 degrees.
 
-Where the curvature varies within the length that the filters cover, none of this is a bound (docs/papers.md, paper 001), nor is it
-needed: what the filters see at the constant speed v is the mean of the path with their kernel as weight. By a rule with two nodes that
-has the kernel's second and fourth moment mu2, mu4,
+Where the curvature varies within the length that the filters cover, none of this is a bound (docs/papers.md,
+paper 001), nor is it needed: what the filters see at the constant speed v is the mean of the path with their
+kernel as weight. By a rule with two nodes that has the kernel's second and fourth moment mu2, mu4,
 
     D = p(s - v x) + p(s + v x) - 2 p(s),   error w |D|,   acceleration D/x^2,      x^2 = mu4/mu2,   w = mu2^2/(2 mu4).
 
-A corner that turns by theta is missed by no more than eps if the command takes as long as the gap Td - Tk that paper 000's eq. 15
-puts between the pulses of two legs, with V in its legs.
+A corner that turns by theta is missed by no more than eps if the command takes as long as the gap Td - Tk
+that paper 000's eq. 15 puts between the pulses of two legs, with V in its legs.
 """
 
 from __future__ import annotations
@@ -53,16 +55,19 @@ from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
 PATIENCE = 40
-# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: fewer take more rounds.
+# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: fewer take
+# more rounds.
 AROUND = 0.1
-# T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits [-].
+# T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits
+# [-].
 MARGINS_MAX = np.array([2.0, 4.0])
-# So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean length reach from rest to
-# rest.
+# So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean
+# length reach from rest to rest.
 SPEEDS, LOWEST = 18, 0.17
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
-# A mean's speed is good enough when it exceeds nothing by more than this [-]: the motion is measured afterwards.
+# A mean's speed is good enough when it exceeds nothing by more than this [-]: the motion is measured
+# afterwards.
 MEAN_OVER = 0.02
 
 
@@ -123,7 +128,8 @@ class ChordSpeeds(SpeedPlan):
 
 
 def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], FloatArray]:
-    """`SPEEDS` plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that they promise the S runs.
+    """`SPEEDS` plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that
+    they promise the S runs.
 
     guide : its dwells are not looked at
     """
@@ -169,7 +175,8 @@ def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray)
 
 
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm], to second order (par. 24); inf where the path is straight.
+    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm], to second order (par. 24); inf where
+    the path is straight.
 
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
@@ -178,7 +185,8 @@ def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) ->
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filtered point lags by the angle phi [rad] (par. 26); inf where the path is straight.
+    """(n,) speed [mm/s] at which the filtered point lags by the angle phi [rad] (par. 26); inf where the path
+    is straight.
 
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
@@ -191,8 +199,8 @@ def filter_lengths(
 ) -> tuple[FloatArray, FloatArray]:
     """T1 >= T2 (S,) [s] for the speeds on the chords (par. 19).
 
-    T1 = V/A and T1 T2 = V/J with the axes' limits along the chords, each times its margin, or both the same where V is too small to
-    reach A.
+    T1 = V/A and T1 T2 = V/J with the axes' limits along the chords, each times its margin, or both the same
+    where V is too small to reach A.
 
     speed  : (R,) [mm/s]
     margin : (S, 2) of T1 and of T1 T2 [-]
@@ -222,7 +230,8 @@ def first_speeds(
 ) -> FloatArray:
     """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
 
-    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the gap takes.
+    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the
+    gap takes.
 
     most         : (R,) largest speeds [mm/s]
     acceleration : (A,) limits of the axes [mm/s2]
@@ -244,7 +253,8 @@ def two_nodes(T1: FloatArray, T2: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _v_mean(
     guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows (module text)."""
+    """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows
+    (module text)."""
     run = guide.run[at]
     T1, T2 = T1[run], T2[run]
     x, w = two_nodes(T1, T2)
@@ -270,7 +280,8 @@ def _v_mean(
 def _slower_corners(
     guide: ChordGuide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1 elsewhere."""
+    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1
+    elsewhere."""
     chord = np.flatnonzero(guide.corner >= 0)
     by = np.ones(len(guide))
     if not len(chord):

@@ -1,8 +1,8 @@
 """The command: what goes into the filters, as steps of constant velocity.
 
-Each run is a sequence of velocity pulses (legs, or what they are cut into, each with its own speed), with a gap of standstill at some
-joints, and ends with a standstill that lasts until the filters are empty, and the dwell. Times are counted from the start of the run,
-so that an hour of motion costs no digits.
+Each run is a sequence of velocity pulses (legs, or what they are cut into, each with its own speed), with a
+gap of standstill at some joints, and ends with a standstill that lasts until the filters are empty, and the
+dwell. Times are counted from the start of the run, so that an hour of motion costs no digits.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ class VelocityPulses(NamedTuple):
 
 
 class Command(NamedTuple):
-    """N steps of constant velocity over A axes, in S runs: first[k] .. first[k+1] - 1, the last of them a standstill.
+    """N steps of constant velocity over A axes, in S runs: first[k] .. first[k+1] - 1, the last of them a
+    standstill.
 
-    Column A of velocity and position is the length along the guide and its rate: filtered like the axes it tells where on the
-    guide the motion belongs.
+    Column A of velocity and position is the length along the guide and its rate: filtered like the axes it
+    tells where on the guide the motion belongs.
 
     first    : (S+1,) first step of each run
     t        : (N,) start [s], from the start of the run
@@ -124,7 +125,8 @@ def _starts(duration, first):
 
 @njit(cache=True, error_model="numpy")
 def lower_between(order, value, first, last, speed):
-    """speed[n] = min(speed[n], value[b]) for all pulses first[b] <= n < last[b], in place; every pulse is visited once.
+    """speed[n] = min(speed[n], value[b]) for all pulses first[b] <= n < last[b], in place; every pulse is
+    visited once.
 
     order              : (B,) indices b, the lowest value first
     value, first, last : (B,) speeds [mm/s] and the pulses that they hold on

@@ -1,9 +1,10 @@
 """The fastest schedule: which speed, which filters, which full stops.
 
-A high speed V needs a long filter, T1 = V/A, which every standstill and every curve pays for; a pulse of length L is fastest from
-rest to rest at about V = sqrt(L A), well below the feed of many programs. So V is searched for, over decades, and with it the
-margin on T2 = A/J: 1 where nothing overlaps or all flows, up to 2 where overlaps add jerks up. The time of a schedule is known
-without making its motion; what it cannot see costs when the most promising are settled.
+A high speed V needs a long filter, T1 = V/A, which every standstill and every curve pays for; a pulse of
+length L is fastest from rest to rest at about V = sqrt(L A), well below the feed of many programs. So V is
+searched for, over decades, and with it the margin on T2 = A/J: 1 where nothing overlaps or all flows, up to 2
+where overlaps add jerks up. The time of a schedule is known without making its motion; what it cannot see
+costs when the most promising are settled.
 
 Where the command waits anyway a full stop costs little more, and what it parts may have filters of its own.
 """
@@ -24,26 +25,28 @@ from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to rest; then others
-# between them, to this natural logarithm of their ratio.
+# Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to
+# rest; then others between them, to this natural logarithm of their ratio.
 SPEEDS = 10
 FINEST = 0.03
 # Margins that are tried; from the second on with speeds near the best of the one before.
 MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
 NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
-# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last they are tried at all
-# corners, as a corner may be so slow that a stop is faster.
+# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
+# they are tried at all corners, as a corner may be so slow that a stop is faster.
 STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that fraction
-# In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion by dt^2/8 of it. T1 is at
-# least so long that this is the given fraction of the tolerance [-]: what is left is for the filters.
+# In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion
+# by dt^2/8 of it. T1 is at least so long that this is the given fraction of the tolerance [-]: what is left
+# is for the filters.
 CHORD_FRACTION = 0.5
 # Two filters suppress two modes, those of the lowest frequencies.
 MODES = 2
 
 
 def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
-    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops than the given one."""
+    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops than the
+    given one."""
     plan = _settled(guide, machine)
     for fraction in STOPS:
         plan = _stopping(plan, machine, _waits(plan, fraction))
@@ -79,7 +82,8 @@ def _stopping(plan: Schedule, machine: Machine, stops: Array) -> Schedule:
 
 
 def _least_time(guide: LegGuide, stops: Array) -> FloatArray:
-    """A time (S,) [s] that each run cannot beat with full stops at the joints `stops` (R+1,): straight from stop to stop."""
+    """A time (S,) [s] that each run cannot beat with full stops at the joints `stops` (R+1,): straight from
+    stop to stop."""
     stopping = guide.stopping(np.flatnonzero(stops))
     limits = (stopping.largest(value) for value in (stopping.feed, stopping.a_max, stopping.j_max))
     times = rest_to_rest_times(stopping.total(stopping.length), *limits)
@@ -98,10 +102,11 @@ def _settled(guide: LegGuide, machine: Machine) -> Schedule:
 
 
 def _search(guide: LegGuide, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """For each margin (K,) the best speed of each run [mm/s] and its time [s], both (K, S), by the times of schedules.
+    """For each margin (K,) the best speed of each run [mm/s] and its time [s], both (K, S), by the times of
+    schedules.
 
-    Where nothing waits at the first margin, the others would make filters longer for nothing; and where the second, the largest, is
-    slower, those between them are not tried.
+    Where nothing waits at the first margin, the others would make filters longer for nothing; and where the
+    second, the largest, is slower, those between them are not tried.
     """
     high = guide.largest(guide.feed)
     low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
@@ -126,7 +131,8 @@ def _search(guide: LegGuide, machine: Machine, margins: FloatArray) -> tuple[Flo
 def _best_speeds(
     guide: LegGuide, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Best speed (S,) [mm/s] of each run and its time (S,) [s]: among `tries`, `step` (S,) apart in logarithm, and between them."""
+    """Best speed (S,) [mm/s] of each run and its time (S,) [s]: among `tries`, `step` (S,) apart in
+    logarithm, and between them."""
     margins, high = np.full(guide.runs, margin), guide.largest(guide.feed)
     best, best_time = high, np.full(guide.runs, np.inf)
     while tries:
@@ -145,8 +151,9 @@ def filters_for(
 ) -> tuple[FloatArray, FloatArray]:
     """T1 and T2 (S,) [s]: the guide's own, or the shortest for legs run at their feed and at most at `speed`.
 
-    T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or both equal where V does
-    not reach A), lengthened to whole periods of the machine's vibration modes (eq. 10).
+    T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or
+    both equal where V does not reach A), lengthened to whole periods of the machine's vibration modes (eq.
+    10).
 
     speed  : (S,) [mm/s]
     margin : (S,) [-]

@@ -1,9 +1,11 @@
 """The guides that filters are led along: straight legs between joints, in runs between full stops.
 
-Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself: arcs become
-chords, collinear lines of one feed are one leg. Paper 001 runs along the fine chords of a smooth path (chord_guide.py).
+Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself: arcs
+become chords, collinear lines of one feed are one leg. Paper 001 runs along the fine chords of a smooth path
+(chord_guide.py).
 
-Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is declared so is checked
+Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is
+                                   declared so is checked
 and made read-only, picked for some runs and put back, for every record in the same way.
 """
 
@@ -24,8 +26,8 @@ from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with feed^2, so that this costs
-# half of it in feed.
+# Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with
+# feed^2, so that this costs half of it in feed.
 CHORD_FRACTION = 0.05
 
 
@@ -84,7 +86,8 @@ def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
 
 
 def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
-    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run belongs to the next one.
+    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run
+    belongs to the next one.
 
     rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
     chosen : a record of these rows alone
@@ -118,7 +121,8 @@ def check_profile_filters(times: tuple[float, float] | None) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guide(ABC):
-    """R legs over A axes, R+1 joints, S runs; joints first[k] .. first[k+1] belong to run k, its ends are full stops.
+    """R legs over A axes, R+1 joints, S runs; joints first[k] .. first[k+1] belong to run k, its ends are
+    full stops.
 
     The legs of a guide are straight: legs of the program, or chords of a smooth path.
 
@@ -155,7 +159,8 @@ class Guide(ABC):
     @property
     @abstractmethod
     def budget(self) -> FloatArray:
-        """(R, 2) what filters and interpolation may use of the tolerance on the first and the second half of each leg [mm]."""
+        """(R, 2) what filters and interpolation may use of the tolerance on the first and the second half of
+        each leg [mm]."""
 
     @property
     def runs(self) -> int:
@@ -193,7 +198,8 @@ class Guide(ABC):
         return np.full(self.runs, T1), np.full(self.runs, T2)
 
     def pick(self, chosen: Array) -> Self:
-        """The runs `chosen` (S,), each shifted to where the one before ends, without the dwells: good for planning only."""
+        """The runs `chosen` (S,), each shifted to where the one before ends, without the dwells: good for
+        planning only."""
         columns = picked(self, chosen_rows(self.first, chosen))
         along = np.cumsum(columns["length"][:, None] * columns["direction"], axis=0)
         columns["point"] = np.vstack([np.zeros((1, len(self.axes))), along])

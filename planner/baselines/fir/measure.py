@@ -1,16 +1,17 @@
 """A planned motion measured exactly, and what has to become slower for it.
 
-The filtered position is the mean of the commanded one over the last Td with the kernel as weight, and so is the filtered length
-along the guide, sigma(t). With the corners c of the guide, at s_c, that turn by Du_c, the motion q differs from the point of the
-polyline at sigma by
+The filtered position is the mean of the commanded one over the last Td with the kernel as weight, and so is
+the filtered length along the guide, sigma(t). With the corners c of the guide, at s_c, that turn by Du_c, the
+motion q differs from the point of the polyline at sigma by
 
     q(t) - p(sigma(t)) = sum_c Du_c B_c(t),    B_c = mean of (s - s_c)_+ where sigma < s_c, of (s_c - s)_+ where it is not,
 
-whatever the speeds, gaps and lengths. sigma never goes back, so the largest of these distances bounds the deviation of motion
-and path from each other both ways and in order (their Frechet distance): no corner is left out, the tolerance is two-sided. For one
-corner between long legs it is eq. 14, for a chain without gaps V |sum Du_c psi(t - t_c)| (docs/papers.md A8). B_c grows until sigma
-passes s_c and falls from there on, so that the peaks are looked for at the corners, at the ends of the pieces and in their middle.
-Samples at dt leave the motion by up to |normal acceleration| dt^2/8 more, which is added.
+whatever the speeds, gaps and lengths. sigma never goes back, so the largest of these distances bounds the
+deviation of motion and path from each other both ways and in order (their Frechet distance): no corner is
+left out, the tolerance is two-sided. For one corner between long legs it is eq. 14, for a chain without gaps
+V |sum Du_c psi(t - t_c)| (docs/papers.md A8). B_c grows until sigma passes s_c and falls from there on, so
+that the peaks are looked for at the corners, at the ends of the pieces and in their middle. Samples at dt
+leave the motion by up to |normal acceleration| dt^2/8 more, which is added.
 
 Acceleration is linear and jerk constant on every piece: their peaks are exact.
 """
@@ -28,8 +29,8 @@ from planner.baselines.fir.superpose import Filtered
 from planner.corners.budget import chord_rate, largest_normal
 from planner.machine import LINEAR_AXES, Machine
 
-# Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and may use this fraction of
-# its limit [-]: the rest is for what it rises to between two looks.
+# Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and
+# may use this fraction of its limit [-]: the rest is for what it rises to between two looks.
 NORMAL_STEPS, NORMAL_SPARE = 16, 0.98
 # Bisections for the time at which the motion passes a joint: to 1e-9 of the piece.
 BISECTIONS = 30
@@ -37,7 +38,8 @@ FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is roundi
 
 
 class Measured(NamedTuple):
-    """Measured at n times: start and middle of all pieces, and when the joints that are no full stops are passed.
+    """Measured at n times: start and middle of all pieces, and when the joints that are no full stops are
+    passed.
 
     t            : (n,) ascending [s]
     error        : (n,) deviation from the guide with the chord error, over the tolerance there [-]
@@ -59,7 +61,8 @@ class Measured(NamedTuple):
 
 
 class _Limits(NamedTuple):
-    """Acceleration and jerk of the axes, normal acceleration and the axes that it is of, and the chord error over it, dt^2/8 [s2]."""
+    """Acceleration and jerk of the axes, normal acceleration and the axes that it is of, and the chord error
+    over it, dt^2/8 [s2]."""
 
     acceleration: FloatArray
     jerk: FloatArray
@@ -130,7 +133,8 @@ def _normal_peak(motion, m, begin, lasting, linear):
 
 @njit(cache=True, error_model="numpy")
 def _reaching(state, s, duration):
-    """tau in [0, duration] at which p + v tau + a tau^2/2 + j tau^3/6, which never falls, reaches s; state: p, v, a, j."""
+    """tau in [0, duration] at which p + v tau + a tau^2/2 + j tau^3/6, which never falls, reaches s; state:
+    p, v, a, j."""
     p, v, a, j = state
     low, high = 0.0, duration
     for _ in range(BISECTIONS):
@@ -180,7 +184,8 @@ def slowest(t: FloatArray, factor: FloatArray, begin: FloatArray, end: FloatArra
 
 @njit(cache=True, error_model="numpy")
 def _window_min(value, first, last):
-    """min(value[first[n] : last[n]]) for windows that never go back, by a queue of the candidates for later windows."""
+    """min(value[first[n] : last[n]]) for windows that never go back, by a queue of the candidates for later
+    windows."""
     out = np.ones(len(first))
     queue = np.empty(len(value), np.int64)
     head, tail, taken = 0, 0, 0

@@ -5,35 +5,39 @@ Two ways to turn at a joint within the tolerance:
 * wait:  the gap Td - Tk of eq. 15 between two pulses at full speed. Right for sharp corners between long legs.
 * flow:  no gap, but a speed so low that the filters cut the corner by no more than the tolerance. Right for the joints of curves.
 
-Flow joints are judged together, since on short legs many of them lie within one delay. Run through at the constant speed V the
-error E and the acceleration a at joint i are, exactly (docs/papers.md A8), the vectors
+Flow joints are judged together, since on short legs many of them lie within one delay. Run through at the
+constant speed V the error E and the acceleration a at joint i are, exactly (docs/papers.md A8), the vectors
 
     E = V sum_j Du_j R(Td/2 - |s_j - s_i| / V),      a = V sum_j Du_j h(Td/2 - |s_j - s_i| / V)
 
-over the joints within V Td/2; on a circle E = V^2 kappa (T1^2 + T2^2)/24, paper 001's error; noise that turns to and fro cancels.
-Where there are very many of them E and a come from the mean of the path with the kernel as weight, by a rule with two nodes,
+over the joints within V Td/2; on a circle E = V^2 kappa (T1^2 + T2^2)/24, paper 001's error; noise that turns
+to and fro cancels. Where there are very many of them E and a come from the mean of the path with the kernel
+as weight, by a rule with two nodes,
 
     D = p(s_i + V x) + p(s_i - V x) - 2 p(s_i),      E = w |D|,      a = D / x^2,      x^2 = mu4/mu2,  w = mu2^2 / (2 mu4).
 
-Where the command comes to rest before V x, the path ends there, and D is corrected by what that shifts along the path.
-What constant speed leaves out is measured afterwards (measure.py).
+Where the command comes to rest before V x, the path ends there, and D is corrected by what that shifts along
+the path. What constant speed leaves out is measured afterwards (measure.py).
 
-A speed that a joint or a slow block asks for holds on V Td/2 of the guide to both sides: the mean time the command spends there
-puts the motion past the joint or block before a faster command has any effect on it. Long legs are cut for that.
+A speed that a joint or a slow block asks for holds on V Td/2 of the guide to both sides: the mean time the
+command spends there puts the motion past the joint or block before a faster command has any effect on it.
+Long legs are cut for that.
 
-Where the command waits (paper 000, eq. 10-15, as corrected in docs/papers.md A.14), pulse 2 starts the gap g = Td - Tk after
-pulse 1 has ended; Tk is the overlap time, 0 for a full stop and Td without any gap. With tau = time since the start of pulse 2,
-w1 = V1 u1, w2 = V2 u2 and the ramp response R,
+Where the command waits (paper 000, eq. 10-15, as corrected in docs/papers.md A.14), pulse 2 starts the gap g
+= Td - Tk after pulse 1 has ended; Tk is the overlap time, 0 for a full stop and Td without any gap. With tau
+= time since the start of pulse 2, w1 = V1 u1, w2 = V2 u2 and the ramp response R,
 
     p - P = -R(Tk - tau) w1 + R(tau) w2,     0 <= tau <= Tk.
 
-For V1 = V2 = V the vertex P is missed by (s = sin(theta/2), theta the turning angle: with the interior angle it would be cos)
+For V1 = V2 = V the vertex P is missed by (s = sin(theta/2), theta the turning angle: with the interior angle
+it would be cos)
 
     eps = 2 V s R(Tk/2) = Tk^3 V s / (24 T1 T2)                         Tk <= 2 T2                     (eq. 14)
                           (4 T2^2 - 6 T2 Tk + 3 Tk^2) V s / (12 T1)     beyond
 
-and eq. 15 is its inverse. For V1 != V2 the same with V = sqrt(V1 V2) is never too small: the exact value in the cubic zone is
-V1 V2/(V1^(1/3) + V2^(1/3))^3 <= sqrt(V1 V2)/8, with equality at V1 = V2 only; min(V1, V2) would be too small.
+and eq. 15 is its inverse. For V1 != V2 the same with V = sqrt(V1 V2) is never too small: the exact value in
+the cubic zone is V1 V2/(V1^(1/3) + V2^(1/3))^3 <= sqrt(V1 V2)/8, with equality at V1 = V2 only; min(V1, V2)
+would be too small.
 
 Neighbours on a leg that is run through in Tv do not disturb each other's error if Tk_i + Tk_{i+1} <= Tv + Td.
 
@@ -80,10 +84,12 @@ def corner_error(
 def overlap_within(
     tol: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray, dt: float
 ) -> FloatArray:
-    """(n,) overlap Tk [s] whose corner error, together with the chord error of samples at dt [s], stays within `tol` (n,) [mm].
+    """(n,) overlap Tk [s] whose corner error, together with the chord error of samples at dt [s], stays
+    within `tol` (n,) [mm].
 
-    At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of it. What is left for
-    the corner is reckoned with the overlap that the whole tolerance would allow, the longer one, and is half of it at least.
+    At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of
+    it. What is left for the corner is reckoned with the overlap that the whole tolerance would allow, the
+    longer one, and is half of it at least.
 
     V, sin_half, T1, T2 : (n,) as of `corner_error`
     """
@@ -95,7 +101,8 @@ def overlap_within(
 def overlap_beside(
     overlap: FloatArray, neighbour: FloatArray, duration: FloatArray, delay: FloatArray
 ) -> FloatArray:
-    """(n,) the overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td [s]; both ends get the same unless one needs less.
+    """(n,) the overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td [s]; both ends get the same unless one
+    needs less.
 
     overlap, neighbour : (n,) Tk at this end of the leg and at the other [s]
     duration, delay    : (n,) Tv of the leg and Td of the filters [s]
@@ -137,8 +144,8 @@ def overlap_within_limits(
 
 # More joints than this to one side of a flow joint are taken together.
 FLOW_JOINTS = 24
-# Steps in which the speed of a flow joint is lowered, and what one may leave of it [-]: the error falls with the square of the speed at
-# least, so that few are needed.
+# Steps in which the speed of a flow joint is lowered, and what one may leave of it [-]: the error falls with
+# the square of the speed at least, so that few are needed.
 FLOW_STEPS = 40
 FLOW_STEP_MIN = 0.3
 
@@ -182,7 +189,8 @@ def schedule(
 def _waiting(
     guide: LegGuide, machine: Machine, speed: FloatArray, inner: Array, T1: FloatArray, T2: FloatArray
 ) -> tuple[Array, FloatArray]:
-    """At which of the joints `inner` (n,) waiting costs less time than flowing, and the overlap [s] it then has."""
+    """At which of the joints `inner` (n,) waiting costs less time than flowing, and the overlap [s] it then
+    has."""
     before, after = speed[inner - 1], speed[inner]
     lower, delay = np.minimum(before, after), T1 + T2
     tol, sin_half = guide.tol[inner], guide.sin_half[inner]
@@ -257,7 +265,8 @@ def _flow_speeds(joint, tied, speed, line, allowed, T1, T2):
 
 @njit(cache=True, error_model="numpy")
 def _at_speed(i, between, V, line, a_max, T1, T2):
-    """Error [mm], largest ratio of the axes' accelerations, and acceleration [mm/s2] at joint i, run through at V.
+    """Error [mm], largest ratio of the axes' accelerations, and acceleration [mm/s2] at joint i, run through
+    at V.
 
     between : the standstills before and behind it
     """

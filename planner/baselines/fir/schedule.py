@@ -1,9 +1,11 @@
-"""Paper 000's command: a speed on every leg, a wait or a largest speed at every joint; and how it gets slower.
+"""Paper 000's command: a speed on every leg, a wait or a largest speed at every joint; and how it gets
+slower.
 
-What is exceeded at time t comes from what was commanded within [t - Td, t]: legs that are short there get slower, joints that flow
-are passed more slowly, joints that wait wait longer. Everything falls with that: the error of a flow joint with V to V^2, that of a
-waiting one with Tk^3, accelerations with V to V^2, jerks with V to V^3. If it ever did not come to an end, every leg of the run
-would run from rest to rest at half speed, which keeps any limit (a single pulse exceeds V/(T1 T2) by 2 at most) without an error.
+What is exceeded at time t comes from what was commanded within [t - Td, t]: legs that are short there get
+slower, joints that flow are passed more slowly, joints that wait wait longer. Everything falls with that: the
+error of a flow joint with V to V^2, that of a waiting one with Tk^3, accelerations with V to V^2, jerks with
+V to V^3. If it ever did not come to an end, every leg of the run would run from rest to rest at half speed,
+which keeps any limit (a single pulse exceeds V/(T1 T2) by 2 at most) without an error.
 """
 
 from __future__ import annotations
@@ -20,12 +22,13 @@ from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
 
-# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td at their own speed [-]: others would
-# make many pulses of fine paths.
+# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td at their own
+# speed [-]: others would make many pulses of fine paths.
 CUT_LEGS = 0.25
 # After so many rounds what still exceeds something stops at every joint.
 ROUNDS = 40
-# Each round slows down by so much more than the round before at least [-], for what hardly falls with the speed.
+# Each round slows down by so much more than the round before at least [-], for what hardly falls with the
+# speed.
 HASTE = 0.02
 
 

@@ -4,9 +4,10 @@ With w(t) the commanded velocity the filtered jerk is (docs/papers.md, universal
 
     j(t) = [w(t) - w(t - T2) - w(t - T1) + w(t - Td)] / (T1 T2),
 
-constant but where an edge of the command (w jumps by Dw at t_e) is 0, T2, T1 or Td old. Between such times the motion is integrated
-exactly. So that nothing adds up over a long program, it is set anew every now and then, and where all filters have the same input,
-by superposition of the edges that still have an effect, on what the step that was commanded Td ago contributes by itself:
+constant but where an edge of the command (w jumps by Dw at t_e) is 0, T2, T1 or Td old. Between such times
+the motion is integrated exactly. So that nothing adds up over a long program, it is set anew every now and
+then, and where all filters have the same input, by superposition of the edges that still have an effect, on
+what the step that was commanded Td ago contributes by itself:
 
     p = p_e + w_e (t - t_e - Td/2) + sum Dw R(t - t_e),    v = w_e + sum Dw S(t - t_e),    a = sum Dw h(t - t_e).
 """
@@ -23,9 +24,11 @@ from planner.baselines.fir.command import Command
 from planner.geometry.toolpath import Toolpath
 from planner.motion.axis_motion import AxisMotion
 
-# Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that close is rounding.
+# Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that
+# close is rounding.
 SHORTEST_PIECE = 1e-12
-# Pieces from one superposition to the next, at least; or twice the edges that it sums, so that its cost stays linear [-].
+# Pieces from one superposition to the next, at least; or twice the edges that it sums, so that its cost stays
+# linear [-].
 ANCHOR_EVERY = 32
 
 
@@ -34,7 +37,8 @@ class Filtered(NamedTuple):
 
     t     : (L,) start of each piece [s]
     ends  : (L,) end of each piece [s]
-    state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece [mm/s3]
+    state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the
+            piece [mm/s3]
     first : (S+1,) first piece of each run
     """
 
@@ -60,7 +64,8 @@ def superpose(command: Command) -> Filtered:
 
 
 def reached(motion: Filtered) -> FloatArray:
-    """(P,) how far the middle of each piece has come along the guide, which is the last column of the pieces [mm]."""
+    """(P,) how far the middle of each piece has come along the guide, which is the last column of the pieces
+    [mm]."""
     middle = (motion.ends + motion.t) / 2 - motion.t
     s, v, a, j = motion.state[:, :, -1]
     along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))
@@ -160,7 +165,8 @@ def _superpose(command, t_out, state, first_out):
 
 @njit(cache=True, error_model="numpy")
 def _anchor(command, k, passed, at, now):
-    """Position, velocity and acceleration at `at` by superposition, into now; passed (4,): edges that are 0, T2, T1, Td old."""
+    """Position, velocity and acceleration at `at` by superposition, into now; passed (4,): edges that are 0,
+    T2, T1, Td old."""
     t, velocity, position = command.t, command.velocity, command.position
     low, T1, T2 = command.first[k], command.T1[k], command.T2[k]
     axes, delay, base = velocity.shape[1], T1 + T2, passed[3] - 1

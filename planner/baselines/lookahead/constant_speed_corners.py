@@ -1,13 +1,15 @@
-"""Corners at constant speed (paper 002): how fast each may be, and a smooth path as the chain of legs and corners for the look-ahead.
+"""Corners at constant speed (paper 002): how fast each may be, and a smooth path as the chain of legs and
+corners for the look-ahead.
 
-At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k v^2 and the jerk r'''_k v^3, so that over a corner
+At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k v^2 and the jerk r'''_k v^3,
+so that over a corner
 
     v <= v_k / max |r'_k|,   v <= (a_k / max |r''_k|)^(1/2),   v <= (j_k / max |r'''_k|)^(1/3)         for every axis k,
 
-besides the bounds on kappa v^2 of eq. (18)-(20), the chord error and the programmed feed (feedrate/constraints/assemble.py). The
-maxima of r'' and r''' are taken from five samples per grid interval; with the samples g_i of one component a smooth function
-exceeds them by at most max |g_{i-1} - 2 g_i + g_{i+1}| / 8 but for terms of fourth order, which is added. What is added depends on
-where intervals end.
+besides the bounds on kappa v^2 of eq. (18)-(20), the chord error and the programmed feed
+(feedrate/constraints/assemble.py). The maxima of r'' and r''' are taken from five samples per grid interval;
+with the samples g_i of one component a smooth function exceeds them by at most max |g_{i-1} - 2 g_i +
+g_{i+1}| / 8 but for terms of fourth order, which is added. What is added depends on where intervals end.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
 STEPS = 4  # in which a grid interval is sampled: peaks are then good to the fourth order (module text)
-# Limits along blocks that differ by less than this fraction are the same [-]: coordinates rounded to 1e-9 of a block's length.
+# Limits along blocks that differ by less than this fraction are the same [-]: coordinates rounded to 1e-9 of
+# a block's length.
 SAME = 1e-9
 QUANTITIES = ("acceleration", "jerk")
 
@@ -43,7 +46,8 @@ class CornerSpeeds(NamedTuple):
 
 
 def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
-    """The largest speed at which each corner of a sampled path can be run through from end to end (module text)."""
+    """The largest speed at which each corner of a sampled path can be run through from end to end (module
+    text)."""
     axes = samples.path.toolpath.axes
     limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
     problem = feedrate_problem(samples, machine.with_own(()))
@@ -73,9 +77,11 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
 
 
 class CornerChain(NamedTuple):
-    """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only the limits change.
+    """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only
+    the limits change.
 
-    legs    : (n,) records `LEG`: what is free between two joints, each with what the corners beside it took of their legs
+    legs    : (n,) records `LEG`: what is free between two joints, each with what the corners beside it took
+              of their legs
     passage : (n+1,) records `WAY`
     joint   : (n+1,) the path's joint if it is a corner, -1 otherwise
     run     : (n,) run between full stops that a leg belongs to
@@ -140,7 +146,8 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
 
 @njit(cache=True, error_model="numpy")
 def _bends(on, limits, bends, which):
-    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and their axes k into which (n, 2).
+    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and their axes k into
+    which (n, 2).
 
     on     : `ElementIntervals`
     limits : (2, A) accelerations and jerks of the axes

@@ -4,17 +4,19 @@ Every piece is anchored at a joint k between the legs k-1 and k with the directi
 
     P_k + c1(t) u1 + c2(t) u2,      c1, c2 cubics in t: position, velocity, acceleration, jerk at the piece's start.
 
-On leg k only c2 moves, in the seven phases of two ramps and the cruise between them. In the corner at joint k (corners/kinematic.py)
+On leg k only c2 moves, in the seven phases of two ramps and the cruise between them. In the corner at joint k
+(corners/kinematic.py)
 
     zero entry acceleration    c1'' = -V h(t),  c2'' = V h(t),   h = the trapezoid of T1, T2 (docs/papers.md 0);
     entry deceleration         c1''' = c2''' = A/Tc,
 
-and c1 + c2 is the distance from the vertex along the program at which the corner is matched with it (corners/blend.py): pieces are
-cut where that passes the end of a block, in a corner's middle and inside long legs.
+and c1 + c2 is the distance from the vertex along the program at which the corner is matched with it
+(corners/blend.py): pieces are cut where that passes the end of a block, in a corner's middle and inside long
+legs.
 
-Arcs from rest to rest are the twice continuously differentiable cubic spline in time. A move s(t) along an arc is cut into pieces that
-turn little; the spline through their ends p_i, at rest at both ends of the arc, has the accelerations M_i that solve (h_i the pieces'
-durations, d_i = (p_{i+1} - p_i)/h_i)
+Arcs from rest to rest are the twice continuously differentiable cubic spline in time. A move s(t) along an
+arc is cut into pieces that turn little; the spline through their ends p_i, at rest at both ends of the arc,
+has the accelerations M_i that solve (h_i the pieces' durations, d_i = (p_{i+1} - p_i)/h_i)
 
     h_{i-1} M_{i-1} + 2 (h_{i-1} + h_i) M_i + h_i M_{i+1} = 6 (d_i - d_{i-1}),
     2 h_0 M_0 + h_0 M_1 = 6 d_0,        h_{n-1} M_{n-1} + 2 h_{n-1} M_n = -6 d_{n-1}      at the two ends,
@@ -43,19 +45,21 @@ from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Toolpath
 
-# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10 of the radius; and by less
-# where that is more than ARC_MISS [mm], a tenth of the least digit that programs carry.
+# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10
+# of the radius; and by less where that is more than ARC_MISS [mm], a tenth of the least digit that programs
+# carry.
 ARC_PIECE, ARC_MISS = 0.01, 1e-7
-# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's acceleration is good to this
-# fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12 times 4 kappa v J where the jerk J along the arc sets
-# in, and 2 kappa a^2 where the acceleration is constant.
+# Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's
+# acceleration is good to this fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12
+# times 4 kappa v J where the jerk J along the arc sets in, and 2 kappa a^2 where the acceleration is
+# constant.
 ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 # Shortest piece of all [s]: at 1000 mm/s it is 1e-13 mm long.
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
 ARC_SHORTEST = 2e-5
-# Shortest time in which the acceleration on an arc comes to its limit, in pieces that short: over a step of the acceleration a spline
-# with long pieces leaves the arc, by a h^2/48 or so.
+# Shortest time in which the acceleration on an arc comes to its limit, in pieces that short: over a step of
+# the acceleration a spline with long pieces leaves the arc, by a h^2/48 or so.
 ARC_RAMP = 5 * ARC_SHORTEST
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
@@ -177,7 +181,8 @@ def _advance(state, t):
 
 @njit(cache=True, error_model="numpy")
 def _put(n, t, k, leg, state, rows):
-    """Write a piece unless it is shorter than `SHORTEST`, advance its cubics c1, c2 (2, 4), return the next row."""
+    """Write a piece unless it is shorter than `SHORTEST`, advance its cubics c1, c2 (2, 4), return the next
+    row."""
     if t > SHORTEST and n < len(rows.duration):
         rows.joint[n], rows.leg[n], rows.duration[n] = k, leg, t
         for c in range(4):
@@ -226,7 +231,8 @@ def _emit(ways, legs, dwell, rows):
 
 @njit(cache=True, error_model="numpy")
 def _emit_arc(n, k, leg, phases, state, rows):
-    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their neighbour."""
+    """The phases on an arc in pieces that turn little; phases shorter than `ARC_SHORTEST` join their
+    neighbour."""
     two = state[1]
     pending, began = 0.0, two[0]
     turn = min(ARC_PIECE, (ARC_MISS * leg.turning * 384.0 / 5.0) ** 0.25)

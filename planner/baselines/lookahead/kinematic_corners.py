@@ -1,13 +1,15 @@
-"""The candidates of the look-ahead: for every corner of a path of straight legs the ways to take it, each at its largest speed.
+"""The candidates of the look-ahead: for every corner of a path of straight legs the ways to take it, each at
+its largest speed.
 
-A corner may use what the interpolation leaves of the tolerance. Between samples dt apart the motion bows from its chords by up to
-rate X, rate = dt^2/8 (plus sum T^2/24 where filters follow), with the largest acceleration X in the corner:
+A corner may use what the interpolation leaves of the tolerance. Between samples dt apart the motion bows from
+its chords by up to rate X, rate = dt^2/8 (plus sum T^2/24 where filters follow), with the largest
+acceleration X in the corner:
 
     zero entry acceleration   X = 2 s min(alpha, (3 eps eta^2/s)^(1/3))       entry deceleration   X = Ac,
     miss of the vertex <= eps - rate X,       X <= eps / (2 rate)   as in eq. (20).
 
-A limit A_n on the normal acceleration adds alpha <= A_n/(2s) and Ac <= A_n/s: at the apex, where it is largest, the acceleration is
-normal, Vc 2s/T1 and Ac s.
+A limit A_n on the normal acceleration adds alpha <= A_n/(2s) and Ac <= A_n/s: at the apex, where it is
+largest, the acceleration is normal, Vc 2s/T1 and Ac s.
 """
 
 from __future__ import annotations
@@ -27,11 +29,12 @@ from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Arcs that are run whole get this fraction of their limits [-]: their cubic pieces exceed the arc's accelerations by up to 2e-4
-# (corner_pieces.ARC_PIECE).
+# Arcs that are run whole get this fraction of their limits [-]: their cubic pieces exceed the arc's
+# accelerations by up to 2e-4 (corner_pieces.ARC_PIECE).
 ARC_LIMITS = 1.0 - 3e-4
 
-# Speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared: not 0, by which is divided; below any real one.
+# Speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared: not 0, by which is
+# divided; below any real one.
 EASE_MIN = 1e-12
 
 
@@ -47,12 +50,14 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> np.recarray:
 def corner_passages(
     path: Legs, toolpath: Toolpath, legs: np.recarray, machine: Machine, start_stop: float
 ) -> list[np.recarray]:
-    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, (n+1,) records `WAY` each.
+    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, (n+1,)
+    records `WAY` each.
 
-    Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints without a corner are passed
-    straight on by every candidate.
+    Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints
+    without a corner are passed straight on by every candidate.
 
-    start_stop : step of velocity that the drives make from standstill [mm/s]; 0 for none, then there are two candidates
+    start_stop : step of velocity that the drives make from standstill [mm/s]; 0 for none, then there are two
+                 candidates
     """
     at = path.first
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)
@@ -72,7 +77,8 @@ def corner_passages(
 
 
 def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
-    """A candidate slowed down to what its n legs have room for; a leg is divided where both of its corners would be equally fast."""
+    """A candidate slowed down to what its n legs have room for; a leg is divided where both of its corners
+    would be equally fast."""
     longest = np.minimum(np.append(legs.length, np.inf), np.insert(legs.length, 0, np.inf))
     wanted = np.minimum(needed(passage, legs), longest)
     ease = np.divide(passage.V**2, wanted, out=np.ones(len(wanted)), where=wanted > 0)
@@ -105,8 +111,8 @@ def _zero_entry(
 def _velocity_step(
     u1: FloatArray, u2: FloatArray, tol: FloatArray, dt: float, start_stop: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Speed at the vertex with no axis stepping by more than `start_stop`; the chord between two samples cuts the vertex off by up to
-    V dt s / 2. This kind has no parameters."""
+    """Speed at the vertex with no axis stepping by more than `start_stop`; the chord between two samples cuts
+    the vertex off by up to V dt s / 2. This kind has no parameters."""
     step = np.abs(u2 - u1).max(axis=1)
     sin_half = np.linalg.norm(u2 - u1, axis=1) / 2.0
     return np.minimum(start_stop / step, 2.0 * tol / (dt * sin_half)), np.ones(len(u1)), np.ones(len(u1))

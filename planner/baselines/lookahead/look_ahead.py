@@ -1,19 +1,24 @@
-"""Look-ahead over legs and the corners between them: at which speed every corner is taken, or whether it is a stop.
+"""Look-ahead over legs and the corners between them: at which speed every corner is taken, or whether it is a
+stop.
 
-A leg is what has the same limits along the path between two joints; at a joint there is a corner, or the limits change. Corners are
-candidates of a kind (ramps.JointKind); passed with the speed V a corner of that kind has a start deceleration (and end acceleration)
-A, takes l of the legs beside it and lasts T. A and l grow with V (or do not depend on it), so every candidate is a family with one
-parameter. What a leg can do between two corners is in baselines/lookahead/ramps.py, with V' and x as there.
+A leg is what has the same limits along the path between two joints; at a joint there is a corner, or the
+limits change. Corners are candidates of a kind (ramps.JointKind); passed with the speed V a corner of that
+kind has a start deceleration (and end acceleration) A, takes l of the legs beside it and lasts T. A and l
+grow with V (or do not depend on it), so every candidate is a family with one parameter. What a leg can do
+between two corners is in baselines/lookahead/ramps.py, with V' and x as there.
 
-Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible iff from the slower
-of its ends that speed of the faster one is within reach of what the corners leave: W_fast <= V' + x.
+Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible
+iff from the slower of its ends that speed of the faster one is within reach of what the corners leave: W_fast
+<= V' + x.
 
-1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible. Lowering a speed never
+1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible.
+Lowering a speed never
    lengthens its corner, which leaves the neighbouring leg feasible, so two sweeps are enough.
-2. Faster corners are not always better (zero entry acceleration makes the deceleration die out twice, a corner at constant low speed
-   takes long). Over all choices of a candidate or a stop per corner, the fastest is found by dynamic programming; between two
-   corners the speeds where only limits change are the largest ones. All stops, and every candidate throughout, are among the choices:
-   the result is never slower than any of them.
+2. Faster corners are not always better (zero entry acceleration makes the deceleration die out twice, a
+corner at constant low speed
+   takes long). Over all choices of a candidate or a stop per corner, the fastest is found by dynamic
+   programming; between two corners the speeds where only limits change are the largest ones. All stops, and
+   every candidate throughout, are among the choices: the result is never slower than any of them.
 
 Everything is linear in the number of joints.
 """
@@ -42,14 +47,17 @@ from planner.baselines.lookahead.ramps import (
 # The choice may lack this fraction of a leg's length [-]: rounding of sums of lengths.
 LENGTH_ROUNDING = 1e-14
 BISECTIONS = 60  # of a speed's bracket: to its last digit
-# A speed in closed form is lowered by this until it is feasible with its rounding [-]: two units of its last digit.
+# A speed in closed form is lowered by this until it is feasible with its rounding [-]: two units of its last
+# digit.
 SPEED_ROUNDING = 4e-16
 
 
 def look_ahead(legs: np.recarray, candidates: Sequence[np.recarray]) -> tuple[np.recarray, FloatArray]:
-    """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each joint's corner [s].
+    """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each
+    joint's corner [s].
 
-    Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the corners beside them allow.
+    Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the
+    corners beside them allow.
 
     legs       : (n,) records `LEG`
     candidates : (n+1,) records `WAY` each; may overlap nowhere on a leg at their speeds (see `capped`)
@@ -82,13 +90,15 @@ def capped(ways: np.recarray, legs: np.recarray, room: FloatArray) -> np.recarra
 
 
 def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]:
-    """Durations [s] and jerks along the path [mm/s3], both (n, 8): the corner at constant speed before each leg, and its phases."""
+    """Durations [s] and jerks along the path [mm/s3], both (n, 8): the corner at constant speed before each
+    leg, and its phases."""
     duration, jerk = np.zeros((len(legs), 1 + PHASES)), np.zeros((len(legs), 1 + PHASES))
     _moves(ways, legs, duration, jerk)
     return duration, jerk
 
 
-# ---- speeds that fit -------------------------------------------------------------------------------------------------------------
+# ---- speeds that fit
+# -------------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True, error_model="numpy")
@@ -136,7 +146,8 @@ def _cap(ways, legs, room):
 
 @njit(cache=True, error_model="numpy")
 def _lowered(way, V, behind, fixed, leg):
-    """The largest speed up to V with which a leg is feasible towards its other end `fixed`, but not below that end's W.
+    """The largest speed up to V with which a leg is feasible towards its other end `fixed`, but not below
+    that end's W.
 
     behind : True if the joint passed at V is the one that the leg begins at
     """
@@ -173,12 +184,14 @@ def _sweep(ways, legs):
         ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i])
 
 
-# ---- the fastest choice ----------------------------------------------------------------------------------------------------------
+# ---- the fastest choice
+# ----------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True, error_model="numpy")
 def _between(ways, first, last, legs):
-    """Time [s] from the joint `first` to the joint `last`, the corner at that one not counted; inf if that is impossible.
+    """Time [s] from the joint `first` to the joint `last`, the corner at that one not counted; inf if that is
+    impossible.
 
     In between there is no corner: there the speeds of the ways are lowered, in place, to the largest ones.
     """
@@ -200,7 +213,8 @@ def _between(ways, first, last, legs):
 
 @njit(cache=True, error_model="numpy")
 def _choose(rows, straight, legs):
-    """The fastest choice (n+1,) among the rows (R, n+1), and the time at the end of each corner; row 0 is the stop."""
+    """The fastest choice (n+1,) among the rows (R, n+1), and the time at the end of each corner; row 0 is the
+    stop."""
     count, joints = rows.shape
     best, back = np.full((joints, count), np.inf), np.zeros((joints, count), np.int64)
     best[0, 0] = 0.0

@@ -1,7 +1,8 @@
 """One leg of a look-ahead between two corners: how much speed it can gain, and how fast it is run.
 
-On a leg with the limits a, j along it the motion runs from (V1, A1) to (V2, -A2). A ramp from (V, A) to a speed W with zero
-acceleration is the end of one that began with zero acceleration at V' = V - A^2/(2j), `pre` = V' A/j + A^3/(6 j^2) before:
+On a leg with the limits a, j along it the motion runs from (V1, A1) to (V2, -A2). A ramp from (V, A) to a
+speed W with zero acceleration is the end of one that began with zero acceleration at V' = V - A^2/(2j), `pre`
+= V' A/j + A^3/(6 j^2) before:
 
     length  U = (V' + W)/2 T - pre,    time T - A/j,    T = 2 sqrt(x/j)  for x = W - V' <= a^2/j,    x/a + a/j beyond,
     dU/dW = W/p + p/(2j) with the largest acceleration p = min(a, sqrt(j x)).
@@ -24,8 +25,8 @@ from planner.base.point_to_point import PHASES
 from planner.corners.kinematic import entry_acceleration, phase_times
 
 ROUNDING = 1e-15  # of a leg's length [-]
-# What is left of a leg between two ramps is run at constant speed if it is at most this fraction of the leg [-]: faster still would
-# save less than this fraction of the leg's time, for four pieces of microseconds.
+# What is left of a leg between two ramps is run at constant speed if it is at most this fraction of the leg
+# [-]: faster still would save less than this fraction of the leg's time, for four pieces of microseconds.
 SMALL_REST = 1e-6
 NEWTON_STEPS = 100  # safeguarded by bisection: never reached, as a bisection to the last digit takes 60
 
@@ -44,15 +45,17 @@ class JointKind(IntEnum):
 
 STOP, PASS, ZERO, ENTRY, CONSTANT = (int(kind) for kind in JointKind)  # numba reads plain integers
 
-# A leg: length from joint to joint, with what corners take of it, > 0 [mm]; largest speed, acceleration and jerk along it; of one that
-# is run as an arc from rest to rest the turning [rad/mm], 0 on others.
+# A leg: length from joint to joint, with what corners take of it, > 0 [mm]; largest speed, acceleration and
+# jerk along it; of one that is run as an arc from rest to rest the turning [rad/mm], 0 on others.
 LEG = np.dtype([(name, np.float64) for name in ("length", "v", "a", "j", "turning")])
-# A way to pass a joint: its `JointKind`, the speed [mm/s], 0 at stops, of candidates the largest; and the parameters of the kind.
+# A way to pass a joint: its `JointKind`, the speed [mm/s], 0 at stops, of candidates the largest; and the
+# parameters of the kind.
 WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", "q", "r"))])
 
 
 def records(dtype: np.dtype, **columns: Any) -> np.recarray:
-    """(n,) records `LEG` or `WAY` with these columns, each (n,); 0 in others. n legs have n+1 joints, the first and last are stops."""
+    """(n,) records `LEG` or `WAY` with these columns, each (n,); 0 in others. n legs have n+1 joints, the
+    first and last are stops."""
     table = np.zeros(len(next(iter(columns.values()))), dtype).view(np.recarray)
     for name, column in columns.items():
         table[name] = column
@@ -84,7 +87,8 @@ entry_acceleration_of = njit(cache=True, error_model="numpy")(entry_acceleration
 
 @njit(cache=True, error_model="numpy")
 def gain_max(start, distance, a, j):
-    """By how much the speed can grow at most [mm/s] over a distance [mm] from `start` [mm/s], with zero acceleration at both ends.
+    """By how much the speed can grow at most [mm/s] over a distance [mm] from `start` [mm/s], with zero
+    acceleration at both ends.
 
     a, j : limits of acceleration and jerk along the leg [mm/s2], [mm/s3]
     """
@@ -105,7 +109,8 @@ def gain_max(start, distance, a, j):
 
 @njit(cache=True, error_model="numpy")
 def ramp(start, gain, a, j):
-    """Length U [mm] and time [s] from the speed `start` to W = start + gain [mm/s] with zero acceleration at both ends, and dU/dW [s].
+    """Length U [mm] and time [s] from the speed `start` to W = start + gain [mm/s] with zero acceleration at
+    both ends, and dU/dW [s].
 
     a, j : limits of acceleration and jerk along the leg [mm/s2], [mm/s3]
     """
@@ -118,7 +123,8 @@ def ramp(start, gain, a, j):
 
 @njit(cache=True, error_model="numpy")
 def corner_at(way, V, behind):
-    """A corner passed at V [mm/s]: start deceleration A [mm/s2], length [mm] that it takes of a leg, duration [s].
+    """A corner passed at V [mm/s]: start deceleration A [mm/s2], length [mm] that it takes of a leg, duration
+    [s].
 
     way    : record `WAY`
     behind : True for the leg behind the corner, False for the one before
@@ -149,12 +155,13 @@ def leg_end(way, V, j, behind):
 
 @njit(cache=True, error_model="numpy")
 def leg_top(one, other, leg):
-    """Highest speed W on a leg [mm/s], how far it is above each end's V' [mm/s], and the length that is left to be run at it [mm].
+    """Highest speed W on a leg [mm/s], how far it is above each end's V' [mm/s], and the length that is left
+    to be run at it [mm].
 
     one, other, leg : `End`, `End`, record `LEG`
 
-    The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s is lost in the rounding of
-    100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
+    The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s is
+    lost in the rounding of 100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
     """
     a, j = leg.a, leg.j
     D = max(leg.length - one.corner - other.corner, 0.0) + one.pre + other.pre
@@ -195,7 +202,8 @@ def leg_time(one, other, leg):
 
 @njit(cache=True, error_model="numpy")
 def leg_phases(one, other, leg, out):
-    """Durations [s] and jerks [mm/s3] of the seven phases of a leg (record `LEG`) between its ends (`End`), into out (2, 7)."""
+    """Durations [s] and jerks [mm/s3] of the seven phases of a leg (record `LEG`) between its ends (`End`),
+    into out (2, 7)."""
     W, first, second, rest = leg_top(one, other, leg)
     a, j = leg.a, leg.j
     for side in range(2):

@@ -1,7 +1,9 @@
-"""Blocks from rest to rest, the point-to-point reference of the papers: limits along a block from those of the axes, and the moves.
+"""Blocks from rest to rest, the point-to-point reference of the papers: limits along a block from those of
+the axes, and the moves.
 
-Lines and arcs are the closed form of base/point_to_point.py. The segments of a spline have limits of their own, so a spline is a chain
-of legs between two full stops, passed from one to the next at the speed that both allow and without acceleration (look_ahead.py).
+Lines and arcs are the closed form of base/point_to_point.py. The segments of a spline have limits of their
+own, so a spline is a chain of legs between two full stops, passed from one to the next at the speed that both
+allow and without acceleration (look_ahead.py).
 """
 
 from __future__ import annotations
@@ -27,16 +29,19 @@ AT_REST = 1e-12  # an axis with a smaller component of a unit vector does not li
 
 
 def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own, wherever on the segment.
+    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own,
+    wherever on the segment.
 
-    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest limit of the axes that
-    move, each over the largest component that a unit vector has there (`_components`), must hold for the vector: with kappa v^2 <=
-    a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s
-    <= j/sqrt2 and j/(2 sqrt2) along the path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N).
-    The tangential acceleration is bounded by the share of the path that is in x, y and z, on curves as if all of it were.
-    Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of |r'''| takes the
-    place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment takes least time from rest to rest: none of
-    these limits makes it longer when it gets larger.
+    On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest
+                                         limit of the axes that
+    move, each over the largest component that a unit vector has there (`_components`), must hold for the
+    vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a,
+    and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the path the norm of
+    the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). The tangential acceleration is
+    bounded by the share of the path that is in x, y and z, on curves as if all of it were. Normal
+    acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of
+    |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
+    takes least time from rest to rest: none of these limits makes it longer when it gets larger.
     """
     axes = toolpath.axes
     direction = np.abs(toolpath.tangent_start)
@@ -71,8 +76,9 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
 
 
 def _components(toolpath: Toolpath, curved: Array) -> FloatArray:
-    """(n, A) the largest component along each axis that a unit vector along or across the path can have, on the segments `curved` (M,):
-    on an arc its drift's and that of its plane, on a curve 1 for the axes in which its control points differ."""
+    """(n, A) the largest component along each axis that a unit vector along or across the path can have, on
+    the segments `curved` (M,): on an arc its drift's and that of its plane, on a curve 1 for the axes in
+    which its control points differ."""
     arc, curve = toolpath.arc[curved], toolpath.curve[curved]
     found = np.empty((len(arc), len(toolpath.axes)))
     row = arc[arc >= 0]
@@ -85,9 +91,10 @@ def _components(toolpath: Toolpath, curved: Array) -> FloatArray:
 def _fastest(
     length: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray, product: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by golden sections of log v,
-    from the v that leaves a as it is to the one that is given. Where v is reached, a move takes L/v + v^2/P + P/(v j) with P the
-    product: a sum of exponentials of log v, which is convex. Where it is not, it takes the longer the lower a is: the higher v."""
+    """v and a (n,) of the shortest moves from rest to rest with v a <= product, below the given v and a; by
+    golden sections of log v, from the v that leaves a as it is to the one that is given. Where v is reached,
+    a move takes L/v + v^2/P + P/(v j) with P the product: a sum of exponentials of log v, which is convex.
+    Where it is not, it takes the longer the lower a is: the higher v."""
     low, high = np.log(product / a), np.log(v)
 
     def time(at: FloatArray) -> FloatArray:
@@ -115,10 +122,11 @@ class Parts(NamedTuple):
 
 
 def parts_of(toolpath: Toolpath, join_lines: bool = False) -> Parts:
-    """The parts of a path of M segments. A move is a block, or a part of a spline between kinks and jumps of its curvature, at which a
-    motion cannot go on without a jump of its acceleration.
+    """The parts of a path of M segments. A move is a block, or a part of a spline between kinks and jumps of
+    its curvature, at which a motion cannot go on without a jump of its acceleration.
 
-    join_lines : lines that go straight on are one move, so that it does not matter where a straight line is cut into blocks
+    join_lines : lines that go straight on are one move, so that it does not matter where a straight line is
+                 cut into blocks
     """
     first = np.arange(len(toolpath) + 1)
     curve, on = toolpath.curve >= 0, np.zeros(len(first), bool)

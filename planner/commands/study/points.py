@@ -5,8 +5,9 @@
     DIR/sweep.parquet     the table of all combinations that the command line names
     DIR/sweep.png         its picture
 
-A sweep that was ended goes on where it stopped: points that are there are not planned again. Other ranges of the same job use them as
-well. A program, machine or method that has changed since is refused, because its points do not belong to the same table.
+A sweep that was ended goes on where it stopped: points that are there are not planned again. Other ranges of
+the same job use them as well. A program, machine or method that has changed since is refused, because its
+points do not belong to the same table.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _HELD = 3  # limits that a point names
 
 
 def planned_point(job: StudiedJob, settings: Sequence[Setting]) -> dict[str, Any]:
-    """Plan a job with some settings, in one thread; whatever comes of it is the row of the point, ready for JSON.
+    """Plan a job with some settings, in one thread; whatever comes of it is the row of the point, ready for
+    JSON.
 
     outcome and sentence are as in `compare`; lengths are in mm, times in s. A worker of a cluster calls this.
     """
@@ -73,8 +75,8 @@ class SweepFolder:
     def open(self, *, force: bool = False) -> bool:
         """Make the directory, or take up the sweep in it; True if there is one.
 
-        Raises InputError if it cannot be written, holds something else, or a sweep of another program, machine or method; with `force`
-        the points of that are removed.
+        Raises InputError if it cannot be written, holds something else, or a sweep of another program,
+        machine or method; with `force` the points of that are removed.
         """
         check_output(self.directory, ())
         about = self.directory / ABOUT
@@ -124,7 +126,8 @@ class SweepFolder:
 
 
 def digest(job: StudiedJob) -> dict[str, str]:
-    """SHA-256 of the blocks of the program, of the machine and of how they are planned: what a table must have in common."""
+    """SHA-256 of the blocks of the program, of the machine and of how they are planned: what a table must
+    have in common."""
     blocks = hashlib.sha256()
     program = job.program
     for column in (

@@ -1,9 +1,10 @@
-"""Settings of a job that can be tried with other values, and values with units: `axes.y.jerk=400 m/s3`, `tolerance=+10%`.
+"""Settings of a job that can be tried with other values, and values with units: `axes.y.jerk=400 m/s3`,
+`tolerance=+10%`.
 
-A setting is a number of the machine file that its motion depends on, named as it stands there, or `feed`, a factor on every programmed
-feed. Numbers without a unit are in mm and s (degrees and s for rotary axes), as in the machine file; percentages are of the present
-value. Numbers that the reader of programs needs (tool lengths, work offsets, `feed_default`) are none: with another one the program is
-another one.
+A setting is a number of the machine file that its motion depends on, named as it stands there, or `feed`, a
+factor on every programmed feed. Numbers without a unit are in mm and s (degrees and s for rotary axes), as in
+the machine file; percentages are of the present value. Numbers that the reader of programs needs (tool
+lengths, work offsets, `feed_default`) are none: with another one the program is another one.
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ class Setting:
 
 
 def setting_names(machine: Machine) -> dict[str, dict[str, float]]:
-    """Every setting of a machine, with the units that its value may have and what they are in that of the machine file."""
+    """Every setting of a machine, with the units that its value may have and what they are in that of the
+    machine file."""
     units: dict[str, dict[str, float]] = {}
     for axis in machine.axes:
         for name, allowed in (_OF_ROTARY if axis in ROTARY_AXES else _OF_AXIS).items():
@@ -84,10 +86,11 @@ def setting_names(machine: Machine) -> dict[str, dict[str, float]]:
 def parse_setting(text: str, machine: Machine, tolerance: float) -> Setting:
     """A setting of `NAME=VALUE`.
 
-    tolerance : the present contour tolerance [mm], of which a percentage is taken; NaN if the program has several
+    tolerance : the present contour tolerance [mm], of which a percentage is taken; NaN if the program has
+                several
 
-    Raises InputError for a name that is no setting, with one that is near, and for a value that is no positive number or has a unit of
-    something else.
+    Raises InputError for a name that is no setting, with one that is near, and for a value that is no
+    positive number or has a unit of something else.
     """
     name, equals, value = text.partition("=")
     if not equals:
@@ -97,7 +100,8 @@ def parse_setting(text: str, machine: Machine, tolerance: float) -> Setting:
 
 
 def known_setting(name: str, machine: Machine) -> str:
-    """The full name of a setting; `y.jerk` is `axes.y.jerk`. Raises InputError for other names, with one that is near."""
+    """The full name of a setting; `y.jerk` is `axes.y.jerk`. Raises InputError for other names, with one that
+    is near."""
     known = setting_names(machine)
     for full in (name, f"axes.{name}"):
         if full in known:
@@ -158,8 +162,8 @@ def unit_of(name: str, machine: Machine) -> str:
 
 
 def with_settings(machine: Machine, settings: Iterable[Setting]) -> Machine:
-    """The machine with other values; `tolerance` and `feed`, which are of the job, are passed over. Raises InputError where they do not
-    go together."""
+    """The machine with other values; `tolerance` and `feed`, which are of the job, are passed over. Raises
+    InputError where they do not go together."""
     data = machine.model_dump(mode="python", exclude_none=True)
     for setting in settings:
         if setting.name in (TOLERANCE, FEED):
@@ -192,7 +196,8 @@ _DASHED = re.compile(r"\s*[\d.]+\s*(-|\.\.)\s*[\d.]+\s*")  # a range as one migh
 
 @dataclass(frozen=True, kw_only=True)
 class Varied:
-    """A setting and its values in the unit of the machine file, each once, in their order; `unit` is empty for factors."""
+    """A setting and its values in the unit of the machine file, each once, in their order; `unit` is empty
+    for factors."""
 
     name: str
     values: tuple[float, ...]
@@ -200,7 +205,8 @@ class Varied:
 
 
 def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
-    """A setting with values, of `NAME=FIRST:LAST:COUNT`, with `:log` behind it for equal ratios, or of `NAME=A,B,C`.
+    """A setting with values, of `NAME=FIRST:LAST:COUNT`, with `:log` behind it for equal ratios, or of
+    `NAME=A,B,C`.
 
     tolerance : the present one [mm], of which percentages are taken
 
@@ -234,8 +240,8 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
 
 
 def grid_of(varied: Sequence[Varied]) -> list[tuple[Setting, ...]]:
-    """All combinations of values, the last setting changing fastest. Raises InputError for a setting that is there twice, and for more
-    than `POINTS_MAX` of them."""
+    """All combinations of values, the last setting changing fastest. Raises InputError for a setting that is
+    there twice, and for more than `POINTS_MAX` of them."""
     names = [one.name for one in varied]
     for name in names:
         if names.count(name) > 1:

@@ -1,10 +1,11 @@
-"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table and a picture.
+"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table
+and a picture.
 
 Who plans the points of a sweep: processes of this machine (joblib), or the workers of a Dask cluster.
 
-Both call `planned_point` with the same job and hand the rows back as they come; the process that asks writes the files, so that workers
-need no file system in common. A point whose worker died is given to another one: by Dask, up to `DEATHS` times; a local process that
-dies ends the sweep, and the points so far are kept.
+Both call `planned_point` with the same job and hand the rows back as they come; the process that asks writes
+the files, so that workers need no file system in common. A point whose worker died is given to another one:
+by Dask, up to `DEATHS` times; a local process that dies ends the sweep, and the points so far are kept.
 """
 
 from __future__ import annotations
@@ -58,9 +59,11 @@ def sweep(
     """Plan all combinations that the folder does not have yet, and keep each as soon as it is done.
 
     cluster  : address of a Dask scheduler; None for processes of this machine
-    progress : called with the number of points that are there, of how many, and how many of them were there before
+    progress : called with the number of points that are there, of how many, and how many of them were there
+               before
 
-    Raises InputError if a point cannot be written or there is no such scheduler, NotSolvedError if processes die.
+    Raises InputError if a point cannot be written or there is no such scheduler, NotSolvedError if processes
+    die.
     """
     points = grid_of(varied)
     rows = {point: row for point in points if (row := folder.known(point)) is not None}
@@ -116,9 +119,11 @@ def planned_here(job: StudiedJob, points: Sequence[Point]) -> Iterator[tuple[Poi
 def planned_on_cluster(
     address: str, job: StudiedJob, points: Sequence[Point]
 ) -> Iterator[tuple[Point, dict[str, Any]]]:
-    """Rows of points, as they are planned by the workers of the Dask cluster whose scheduler has this address.
+    """Rows of points, as they are planned by the workers of the Dask cluster whose scheduler has this
+    address.
 
-    Raises InputError if there is no scheduler, NotSolvedError if it goes away, or if a point is given up because its workers died.
+    Raises InputError if there is no scheduler, NotSolvedError if it goes away, or if a point is given up
+    because its workers died.
     """
     distributed = import_needed("distributed", "--cluster")
     # how it tries to reach a scheduler that has gone, in pages; what came of it is said below
@@ -192,7 +197,8 @@ def write_sweep(done: Sweep, directory: Path) -> list[str]:
 
 
 def sweep_figure(done: Sweep, path: Path) -> None:
-    """Write the picture (PNG). Motions that failed the verdict are crosses; where there is no motion the line is broken."""
+    """Write the picture (PNG). Motions that failed the verdict are crosses; where there is no motion the line
+    is broken."""
     first, *others = done.varied
     second = others[0] if others else None
     shape = [len(one.values) for one in done.varied]

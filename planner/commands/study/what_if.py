@@ -1,20 +1,22 @@
-"""A job as it is, with each of some settings changed alone, and with all of them, planned again; beside what the prices of the
-first plan foretold (commands/study/what_if.py).
+"""A job as it is, with each of some settings changed alone, and with all of them, planned again; beside what
+the prices of the first plan foretold (commands/study/what_if.py).
 
 What the prices of a plan (sensitivity/prices.py) say of other values of its settings, without planning again.
 
-Of a limit L the price p = dT/d(ln L) is known, and what 10 % more saves, between a least and a most. The cycle time is convex in one
-over a limit, so that a straight line there foretells a change to r L as
+Of a limit L the price p = dT/d(ln L) is known, and what 10 % more saves, between a least and a most. The
+cycle time is convex in one over a limit, so that a straight line there foretells a change to r L as
 
     T(r L) - T(L)  =  p (1 - 1/r),
 
-for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where another limit takes over,
-for which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 - 1/1.1
+for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where
+another limit takes over, for which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 -
+1/1.1
 
     saved(x)  =  x saved(d)/d (1 + c d) / (1 + c x),      c >= 0 such that its slope at 0 is -p where that is the larger one.
 
-Of the tolerance the price is dT/d(tolerance) = s, and what d = 10 um more save is known: the same curve in x, so much more of it, and
-less costs s times the change. Settings without a price have no forecast, and changes at once are added up.
+Of the tolerance the price is dT/d(tolerance) = s, and what d = 10 um more save is known: the same curve in x,
+so much more of it, and less costs s times the change. Settings without a price have no forecast, and changes
+at once are added up.
 """
 
 from __future__ import annotations
@@ -75,8 +77,8 @@ def what_if(
 
     progress : called with the label of the row, the stage and the fraction of it that is done
 
-    Raises InputError if a setting is there twice, and for a job that cannot be planned as it is; NotSolvedError if it has no motion.
-    What cannot be planned with another setting is its row.
+    Raises InputError if a setting is there twice, and for a job that cannot be planned as it is;
+    NotSolvedError if it has no motion. What cannot be planned with another setting is its row.
     """
     names = [setting.name for setting in settings]
     for name in names:
@@ -233,7 +235,8 @@ def _present(job: StudiedJob, it: WhatIf) -> str:
 
 
 def sweep_table(done: Sweep, title: str) -> Group:
-    """A sweep in a few lines: how many points, their outcomes, the fastest that passed, and why the others did not."""
+    """A sweep in a few lines: how many points, their outcomes, the fastest that passed, and why the others
+    did not."""
     outcomes = Counter(row["outcome"] for row in done.rows)
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)

@@ -1,1 +1,2 @@
-"""A plan in files that a control plays: setpoints for LinuxCNC's HAL, and positions, velocities and times (PVT)."""
+"""A plan in files that a control plays: setpoints for LinuxCNC's HAL, and positions, velocities and times
+(PVT)."""

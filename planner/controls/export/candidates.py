@@ -1,14 +1,18 @@
-"""The candidates that a control may be given of a plan: the program as it is, its own moves in the control's words, the planned path as chords.
+"""The candidates that a control may be given of a plan: the program as it is, its own moves in the control's
+words, the planned path as chords.
 
-The program as it is is the input, byte for byte; where the control cannot read it so (source.py), its lines are written in the
-control's words (translate.py). Chords replace only lines whose place the program's own words tell (rows.py).
+The program as it is is the input, byte for byte; where the control cannot read it so (source.py), its lines
+are written in the control's words (translate.py). Chords replace only lines whose place the program's own
+words tell (rows.py).
 
-What LinuxCNC is given: the program's own words or the planned path, whichever a model of its planner finds faster.
+What LinuxCNC is given: the program's own words or the planned path, whichever a model of its planner finds
+                        faster.
 
-Candidates are the program as it is, with G64 P of the whole tolerance, or with half of it for P and half for Q, which joins short
-moves; and the planned path as chords, with G64 P for the room that they leave. The model (linuxcnc_model.py) was off by -2.1 to
-+0.9 % on programs like these, so another candidate than the first is taken only where it is predicted to be faster by more than
-`MARGIN`. A program that says its path mode keeps it, and its own path.
+Candidates are the program as it is, with G64 P of the whole tolerance, or with half of it for P and half for
+Q, which joins short moves; and the planned path as chords, with G64 P for the room that they leave. The model
+(linuxcnc_model.py) was off by -2.1 to +0.9 % on programs like these, so another candidate than the first is
+taken only where it is predicted to be faster by more than `MARGIN`. A program that says its path mode keeps
+it, and its own path.
 """
 
 from __future__ import annotations
@@ -99,14 +103,15 @@ class Candidates:
 
     @cached_property
     def room(self) -> float | None:
-        """How far chords may miss the planned motion [mm]; None if that is nothing. Raises InputError if the motion leaves the
-        program."""
+        """How far chords may miss the planned motion [mm]; None if that is nothing. Raises InputError if the
+        motion leaves the program."""
         left = self.tolerance - self.used
         return None if left < 2.0 * ROUNDING else left - ROUNDING
 
     @cached_property
     def used(self) -> float:
-        """The part of the tolerance that the plan uses [mm]. Raises InputError if the motion leaves the program."""
+        """The part of the tolerance that the plan uses [mm]. Raises InputError if the motion leaves the
+        program."""
         verdict = self.plan.verdict
         assert verdict is not None
         if verdict.contour_error_mm is None or verdict.vertex_error_mm is None:
@@ -116,7 +121,8 @@ class Candidates:
         return max(verdict.contour_error_mm, verdict.vertex_error_mm)
 
     def own(self, within: float) -> list[Candidate]:
-        """The program as it is, or its own moves in the control's words: its arcs and curves as chords within so much [mm]."""
+        """The program as it is, or its own moves in the control's words: its arcs and curves as chords within
+        so much [mm]."""
         line = programmed_polyline(self.plan, within)
         if not self.why_not:
             return [Candidate(name=AS_IT_IS, line=line, replaced=None)]
@@ -136,7 +142,8 @@ class Candidates:
         return [Candidate(name=name, line=line, replaced=replaced)]
 
     def _replaced(self, *, planned: bool) -> Array:
-        """(R,) the rows whose moves are written as chords: all that can be, or those for which the control has no words."""
+        """(R,) the rows whose moves are written as chords: all that can be, or those for which the control
+        has no words."""
         return np.array(
             [row.plain and self._is_replaced(row, planned=planned) for row in self.source.rows], dtype=bool
         )
@@ -149,7 +156,8 @@ class Candidates:
 
     @cached_property
     def feed_in_force(self) -> FloatArray:
-        """(B,) the F in force on each block [mm/s], at which such controls move with G0; inf before the first F word."""
+        """(B,) the F in force on each block [mm/s], at which such controls move with G0; inf before the first
+        F word."""
         feed, found = np.inf, np.full(len(self.plan.program), np.inf)
         for row in self.source.rows:
             word = row.value("F")
@@ -159,7 +167,8 @@ class Candidates:
         return found
 
     def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
-        """The file of a candidate, and notes on it. Raises InputError for a line that the control has no words for."""
+        """The file of a candidate, and notes on it. Raises InputError for a line that the control has no
+        words for."""
         if chosen.replaced is None:
             return with_mode(self.text, chosen.mode), ()
         rapid = _rapid_speed(chosen.line, self.plan.machine, self.plan.toolpath.axes)
@@ -189,7 +198,8 @@ class Candidates:
 
 
 def with_mode(text: bytes, mode: str) -> bytes:
-    """A program's text with its path mode on a line of its own, after the percent sign if it begins with one."""
+    """A program's text with its path mode on a line of its own, after the percent sign if it begins with
+    one."""
     if not mode:
         return text
     head = re.match(rb"\s*%[^\n]*\n", text)
@@ -253,7 +263,8 @@ def linuxcnc_candidates(job: Candidates) -> list[Candidate]:
 
 
 def best_first(found: list[Candidate]) -> list[Candidate]:
-    """The candidates, the first in front unless another is predicted to be faster by more than the model's error."""
+    """The candidates, the first in front unless another is predicted to be faster by more than the model's
+    error."""
     fastest = min(found, key=lambda one: one.time)
     first = fastest if fastest.time < (1.0 - MARGIN) * found[0].time else found[0]
     return [first, *(one for one in found if one is not first)]

@@ -1,9 +1,10 @@
-"""The planned motion as a polyline: setpoints between which straight moves miss no other setpoint by more than a given distance.
+"""The planned motion as a polyline: setpoints between which straight moves miss no other setpoint by more
+than a given distance.
 
-A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the path is
-(kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers; where the chords then miss by more,
-which is measured, the density is raised and all is done again. The ends of rapid moves, standstills and places where something else
-happens (an M word) are vertices in any case.
+A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the
+path is (kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers; where
+the chords then miss by more, which is measured, the density is raised and all is done again. The ends of
+rapid moves, standstills and places where something else happens (an M word) are vertices in any case.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class Polyline:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed before them."""
+    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed
+    before them."""
 
     first: int
     last: int
@@ -59,8 +61,8 @@ class Group:
 def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
     """The planned motion as a polyline.
 
-    within : how far it may miss a setpoint [mm], above the rounding of coordinates
-    breaks : (K,) blocks before which something else happens, ascending; None for those of the program's events
+    within : how far it may miss a setpoint [mm], above the rounding of coordinates breaks : (K,) blocks
+    before which something else happens, ascending; None for those of the program's events
 
     Raises ValueError for a plan without a trajectory.
     """
@@ -95,7 +97,8 @@ def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> 
 
 
 def programmed_polyline(plan: Plan, within: float) -> Polyline:
-    """The programmed path as a polyline, at the programmed feeds: straight moves as they are, arcs and curves as chords.
+    """The programmed path as a polyline, at the programmed feeds: straight moves as they are, arcs and curves
+    as chords.
 
     within : how far chords may be from arcs and curves [mm]
     """
@@ -114,10 +117,11 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
 
 
 def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence[Group]) -> Polyline:
-    """The polyline of a program of which chords replace a part: theirs there, and else that of the program's own words.
+    """The polyline of a program of which chords replace a part: theirs there, and else that of the program's
+    own words.
 
-    Chords begin and end where the program has its blocks end, and leave axes alone that the program has not placed: the words around
-    them may be relative, or shift the coordinates.
+    Chords begin and end where the program has its blocks end, and leave axes alone that the program has not
+    placed: the words around them may be relative, or shift the coordinates.
     """
     points = [own.points[:1]]
     feed: list[FloatArray] = []
@@ -151,7 +155,8 @@ def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence
 
 
 def groups(rows: list[Row], replaced: Array) -> list[Group]:
-    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words; `replaced` (R,)."""
+    """The blocks in groups: those that chords replace one after the other, and those of the rows' own words;
+    `replaced` (R,)."""
     found: list[Group] = []
     parted = True
     for row, chords in zip(rows, replaced.tolist(), strict=True):
@@ -181,8 +186,8 @@ def breaks(rows: list[Row], replaced: Array) -> Array:
 
 
 def off_the_path(line: Polyline, plan: Plan, groups: Sequence[Group]) -> float:
-    """How far the first and last straight moves of the groups that chords replace are from the programmed path [mm]: these
-    end where the program does, not at a setpoint."""
+    """How far the first and last straight moves of the groups that chords replace are from the programmed
+    path [mm]: these end where the program does, not at a setpoint."""
     toolpath = plan.toolpath
     replaced = [group for group in groups if group.replaced]
     first = np.searchsorted(line.block, [group.first for group in replaced])
@@ -204,8 +209,8 @@ def _rounded(points: FloatArray) -> FloatArray:
 
 
 def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
-    """(T,) setpoints that are vertices: ends, standstills, those beside turning back, where rapid moves begin and end, and the last
-    before each of the breaks."""
+    """(T,) setpoints that are vertices: ends, standstills, those beside turning back, where rapid moves begin
+    and end, and the last before each of the breaks."""
     fixed = np.zeros(len(trajectory), dtype=bool)
     fixed[[0, -1]] = True
     at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
@@ -234,8 +239,9 @@ def _density(trajectory: Trajectory, within: float) -> FloatArray:
 
 
 def _misses(position: FloatArray, rows: Array, points: FloatArray) -> FloatArray:
-    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1, A) at `rows`; or how far
-    they go back along it, if that is more: a way there and back lies on the chord, which would leave it out."""
+    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1,
+    A) at `rows`; or how far they go back along it, if that is more: a way there and back lies on the chord,
+    which would leave it out."""
     move = np.clip(np.searchsorted(rows, np.arange(len(position)), side="right") - 1, 0, len(rows) - 2)
     a, b = points[move], points[move + 1]
     chord = b - a

@@ -1,4 +1,5 @@
-"""The tables of grbl, Klipper, Marlin and LinuxCNC: the words of each, and how each is told what it has no word for.
+"""The tables of grbl, Klipper, Marlin and LinuxCNC: the words of each, and how each is told what it has no
+word for.
 
 A word that stands in no table is refused with its line. Where the tables come from:
 
@@ -31,7 +32,8 @@ class Control:
     """A control's words. Codes are in tenths: G61.1 is 611.
 
     g, m          : codes that mean there what they mean in RS274NGC
-    arcs, cycles  : it is given arcs, and everything that moves besides G0 to G3, as the program has them; else as straight moves
+    arcs, cycles  : it is given arcs, and everything that moves besides G0 to G3, as the program has them;
+                    else as straight moves
     settings      : M numbers that it knows beside those, kept with all their words
     idle          : codes ("G64") that change nothing of what it does, and why
     instead       : M codes ("M6"), and what is written for them
@@ -166,7 +168,8 @@ def is_setting(words: list[Word], control: Control) -> bool:
 
 
 def takes_move(row: Row, control: Control, reading: Reading) -> bool:
-    """Whether the control is given a move in the program's own words: no arcs with turns for grbl, none with absolute centres."""
+    """Whether the control is given a move in the program's own words: no arcs with turns for grbl, none with
+    absolute centres."""
     if row.radius and not control.cycles:
         return False
     if row.motion in codes.ARCS:

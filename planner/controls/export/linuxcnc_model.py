@@ -1,25 +1,28 @@
 """A short model of LinuxCNC 2.9's planner: how long it takes for straight moves with G64 P.
 
-It is ours, written from what LinuxCNC documents and does, and predicts; nothing here runs its code. At a corner that turns by 2 h
-between legs l, LinuxCNC puts an arc into the corner that misses it by P at most and takes half of a leg at most:
+It is ours, written from what LinuxCNC documents and does, and predicts; nothing here runs its code. At a
+corner that turns by 2 h between legs l, LinuxCNC puts an arc into the corner that misses it by P at most and
+takes half of a leg at most:
 
     d = min(P sin(h) / (1 - cos(h)), l / 2)        tangent length            R = d / tan(h)          v^2 = N a R
 
-with N = 3^(1/2)/2 of the acceleration a across: a is what the axes allow in every direction of the corner's plane, the smallest of
-a_k / |e_k| with e_k the part of axis k's direction in that plane. Where the feed is lower, the arc is as long as a blend by
-overlapping ramps with a/2 would be, but no larger than R. On arcs half of the acceleration is left along the path. So a path of
-many short chords, which becomes one chain of arcs, is braked and sped up with half of the acceleration, and corners with long legs
-lose less: a smooth path can be the slower one here. Where it is faster, the corner is a kink: passed within one period dt as long
-as the step of the velocity takes no more than a tenth (K) of what an axis may do in it,
+with N = 3^(1/2)/2 of the acceleration a across: a is what the axes allow in every direction of the corner's
+plane, the smallest of a_k / |e_k| with e_k the part of axis k's direction in that plane. Where the feed is
+lower, the arc is as long as a blend by overlapping ramps with a/2 would be, but no larger than R. On arcs
+half of the acceleration is left along the path. So a path of many short chords, which becomes one chain of
+arcs, is braked and sped up with half of the acceleration, and corners with long legs lose less: a smooth path
+can be the slower one here. Where it is faster, the corner is a kink: passed within one period dt as long as
+the step of the velocity takes no more than a tenth (K) of what an axis may do in it,
 
     v <= K v_max / max_axes |u2 - u1| (v_max / dt + a) / a,
 
-at nine tenths of the acceleration beside it. A rest of a line that is passed in less than four periods belongs to the arc after it.
-The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead, at the end of which the motion must be able to
-stand. Q joins moves before all that: points within Q of the straight line from the first point to the last are left out.
+at nine tenths of the acceleration beside it. A rest of a line that is passed in less than four periods
+belongs to the arc after it. The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead,
+at the end of which the motion must be able to stand. Q joins moves before all that: points within Q of the
+straight line from the first point to the last are left out.
 
-Held against LinuxCNC's own planner on five programs, and on their planned paths with chords of 0.2 um to 25 um and P of 1 um and more:
--2.1 to +0.9 % (tests/controls/export/test_linuxcnc_model.py has some of them).
+Held against LinuxCNC's own planner on five programs, and on their planned paths with chords of 0.2 um to 25
+um and P of 1 um and more: -2.1 to +0.9 % (tests/controls/export/test_linuxcnc_model.py has some of them).
 """
 
 from __future__ import annotations
@@ -127,7 +130,8 @@ def _alternate(lines: FloatArray, arcs: FloatArray) -> FloatArray:
 
 
 def _in_the_plane(way: FloatArray, acceleration: FloatArray) -> FloatArray:
-    """(n-1,) acceleration that the axes allow in every direction of the plane of two moves [mm/s2]: way (n, A), acceleration (A,)."""
+    """(n-1,) acceleration that the axes allow in every direction of the plane of two moves [mm/s2]: way (n,
+    A), acceleration (A,)."""
     first = way[:-1]
     second = way[1:] - (way[1:] * first).sum(axis=1, keepdims=True) * first
     size = np.linalg.norm(second, axis=1, keepdims=True)
@@ -144,7 +148,8 @@ def _corners(
     tolerance: float,
     dt: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The n-1 corners of n moves: tangent length, length of the arc (0 of a kink), speed, and the acceleration left along it."""
+    """The n-1 corners of n moves: tangent length, length of the arc (0 of a kink), speed, and the
+    acceleration left along it."""
     half = np.arctan2(
         np.linalg.norm(np.diff(way, axis=0), axis=1), np.linalg.norm(way[1:] + way[:-1], axis=1)
     )

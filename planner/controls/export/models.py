@@ -1,8 +1,9 @@
 """Short models of the planners inside grbl, Klipper and Marlin: how long such a control takes for a polyline.
 
-They are ours, written from what these controls document, and predict; nothing here runs the controls' own code. All three move with
-constant acceleration along straight blocks, know no jerk, and stay on the path; at a corner the speed steps. With the turning angle
-theta, s = cos(theta/2) and the acceleration a along the bisector they pass it at
+They are ours, written from what these controls document, and predict; nothing here runs the controls' own
+code. All three move with constant acceleration along straight blocks, know no jerk, and stay on the path; at
+a corner the speed steps. With the turning angle theta, s = cos(theta/2) and the acceleration a along the
+bisector they pass it at
 
     grbl 1.1, Marlin 2   v^2 = a delta s / (1 - s)                       delta: junction deviation [mm]
     Marlin 2 besides     v^2 <= a l / theta                               on blocks shorter than 1 mm that turn by less than 45 degrees
@@ -10,23 +11,25 @@ theta, s = cos(theta/2) and the acceleration a along the bisector they pass it a
     Klipper              v^2 <= a delta s / (1 - s),  delta = (2^(1/2) - 1) c^2 / A,   c: square corner velocity [mm/s]
                          v^2 <= a l / (2 tan(theta/2))                    of the blocks on both sides, with their lengths l
 
-The acceleration a of a block is what its axes allow along it, and no more than A, that along the path, where the control has one:
-max_accel of Klipper, which holds along the path for x and y together, M204 of Marlin. Klipper's max_velocity likewise. Where a machine
-does not say them, Klipper's are the smaller limits of x and y: with more, one of the two would exceed its own on some move.
+The acceleration a of a block is what its axes allow along it, and no more than A, that along the path, where
+the control has one: max_accel of Klipper, which holds along the path for x and y together, M204 of Marlin.
+Klipper's max_velocity likewise. Where a machine does not say them, Klipper's are the smaller limits of x and
+y: with more, one of the two would exceed its own on some move.
 
 and the speeds along the path follow from a backward and a forward pass: with S the running sum of 2 a l,
 
     v_i^2 <= min over k >= i of (V_k^2 + S_k - S_i)        and the same from the left,
 
-V the junction's own bound. grbl and Marlin look `blocks` blocks ahead, at the end of which the motion must be able to stand:
-v_i^2 <= S_{i+blocks} - S_i. Klipper looks far ahead, and lets a move speed up only as far as it would with a share 1 - r of A for what
-it gains and loses at once (r: "minimum cruise ratio", 0.5): its speed in between is at most that of such a triangle.
+V the junction's own bound. grbl and Marlin look `blocks` blocks ahead, at the end of which the motion must be
+able to stand: v_i^2 <= S_{i+blocks} - S_i. Klipper looks far ahead, and lets a move speed up only as far as
+it would with a share 1 - r of A for what it gains and loses at once (r: "minimum cruise ratio", 0.5): its
+speed in between is at most that of such a triangle.
 
-A block takes at least `block_time`, the time to send and read its line. What [control] of the machine file says of the same control
-takes the place of the values here.
+A block takes at least `block_time`, the time to send and read its line. What [control] of the machine file
+says of the same control takes the place of the values here.
 
-Tested against these controls' own code on five programs where their times are at hand (tests/controls/export/test_models.py); Marlin's
-were not.
+Tested against these controls' own code on five programs where their times are at hand
+(tests/controls/export/test_models.py); Marlin's were not.
 """
 
 from __future__ import annotations
@@ -76,10 +79,10 @@ class Control:
     block_time: float = 0.0
 
 
-# The values that these controls come with. grbl 1.1: config.h and defaults.h, BLOCK_BUFFER_SIZE 16, $11 = 0.01; Marlin 2:
-# Configuration.h, JUNCTION_DEVIATION_MM 0.013, BLOCK_BUFFER_SIZE 16; Klipper: Config_Reference, square_corner_velocity 5,
-# minimum_cruise_ratio 0.5. Lines of some
-# 30 characters at 115,200 baud take 2.6 ms (grbl, Marlin); Klipper reads a file.
+# The values that these controls come with. grbl 1.1: config.h and defaults.h, BLOCK_BUFFER_SIZE 16, $11 =
+# 0.01; Marlin 2: Configuration.h, JUNCTION_DEVIATION_MM 0.013, BLOCK_BUFFER_SIZE 16; Klipper:
+# Config_Reference, square_corner_velocity 5, minimum_cruise_ratio 0.5. Lines of some 30 characters at 115,200
+# baud take 2.6 ms (grbl, Marlin); Klipper reads a file.
 CONTROLS: dict[str, Control] = {
     "grbl": Control(name="grbl", deviation=0.01, blocks=15, block_time=0.0026),
     "klipper": Control(name="klipper", square_corner=5.0),
@@ -168,7 +171,8 @@ def along(way: FloatArray, limit: FloatArray) -> FloatArray:
 
 
 def _along_the_path(machine: Machine, control: Control) -> tuple[float, float]:
-    """Largest speed [mm/s] and acceleration [mm/s2] along the path, whatever the axes allow; inf where the control has none."""
+    """Largest speed [mm/s] and acceleration [mm/s2] along the path, whatever the axes allow; inf where the
+    control has none."""
     if control.square_corner is None:
         return np.inf, control.acceleration or np.inf
     plane = [machine.axes[letter] for letter in "xy"]
@@ -212,7 +216,8 @@ def _corner_sq(
 
 
 def reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
-    """(n+1,) squares of speeds, each at most its bound (n+1,), that blocks with 2 a l = gain (n,) lead to, and lead on from."""
+    """(n+1,) squares of speeds, each at most its bound (n+1,), that blocks with 2 a l = gain (n,) lead to,
+    and lead on from."""
     s = np.append(0.0, np.cumsum(gain))
     back = np.minimum.accumulate((bound + s)[::-1])[::-1] - s
     found: FloatArray = np.minimum.accumulate(back - s) + s
@@ -234,7 +239,8 @@ def stoppable(gain: FloatArray, blocks: int, seen: Array) -> FloatArray:
 def move_times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
+    """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel,
+    (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     ramps = (2.0 * v * v - x0 - x1) / (2.0 * accel)
     times: FloatArray = (2.0 * v - v0 - v1) / accel + np.maximum(length - ramps, 0.0) / np.maximum(
@@ -246,11 +252,13 @@ def move_times(
 def _smoothed_time(
     length: FloatArray, top: FloatArray, accel: FloatArray, bound: FloatArray, half: FloatArray
 ) -> float:
-    """Time of a run of blocks with Klipper's lower acceleration for what is gained and lost at once, from rest to rest [s].
+    """Time of a run of blocks with Klipper's lower acceleration for what is gained and lost at once, from
+    rest to rest [s].
 
-    top (n,), bound (n+1,) and half (n,), what the lower acceleration gains on each block, are squares of speeds. Two profiles: the fast
-    one keeps all bounds; the smooth one tells, where a braking begins, the highest speed that is worth it: the peak of its triangle. A
-    block that the smooth profile brakes all along is passed at no more than the peak before it, and than where it begins.
+    top (n,), bound (n+1,) and half (n,), what the lower acceleration gains on each block, are squares of
+    speeds. Two profiles: the fast one keeps all bounds; the smooth one tells, where a braking begins, the
+    highest speed that is worth it: the peak of its triangle. A block that the smooth profile brakes all along
+    is passed at no more than the peak before it, and than where it begins.
     """
     gain = 2.0 * accel * length
     fast, smooth = [0.0], [0.0]

@@ -1,7 +1,7 @@
 """The program written for a control so far, and what it has in force there.
 
-G90, G91, the motion code and F are said again wherever straight moves have changed them. S waits for the line that it belongs to: grbl
-empties its buffer at an S on a line of its own.
+G90, G91, the motion code and F are said again wherever straight moves have changed them. S waits for the line
+that it belongs to: grbl empties its buffer at an S on a line of its own.
 """
 
 from __future__ import annotations
@@ -153,7 +153,8 @@ def comment(text: str, control: Control) -> str:
 
 
 def called(macro: str, words: list[Word]) -> str:
-    """A call of a macro with the words that it gets: as they are where its name is a code (M3 S900), else as parameters (S=900)."""
+    """A call of a macro with the words that it gets: as they are where its name is a code (M3 S900), else as
+    parameters (S=900)."""
     traditional = re.fullmatch(r"[A-Za-z]\d+(\.\d+)?", macro) is not None
     return " ".join([macro, *(str(w) if traditional else f"{w.letter}={w.text}" for w in words)])
 
@@ -179,7 +180,8 @@ def head_of(source: Source, control: Control, plan: Plan, tolerance: float, what
 
 
 def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
-    """The assumptions on coordinates and start, in words; `as_it_is` where all lines are the program's own."""
+    """The assumptions on coordinates and start, in words; `as_it_is` where all lines are the program's
+    own."""
     program = source.program
     used = sorted({code for row in source.rows for code in row.g() if codes.G_GROUP[code] == "work offset"})
     system = " ".join(system_name(code) for code in used) or "the work offset in force"
@@ -199,7 +201,8 @@ def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
 
 
 def _modes(source: Source, control: Control) -> list[str]:
-    """Units, plane, distance and feed mode, as far as no line says them before or beside the first that moves."""
+    """Units, plane, distance and feed mode, as far as no line says them before or beside the first that
+    moves."""
     said: set[str] = set()
     for row in source.rows:
         said |= {codes.G_GROUP[code] for code in row.g() if code in control.g}

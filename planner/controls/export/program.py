@@ -1,12 +1,15 @@
-"""A program that a control's own planner runs best: the planned path as straight moves at the planned feeds, if that is faster.
+"""A program that a control's own planner runs best: the planned path as straight moves at the planned feeds,
+if that is faster.
 
-grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smooth path inside the tolerance can let them go faster,
-with F words that keep the axes within their limits in its bends; how far apart its points should be depends on how they look ahead
-and on the time of a line. Their times are predicted by short models (models.py), for the program as it is and for the planned path
-with chords of several widths (`SHARES` of what is allowed); the fastest is written. LinuxCNC rounds corners itself and has a model and
-candidates of its own (candidates.py); benchmarks/results/controls.md says how they did.
+grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smooth path inside the tolerance
+can let them go faster, with F words that keep the axes within their limits in its bends; how far apart its
+points should be depends on how they look ahead and on the time of a line. Their times are predicted by short
+models (models.py), for the program as it is and for the planned path with chords of several widths (`SHARES`
+of what is allowed); the fastest is written. LinuxCNC rounds corners itself and has a model and candidates of
+its own (candidates.py); benchmarks/results/controls.md says how they did.
 
-Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners of LinuxCNC add up to
+Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners
+                                     of LinuxCNC add up to
 it at most. A plan that uses all of it leaves no room; one with a tenth less does.
 """
 
@@ -48,9 +51,11 @@ class Exported:
 
     file      : its name
     sentence  : what it holds
-    predicted : predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path mode of its own
+    predicted : predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path
+                mode of its own
     assumptions : where coordinates and start are, and how a first run goes
-    notes     : what was left out or written another way, what the control needs, and what would leave the chords more room
+    notes     : what was left out or written another way, what the control needs, and what would leave the
+                chords more room
     """
 
     file: str
@@ -66,8 +71,9 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     control   : "grbl", "klipper", "marlin" or "linuxcnc"
     tolerance : of the path [mm], which plan and chords share
 
-    Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises InputError if the motion
-    leaves the program, for a program with the tool centre point on, and with its line for what the control has no words for.
+    Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises
+    InputError if the motion leaves the program, for a program with the tool centre point on, and with its
+    line for what the control has no words for.
     """
     if plan.joints is not None:
         raise InputError(

@@ -1,8 +1,10 @@
-"""The lines of a program as an export needs them: their words, the blocks that they make, and which of them chords may replace.
+"""The lines of a program as an export needs them: their words, the blocks that they make, and which of them
+chords may replace.
 
-Chords are written in the program's own coordinates. They say where the tool is only as far as the program does, so a line is replaced
-only if its words alone tell where it begins and ends: straight moves, arcs, cycles and splines under G90 or G91 at a feed per minute,
-of axes that an absolute coordinate has placed before. Everything else stays a line of its own:
+Chords are written in the program's own coordinates. They say where the tool is only as far as the program
+does, so a line is replaced only if its words alone tell where it begins and ends: straight moves, arcs,
+cycles and splines under G90 or G91 at a feed per minute, of axes that an absolute coordinate has placed
+before. Everything else stays a line of its own:
 
     the first moves of each axis           wherever the machine stands, they lead to the same place
     G53, G28, G30, homing                  machine coordinates; what they move has no place in the program's coordinates afterwards
@@ -66,8 +68,10 @@ class Row:
 
     line     : 1-based
     words    : those of RS274NGC's moves, modes and switches; line numbers are left out
-    others   : codes of other kinds, each with the words that are its own: settings, names, messages, what the user leaves out
-    text     : the line without its comments and number, where it is no words: homing, commands to the control; "" otherwise
+    others   : codes of other kinds, each with the words that are its own: settings, names, messages, what the
+               user leaves out
+    text     : the line without its comments and number, where it is no words: homing, commands to the
+               control; "" otherwise
     first, last : its blocks are those from `first` to before `last`
     motion   : motion code in tenths that its coordinates belong to; -1 for none
     absolute, inch, per_minute : G90, G20 and G94 are in force at its end
@@ -190,7 +194,8 @@ def _text(words: Words, word: int) -> str:
 
 
 def _parted(words: list[Word], ignored: frozenset[str]) -> tuple[list[Word], list[list[Word]]]:
-    """The words of moves, modes and switches; and the others, each code with the words behind it that are its own."""
+    """The words of moves, modes and switches; and the others, each code with the words behind it that are its
+    own."""
     letters = "".join(word.letter for word in words)
     mine: list[Word] = []
     others: list[list[Word]] = []
@@ -298,7 +303,8 @@ class _Follower:
             self.placed |= self._told(row, named) if self.absolute else frozenset()
 
     def _told(self, row: Row, named: frozenset[str]) -> frozenset[str]:
-        """Axes of which the words of a row tell where they are after it: a cycle's depth does not, the tool comes back."""
+        """Axes of which the words of a row tell where they are after it: a cycle's depth does not, the tool
+        comes back."""
         if row.motion <= 30 or row.motion in codes.SPLINES:
             return named
         return named & frozenset(row.plane) if row.motion in codes.CYCLES else frozenset()
@@ -333,7 +339,8 @@ def _is_arc(row: Row, g: list[int]) -> bool:
 
 
 def sets_tools(row: Row) -> bool:
-    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows neither."""
+    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows
+    neither."""
     kind = row.value("L")
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
     lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)

@@ -1,4 +1,5 @@
-"""The text of a plan's program whose lines an export goes by: its own, the expanded one, or one that is written for it."""
+"""The text of a plan's program whose lines an export goes by: its own, the expanded one, or one that is
+written for it."""
 
 from __future__ import annotations
 
@@ -88,7 +89,8 @@ def same_places(one: Program, other: Program) -> bool:
 
 
 def _of_points(program: Program) -> tuple[bytes, Program]:
-    """A path of points as text, and the program with the lines of it: a rapid to where it begins, which is no block, then its moves.
+    """A path of points as text, and the program with the lines of it: a rapid to where it begins, which is no
+    block, then its moves.
 
     Raises InputError for points of other axes than x, y and z.
     """

@@ -1,14 +1,15 @@
 """Setpoints for LinuxCNC's HAL: one row per servo period, put out by its component `streamer`.
 
-LinuxCNC's own planner has no jerk limit and another idea of a corner, so a program cannot make it move as planned. Its HAL plays
-setpoints as they are: `halstreamer` feeds the rows of a file into a FIFO, and `streamer` puts one of them on its pins in every servo
-period. Three files:
+LinuxCNC's own planner has no jerk limit and another idea of a corner, so a program cannot make it move as
+planned. Its HAL plays setpoints as they are: `halstreamer` feeds the rows of a file into a FIFO, and
+`streamer` puts one of them on its pins in every servo period. Three files:
 
     setpoints.txt  rows of axis positions, in mm or inch, rotary axes in degrees
     stream.hal     loads the streamer and names its signals; to be sourced in a machine's HAL configuration
     try.hal        plays and records the rows without a machine: `halrun -f try.hal` writes played.txt
 
-The last period of a plan may be shorter than the others; its row comes a whole period after the one before it.
+The last period of a plan may be shorter than the others; its row comes a whole period after the one before
+it.
 
 Positions, velocities and times (PVT): rows between which a drive moves each axis on a cubic.
 
@@ -16,8 +17,9 @@ With p0, v0 at the start of an interval of length h and p1, v1 at its end, u = (
 
     p(u) = (1 + 2u)(1 - u)^2 p0 + u (1 - u)^2 h v0 + u^2 (3 - 2u) p1 - u^2 (1 - u) h v1
 
-which is the motion itself where its jerk is constant in the interval. So a few rows are enough: `longest_interval` finds the longest
-interval, a whole number of interpolation periods, with which the cubics stay within a given distance of every setpoint on every axis.
+which is the motion itself where its jerk is constant in the interval. So a few rows are enough:
+`longest_interval` finds the longest interval, a whole number of interpolation periods, with which the cubics
+stay within a given distance of every setpoint on every axis.
 """
 
 from __future__ import annotations
@@ -58,7 +60,8 @@ def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> N
 
 
 def scale_of(trajectory: Trajectory, unit: str) -> FloatArray:
-    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for another unit."""
+    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for another
+    unit."""
     if unit not in UNITS:
         raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
     degrees = trajectory.in_degrees
@@ -123,9 +126,11 @@ PERIODS_MAX = 64  # interpolation periods between two rows at most: feedback and
 def write_pvt(
     directory: Path, trajectory: Trajectory, unit: str = "mm", within: float = WITHIN
 ) -> tuple[int, float]:
-    """Write pvt.csv into an existing directory: t [s], then position and velocity of each axis, rotary axes in degrees.
+    """Write pvt.csv into an existing directory: t [s], then position and velocity of each axis, rotary axes
+    in degrees.
 
-    within : largest distance of the cubics between rows from the setpoints [mm]; on rotary axes the same number in degrees
+    within : largest distance of the cubics between rows from the setpoints [mm]; on rotary axes the same
+             number in degrees
 
     Returns the interpolation periods between two rows, and the largest distance found [mm].
 

@@ -1,4 +1,5 @@
-"""The words of a line beside its move, in the words of a control: tool, spindle, coolant, modes, dwells, stops, codes of other kinds."""
+"""The words of a line beside its move, in the words of a control: tool, spindle, coolant, modes, dwells,
+stops, codes of other kinds."""
 
 from __future__ import annotations
 
@@ -152,7 +153,8 @@ class Switches(Output):
         self.absolute = row.absolute
 
     def _know_diameter(self, row: Row, code: int) -> None:
-        """Refuse the radius of a tool that the machine file does not have: its centre would go along the contour."""
+        """Refuse the radius of a tool that the machine file does not have: its centre would go along the
+        contour."""
         word = row.value("D")
         number = word.text if word is not None else self.tool[1:]
         tool = self.machine.tools.get(str(int(float(number)))) if number else None
@@ -180,7 +182,8 @@ class Switches(Output):
                 self._say(text)
 
     def _end(self, said: str = "") -> None:
-        """The end of the program, which M2 and M30 are where they are known; the spindle does not outlive it."""
+        """The end of the program, which M2 and M30 are where they are known; the spindle does not outlive
+        it."""
         self.ended = True
         known = bool(said) and int(said[1:]) in self.control.m
         if self.spindle and not known and said:

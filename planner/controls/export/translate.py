@@ -1,7 +1,8 @@
 """A program in the words of a control: line by line its own, with chords where a line's moves are replaced.
 
-A line gives up to three things, in the order of RS274NGC: what it says before it moves (switches.py), its move, and a stop after it.
-The move is that of the program, word for word, or a run of straight moves in the same coordinates.
+A line gives up to three things, in the order of RS274NGC: what it says before it moves (switches.py), its
+move, and a stop after it. The move is that of the program, word for word, or a run of straight moves in the
+same coordinates.
 """
 
 from __future__ import annotations

@@ -1,15 +1,18 @@
-"""From a control's settings to the text of a machine file: every number with its place, and what is assumed said aloud.
+"""From a control's settings to the text of a machine file: every number with its place, and what is assumed
+said aloud.
 
-Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion without
-it would step in acceleration at every switch. It is assumed from the time in which a drive builds up its acceleration,
+Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion
+without it would step in acceleration at every switch. It is assumed from the time in which a drive builds up
+its acceleration,
 
     jerk = acceleration / ramp time
 
-`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one where the
-frame rings: a ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step would.
+`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one
+where the frame rings: a ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step
+would.
 
-Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in machines for
-such controls.
+Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in
+machines for such controls.
 """
 
 from __future__ import annotations
@@ -46,7 +49,8 @@ CONTROLS: dict[str, ModuleType] = {
 
 @dataclass(frozen=True)
 class Imported:
-    """text : of the machine file; machine : what it holds; assumed : what the settings do not say, one sentence each"""
+    """text : of the machine file; machine : what it holds; assumed : what the settings do not say, one
+    sentence each"""
 
     text: str
     machine: Machine
@@ -67,10 +71,11 @@ def import_machine(
     control   : whose settings it is: "linuxcnc", "grbl", "klipper" or "marlin"; None to recognise it
     ramp_time : in which an axis builds up its acceleration [s], for jerks that the control does not know
     tolerance : contour tolerance [mm]; None for that of the settings
-    given     : limits that the settings lack or that replace theirs, such as {"z.jerk": 1e4}, in mm (deg) and s
+    given     : limits that the settings lack or that replace theirs, such as {"z.jerk": 1e4}, in mm (deg) and
+                s
 
-    Raises InputError for files that hold no settings of these controls, for limits that are missing, and for names of `given` that
-    are none.
+    Raises InputError for files that hold no settings of these controls, for limits that are missing, and for
+    names of `given` that are none.
     """
     text, source = read_settings(Path(path)), str(path)
     found = _settings_of(text, source, control)
@@ -182,7 +187,8 @@ def _text(
 
 
 def _tables(found: ControlSettings) -> list[str]:
-    """The tables that say how the control reads programs, what its planner does, and how it carries the tool."""
+    """The tables that say how the control reads programs, what its planner does, and how it carries the
+    tool."""
     lines: list[str] = []
     if found.inch or found.lathe:
         lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
@@ -201,7 +207,8 @@ def _tables(found: ControlSettings) -> list[str]:
 
 
 def _printable(text: str) -> str:
-    """The text without what TOML does not take in names and comments: settings may have any character in a value that is quoted."""
+    """The text without what TOML does not take in names and comments: settings may have any character in a
+    value that is quoted."""
     return "".join(c if c.isprintable() else "-" for c in text)
 
 

@@ -1,15 +1,17 @@
-"""Settings in tables, `[NAME]`, then `key = value` or `key: value`: LinuxCNC's INI files and Klipper's printer.cfg.
+"""Settings in tables, `[NAME]`, then `key = value` or `key: value`: LinuxCNC's INI files and Klipper's
+printer.cfg.
 
-Both take a file that is included at the place where it is named. For the rest they differ in what counts, and each is
-read as its control reads it (LinuxCNC 2.9: src/libnml/inifile/inifile.cc and scripts/linuxcnc; Klipper:
-klippy/configfile.py):
+Both take a file that is included at the place where it is named. For the rest they differ in what counts, and
+each is read as its control reads it (LinuxCNC 2.9: src/libnml/inifile/inifile.cc and scripts/linuxcnc;
+Klipper: klippy/configfile.py):
 
     LinuxCNC   the first table of a name and in it the first of equal keys; upper and lower case differ; a comment is
-               a line of its own; a backslash at its end goes on with the next line; a missing file is left out
+               a line of its own; a backslash at its end goes on with the next line; a missing file is left
+               out
     Klipper    the last of equal keys, whichever table of that name it is in; `key = ` begins at a line's start, and an
-               indented line belongs to the value above it; "#" begins a comment anywhere, ";" after a blank; a missing
-               file is an error. What SAVE_CONFIG wrote ("#*#" at the end of the first file) counts where the rest
-               says nothing
+               indented line belongs to the value above it; "#" begins a comment anywhere, ";" after a blank;
+               a missing file is an error. What SAVE_CONFIG wrote ("#*#" at the end of the first file) counts
+               where the rest says nothing
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ class _Line(NamedTuple):
 
 
 def read_linuxcnc_ini(text: str, source: str) -> Settings:
-    """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each other."""
+    """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each
+    other."""
     ini = Settings(begins=True)
     table: str | None = None
     pending = ""
@@ -73,7 +76,8 @@ def read_linuxcnc_ini(text: str, source: str) -> Settings:
 def read_klipper_config(text: str, source: str) -> Settings:
     """The settings of a printer.cfg, as Klipper reads it.
 
-    Raises InputError for a setting outside of a table, for files that include each other and for those that are not there.
+    Raises InputError for a setting outside of a table, for files that include each other and for those that
+    are not there.
     """
     text = text.replace("\r\n", "\n")
     mark = _SAVED.search(text)

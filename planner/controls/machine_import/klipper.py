@@ -1,9 +1,9 @@
-"""Klipper's printer.cfg: [printer] with the limits along the path and of z and the law of its corners, [input_shaper]
-with the modes of the frame.
+"""Klipper's printer.cfg: [printer] with the limits along the path and of z and the law of its corners,
+[input_shaper] with the modes of the frame.
 
-Klipper limits velocity and acceleration along the path, a machine file those of each axis: an axis may use them
-alone. What it does at corners is in the table [control] of the machine file, for predictions of its times
-(controls/export/models.py).
+Klipper limits velocity and acceleration along the path, a machine file those of each axis: an axis may use
+them alone. What it does at corners is in the table [control] of the machine file, for predictions of its
+times (controls/export/models.py).
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def recognised(text: str) -> bool:
 
 
 def settings(text: str, source: str) -> ControlSettings:
-    """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y and z,
-    and for numbers that cannot be read."""
+    """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y
+    and z, and for numbers that cannot be read."""
     config = read_klipper_config(text, source)
     kinematics = config.text("printer", "kinematics")
     if kinematics is not None and kinematics not in _PER_AXIS:
@@ -72,8 +72,8 @@ def settings(text: str, source: str) -> ControlSettings:
 
 
 def _cruise_ratio(config: Settings, acceleration: Sourced | None) -> Sourced:
-    """The minimum cruise ratio; of older files max_accel_to_decel, the acceleration that is left for what is gained
-    and lost."""
+    """The minimum cruise ratio; of older files max_accel_to_decel, the acceleration that is left for what is
+    gained and lost."""
     found = config.number("printer", "minimum_cruise_ratio")
     older = config.positive("printer", "max_accel_to_decel")
     if found is None and older is not None and acceleration is not None:

@@ -1,20 +1,20 @@
 """LinuxCNC's INI file: limits of axes and joints, units, servo period, kinematics, start-up codes.
 
 Read are [TRAJ] LINEAR_UNITS, ANGULAR_UNITS, COORDINATES, MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION and
-MAX_LINEAR_JERK, [AXIS_x] and [JOINT_n] MAX_VELOCITY, MAX_ACCELERATION and MAX_JERK, [AXIS_x] WRAPPED_ROTARY and
-OFFSET_AV_RATIO, [KINS] KINEMATICS, [EMCMOT] SERVO_PERIOD and [RS274NGC] RS274NGC_STARTUP_CODE. The axes are those of
-COORDINATES. An axis gets the smallest of the limits of its own section, of those along the path and of the joints that
-move it alone. A limit that is said nowhere is LinuxCNC's default, one unit a second (src/emc/nml_intf/emccfg.h). Files
-of LinuxCNC 2.7 and older have [AXIS_0] for x, [AXIS_1] for y and so on, and [TRAJ] MAX_VELOCITY and MAX_ACCELERATION
-(docs/src/config/ini-config of 2.7).
+MAX_LINEAR_JERK, [AXIS_x] and [JOINT_n] MAX_VELOCITY, MAX_ACCELERATION and MAX_JERK, [AXIS_x] WRAPPED_ROTARY
+and OFFSET_AV_RATIO, [KINS] KINEMATICS, [EMCMOT] SERVO_PERIOD and [RS274NGC] RS274NGC_STARTUP_CODE. The axes
+are those of COORDINATES. An axis gets the smallest of the limits of its own section, of those along the path
+and of the joints that move it alone. A limit that is said nowhere is LinuxCNC's default, one unit a second
+(src/emc/nml_intf/emccfg.h). Files of LinuxCNC 2.7 and older have [AXIS_0] for x, [AXIS_1] for y and so on,
+and [TRAJ] MAX_VELOCITY and MAX_ACCELERATION (docs/src/config/ini-config of 2.7).
 
-Which joint moves which axis is what the kinematics say: one after the other the letters of `coordinates=`, or of the
-module's own list, `_JOINTS`, whatever COORDINATES says: joint 2 of a lathe with plain trivkins is z.
+Which joint moves which axis is what the kinematics say: one after the other the letters of `coordinates=`, or
+of the module's own list, `_JOINTS`, whatever COORDINATES says: joint 2 of a lathe with plain trivkins is z.
 
-The table [kinematics] is what the commands of HAL set the pins of the kinematics to. Commands are those of [HAL]
-HALCMD and of the files that [HAL] HALFILE and POSTGUI_HALFILE name, where they are beside the INI file: `setp PIN
-VALUE`, and `sets SIGNAL VALUE` for pins that `net` joins to the signal; a value may be `[TABLE]KEY`. Pins that nothing
-sets are 0, as in LinuxCNC (src/emc/kinematics/trtfuncs.c).
+The table [kinematics] is what the commands of HAL set the pins of the kinematics to. Commands are those of
+[HAL] HALCMD and of the files that [HAL] HALFILE and POSTGUI_HALFILE name, where they are beside the INI file:
+`setp PIN VALUE`, and `sets SIGNAL VALUE` for pins that `net` joins to the signal; a value may be
+`[TABLE]KEY`. Pins that nothing sets are 0, as in LinuxCNC (src/emc/kinematics/trtfuncs.c).
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ from planner.machine import ROTARY_AXES
 from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
 
 _LETTERS = "xyzabcuvw"  # in the order of LinuxCNC's axes
-# mm in a LINEAR_UNITS and degrees in an ANGULAR_UNITS; a number is units per mm, and per degree (src/emc/ini/emcIniFile.cc).
+# mm in a LINEAR_UNITS and degrees in an ANGULAR_UNITS; a number is units per mm, and per degree
+# (src/emc/ini/emcIniFile.cc).
 _MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
 _DEGREES = {
     "deg": 1.0,
@@ -191,7 +192,8 @@ class _Found:
         return said, modes[-1] if modes else None, inch
 
     def _kinematics(self) -> dict[str, Sourced | str]:
-        """The table [kinematics], empty for other modules than tilting rotary tables; notes on what it does not say.
+        """The table [kinematics], empty for other modules than tilting rotary tables; notes on what it does
+        not say.
 
         Raises InputError for a distance that is no number.
         """

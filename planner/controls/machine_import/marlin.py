@@ -1,11 +1,12 @@
-"""Marlin's settings, as M503 prints them: M203 velocities [mm/s], M201 accelerations of the axes and M204 along the
-path [mm/s2], M205 the law of corners, M593 input shaping. In inches after G20. RepRapFirmware's config.g has the
-same commands, but velocities in mm/min, M566 for M205 and M208 for the travel; it is known by M566 or M584, which
-Marlin has not.
+"""Marlin's settings, as M503 prints them: M203 velocities [mm/s], M201 accelerations of the axes and M204
+along the path [mm/s2], M205 the law of corners, M593 input shaping. In inches after G20. RepRapFirmware's
+config.g has the same commands, but velocities in mm/min, M566 for M205 and M208 for the travel; it is known
+by M566 or M584, which Marlin has not.
 
-M204 P is for moves that print, T for the others; S, of older firmware, is for both, and T beside S is for filament
-alone (Marlin 1.0, Marlin_main.cpp: "S normal moves T filament only moves"). Corners have a junction deviation
-(M205 J), or a jump of velocity by axis that they may have (M205 X Y Z, M566), which Marlin calls jerk.
+M204 P is for moves that print, T for the others; S, of older firmware, is for both, and T beside S is for
+filament alone (Marlin 1.0, Marlin_main.cpp: "S normal moves T filament only moves"). Corners have a junction
+deviation (M205 J), or a jump of velocity by axis that they may have (M205 X Y Z, M566), which Marlin calls
+jerk.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Settings of a control as they stand in its text, and what they say about a machine; each number with its place."""
+"""Settings of a control as they stand in its text, and what they say about a machine; each number with its
+place."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ class FoundMode(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
-    """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are mappings.
+    """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are
+    mappings.
 
     wrapped      : letters of rotary axes whose places are within a turn
     feed_max     : largest feed along the path [mm/s]
@@ -134,7 +136,8 @@ class Settings:
         return Sourced(value * scale, place)
 
     def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
-        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above 0."""
+        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above
+        0."""
         found = self.number(table, key, scale)
         if found is not None and found.value <= 0:
             text, source, line = self._found[table, key][0]
@@ -145,8 +148,8 @@ class Settings:
     def limits(
         self, letters: str, key: str, scale: float = 1.0, *, table: str = ""
     ) -> Iterator[tuple[str, Sourced]]:
-        """The axes that have a number above 0 under a key, and it; "{letter}" and "{axis}", the number of the axis
-        in `letters`, are filled in."""
+        """The axes that have a number above 0 under a key, and it; "{letter}" and "{axis}", the number of the
+        axis in `letters`, are filled in."""
         for k, letter in enumerate(letters):
             if found := self.positive(table, key.format(letter=letter.upper(), axis=k), scale):
                 yield letter, found
@@ -159,7 +162,8 @@ def leading_number(text: str) -> float | None:
 
 
 def travel_note(travel: Mapping[str, tuple[float | None, float | None]]) -> str:
-    """A sentence on how far the axes go, [mm] or degrees, which no machine file says; "" where settings have none."""
+    """A sentence on how far the axes go, [mm] or degrees, which no machine file says; "" where settings have
+    none."""
     said = [
         f"{letter} {' to '.join('?' if end is None else f'{end:.6g}' for end in ends)}"
         for letter, ends in travel.items()

@@ -16,19 +16,22 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
-# The effective curvature is exact in the middle of an interval; at its quarters up to 4e-4 is missing on grids of the default
-# resolution (measured in tests/feedrate/sampling), which this share of the bounds makes good [-].
+# The effective curvature is exact in the middle of an interval; at its quarters up to 4e-4 is missing on
+# grids of the default resolution (measured in tests/feedrate/sampling), which this share of the bounds makes
+# good [-].
 CURVATURE_MARGIN = 5e-4
 
 
 def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
-    measured : the error of the machine's filters is measured afterwards (planning/optimal/behind_filters.py), and bounded here on
+    measured : the error of the machine's filters is measured afterwards (planning/optimal/behind_filters.py),
+               and bounded here on
     programmed
         arcs only
 
-    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for the path.
+    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for
+    the path.
     """
     if samples.margin.max(initial=0.0) >= 1.0:
         worst = int(samples.margin.argmax())
@@ -72,7 +75,8 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
 
 
 def bounds_of(samples: PathSamples, machine: Machine, limits: Sequence[Limit]) -> FloatArray:
-    """(P,) bound of feed^2 by some of `LIMITS` alone, without limits of one's own; inf where they bound nothing [mm2/s2]."""
+    """(P,) bound of feed^2 by some of `LIMITS` alone, without limits of one's own; inf where they bound
+    nothing [mm2/s2]."""
     return _caps(OnGrid(samples, machine), limits).feed_sq_max
 
 

@@ -3,8 +3,8 @@
     | r'_k u + r''_k x | <= a_k                          rows, at both ends of every interval, each with the r'' of its side
     | r''_k(s+) - r''_k(s-) | x <= a_k                   a cap where r'' jumps, as where a line meets an arc
 
-At a jump both rows of the point hold with the u of their intervals; the cap asks that the step in acceleration itself be within the
-limit, too, so that setpoints across it show no more.
+At a jump both rows of the point hold with the u of their intervals; the cap asks that the step in
+acceleration itself be within the limit, too, so that setpoints across it show no more.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ JUMP = "curvature_jump"  # the name of the cap, with the axis behind it
 def feed_sq_at_jump(
     d2_left: FloatArray, d2_right: FloatArray, limits: FloatArray
 ) -> tuple[FloatArray, Array]:
-    """(P,) |d2_right - d2_left| x <= limits for r'' (P, A) on both sides and every axis [mm2/s2]; also the index (P,) of the axis that
-    limits."""
+    """(P,) |d2_right - d2_left| x <= limits for r'' (P, A) on both sides and every axis [mm2/s2]; also the
+    index (P,) of the axis that limits."""
     ratio = np.abs(d2_right - d2_left) / limits
     axis = ratio.argmax(axis=1)
     return over(1.0, ratio[np.arange(len(ratio)), axis]), axis

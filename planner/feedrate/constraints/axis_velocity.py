@@ -1,6 +1,7 @@
 """The limits of the axis velocities:  |r'_k| feed <= v_k,  so x <= min_k (v_k / r'_k)^2.
 
-Between the points r' turns; the share of the interval's `margin` (feedrate/sampling/samples.py) makes that good.
+Between the points r' turns; the share of the interval's `margin` (feedrate/sampling/samples.py) makes that
+good.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(d1: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array]:
-    """(P,) x <= min_k (v_k/|r'_k|)^2 [mm2/s2] for tangents d1 (P, A); also the index (P,) of the axis that limits."""
+    """(P,) x <= min_k (v_k/|r'_k|)^2 [mm2/s2] for tangents d1 (P, A); also the index (P,) of the axis that
+    limits."""
     ratio = np.abs(d1) / limits
     axis = ratio.argmax(axis=1)
     return 1.0 / ratio[np.arange(len(d1)), axis] ** 2, axis

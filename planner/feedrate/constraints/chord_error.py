@@ -1,7 +1,9 @@
-"""The limit of the chord error: between two setpoints the machine runs along the chord, which cuts off the curve.
+"""The limit of the chord error: between two setpoints the machine runs along the chord, which cuts off the
+curve.
 
-It does where it runs "linear" from setpoint to setpoint and where it jumps ("hold"), all axes at once. A "cubic" of both ends is off by
-a quarter of that at most, where the normal acceleration steps from nothing to kappa x, as at the end of an arc:
+It does where it runs "linear" from setpoint to setpoint and where it jumps ("hold"), all axes at once. A
+"cubic" of both ends is off by a quarter of that at most, where the normal acceleration steps from nothing to
+kappa x, as at the end of an arc:
 
     kappa x dt^2/8 <= eps_ch, cubic dt^2/32      eq. (19), approximate form: rigorous, because the interpolator advances the arc
                                                  length feed*dt per period (docs/papers.md D)
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(kappa: FloatArray, tol: FloatArray, rate: float) -> FloatArray:
-    """(P,) kappa x rate <= tol for curvatures (P,) [1/mm], tolerances (P,) [mm] and `rate` [s2]; inf on straights [mm2/s2]."""
+    """(P,) kappa x rate <= tol for curvatures (P,) [1/mm], tolerances (P,) [mm] and `rate` [s2]; inf on
+    straights [mm2/s2]."""
     return over(tol, kappa * rate)
 
 

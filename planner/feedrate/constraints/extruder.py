@@ -1,8 +1,10 @@
-"""The extruder's limits of acceleration and jerk, along the path: one limit more where they may hold the motion.
+"""The extruder's limits of acceleration and jerk, along the path: one limit more where they may hold the
+motion.
 
-Where the extruder feeds r mm of filament per mm of way (geometry/extrusion.py), its limits v, a, j are v/r, a/r and j/r along the path.
-That of the velocity is a feed (geometry/build.py). The others are limits of their own (own.py), but only where they can matter: the
-axes keep the acceleration along the path below |a|, and its jerk below |j| but for what the path turns, which is allowed as much again.
+Where the extruder feeds r mm of filament per mm of way (geometry/extrusion.py), its limits v, a, j are v/r,
+a/r and j/r along the path. That of the velocity is a feed (geometry/build.py). The others are limits of their
+own (own.py), but only where they can matter: the axes keep the acceleration along the path below |a|, and its
+jerk below |j| but for what the path turns, which is allowed as much again.
 """
 
 from __future__ import annotations

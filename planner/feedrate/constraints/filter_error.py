@@ -2,8 +2,8 @@
 
     kappa x sum_i T_i^2/24 <= eps_fir            papers 000/001 (par. 21)
 
-eps_fir is their part of the error budget where the closed form is used (on_grid.py); elsewhere the error is measured
-(planning/optimal/behind_filters.py), and what is found makes a cap of the same name.
+eps_fir is their part of the error budget where the closed form is used (on_grid.py); elsewhere the error is
+measured (planning/optimal/behind_filters.py), and what is found makes a cap of the same name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 def feed_sq_max(
     kappa: FloatArray, tol: FloatArray, time_constants: Sequence[FloatArray | float]
 ) -> FloatArray:
-    """(P,) kappa x sum T^2/24 <= tol [mm] for moving averages of lengths T = time_constants [s]; inf on straights [mm2/s2]."""
+    """(P,) kappa x sum T^2/24 <= tol [mm] for moving averages of lengths T = time_constants [s]; inf on
+    straights [mm2/s2]."""
     return over(tol, kappa * sum(T * T for T in time_constants) / 24.0)
 
 

@@ -1,6 +1,8 @@
-"""A limit, as the planner sees it. Every limit is one object in a file of its own; `limits.py` lists them all.
+"""A limit, as the planner sees it. Every limit is one object in a file of its own; `limits.py` lists them
+all.
 
-A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j acceleration and jerk along the path:
+A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j
+acceleration and jerk along the path:
 
     a cap    x <= ...  at a grid point. What it comes from says which method the limit has:
                  at_points   the point and the intervals beside it          programmed feed, axis velocity
@@ -9,8 +11,8 @@ A limit takes part in the feedrate problem (problem.py) in one of three forms, x
     a row    |row(r', r'', r'''; x, u, j)| <= limit of the axis, at both ends of every interval      axis acceleration, axis jerk
     along    both of one function of the path, as the user's limits have them (machine/user_limit.py)      tangential acceleration
 
-The judge knows nothing of these objects: it
-has code of its own for every limit (verifier/), and tests/verifier/test_laws_of_limits.py holds one against the other.
+The judge knows nothing of these objects: it has code of its own for every limit (verifier/), and
+tests/verifier/test_laws_of_limits.py holds one against the other.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ class Cap(NamedTuple):
 
 
 class RowPoint(NamedTuple):
-    """One axis at n grid points, seen from one side: r', r'', r''' of the axis, x = feed^2, u and jerk along the path, all (n,)."""
+    """One axis at n grid points, seen from one side: r', r'', r''' of the axis, x = feed^2, u and jerk along
+    the path, all (n,)."""
 
     d1: FloatArray
     d2: FloatArray
@@ -56,7 +59,8 @@ class Limit:
 
     name  : as it is printed; of an axis limit with the axis behind it, see `AxisLimit.called`
     unit  : of what is limited; rad stands for mm on rotary axes
-    order : slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and errors, 3 of jerks
+    order : slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and
+            errors, 3 of jerks
     key   : of the machine file, if its value stands alone there
     """
 
@@ -78,11 +82,13 @@ class Limit:
         yield from ()
 
     def inside(self, grid: OnGrid) -> FloatArray | None:
-        """(P,) bound on feed^2 inside the interval to the right of each point, if that is straight [mm2/s2]; None for none."""
+        """(P,) bound on feed^2 inside the interval to the right of each point, if that is straight [mm2/s2];
+        None for none."""
         return None
 
     def along(self, machine: Machine, axes: tuple[str, ...]) -> OwnLimit | None:
-        """The limit as a function of the path, with rows like an axis; None where it has none or cannot bind."""
+        """The limit as a function of the path, with rows like an axis; None where it has none or cannot
+        bind."""
         return None
 
 
@@ -96,7 +102,8 @@ class AxisLimit(Limit):
 
     @classmethod
     def of(cls, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
-        """(A,) the limits of the axes, in mm or rad. Raises InputError if the machine lacks one of the axes."""
+        """(A,) the limits of the axes, in mm or rad. Raises InputError if the machine lacks one of the
+        axes."""
         return machine.limits(cls.name, axes)  # type: ignore[arg-type]
 
 
@@ -114,6 +121,7 @@ def over(value: FloatArray | float, by: FloatArray) -> FloatArray:
 
 
 def by_axis(name: str, axes: tuple[str, ...], feed_sq: FloatArray, axis: FloatArray) -> Iterator[Cap]:
-    """Caps feed_sq (P,) [mm2/s2] that come from one axis each, as caps of every axis; `axis` (P,) is its index."""
+    """Caps feed_sq (P,) [mm2/s2] that come from one axis each, as caps of every axis; `axis` (P,) is its
+    index."""
     for k, letter in enumerate(axes):
         yield Cap(f"{name}.{letter}", np.where(axis == k, feed_sq, np.inf))

@@ -1,8 +1,10 @@
-"""The limit of the normal acceleration: kappa feed^2 <= A, in a path's corners and along its curves (paper 002, eq. (19)).
+"""The limit of the normal acceleration: kappa feed^2 <= A, in a path's corners and along its curves (paper
+002, eq. (19)).
 
-A is the machine's (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes give in the direction n
-of the path's normal, and what the error budget leaves of it (corners/budget.py). Between grid points a motion may exceed it by as
-little as any limit; motion/limits_used.py says where. The judge has code of its own for it (verifier/limits.py).
+A is the machine's (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes
+give in the direction n of the path's normal, and what the error budget leaves of it (corners/budget.py).
+Between grid points a motion may exceed it by as little as any limit; motion/limits_used.py says where. The
+judge has code of its own for it (verifier/limits.py).
 """
 
 from __future__ import annotations

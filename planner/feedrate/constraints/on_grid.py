@@ -1,9 +1,10 @@
-"""The input of the limits: a sampled path on a machine, the two sides of its points, and the error budget there.
+"""The input of the limits: a sampled path on a machine, the two sides of its points, and the error budget
+there.
 
-The budget is what the rounding leaves of the tolerance. Where the filters' error is bounded by its closed form, chords and filters
-share it in proportion to what they cost per unit of normal acceleration, dt^2/8 : sum T^2/24 (docs/papers.md D): on programmed
-lines and arcs always, elsewhere unless the filtered motion is measured afterwards (planning/optimal/behind_filters.py). There
-chords have all of it.
+The budget is what the rounding leaves of the tolerance. Where the filters' error is bounded by its closed
+form, chords and filters share it in proportion to what they cost per unit of normal acceleration, dt^2/8 :
+sum T^2/24 (docs/papers.md D): on programmed lines and arcs always, elsewhere unless the filtered motion is
+measured afterwards (planning/optimal/behind_filters.py). There chords have all of it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ class Side:
     """The curve on one side of P points.
 
     kappa                 : (P,) effective curvature of the interval (feedrate/sampling/grid.py) [1/mm]
-    tol_chord, tol_filter : (P,) parts of the error budget of chords and of filters [mm]; inf where filters are measured afterwards
+    tol_chord, tol_filter : (P,) parts of the error budget of chords and of filters [mm]; inf where filters
+                            are measured afterwards
     """
 
     kappa: FloatArray
@@ -63,7 +65,8 @@ class OnGrid:
         return interval_sides(self.samples)[1]
 
     def feed_of_words(self, side: Array) -> FloatArray:
-        """(P,) feed along the path in all axes at which what F goes by moves at F, for intervals `side` (P,) [mm/s]."""
+        """(P,) feed along the path in all axes at which what F goes by moves at F, for intervals `side` (P,)
+        [mm/s]."""
         return allowed_along(self.samples.path.toolpath, self.samples.segment[side], self.samples.d1)
 
     def sides(self) -> tuple[Side, Side]:
@@ -90,7 +93,8 @@ class OnGrid:
 
 
 def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
-    """(P,) index of the interval to the left and to the right of every point; at a piece's ends the only one there is."""
+    """(P,) index of the interval to the left and to the right of every point; at a piece's ends the only one
+    there is."""
     right = np.arange(len(samples))
     left = right - 1
     left[samples.piece[:-1]] += 1
@@ -99,7 +103,8 @@ def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
 
 
 def remaining_budget(samples: PathSamples) -> FloatArray:
-    """(P,) what the rounding leaves of the contour budget for chord and filter errors, of the interval to the right [mm]."""
+    """(P,) what the rounding leaves of the contour budget for chord and filter errors, of the interval to the
+    right [mm]."""
     path = samples.path
     element = samples.element
     corner = element < 0

@@ -1,8 +1,10 @@
-"""The limit of the phase lag behind filters: on a circle the filtered point runs behind by feed kappa times the filters' delay.
+"""The limit of the phase lag behind filters: on a circle the filtered point runs behind by feed kappa times
+the filters' delay.
 
     feed kappa (sum_i T_i)/2 <= phi              paper 001 (par. 26)
 
-The machine file names phi, or none (`Fir.phase_lag_max`). The judge does not look at it: it is no error of the contour.
+The machine file names phi, or none (`Fir.phase_lag_max`). The judge does not look at it: it is no error of
+the contour.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:
-    """(P,) feed kappa sum T/2 <= angle [rad], as a bound of feed^2, for T = time_constants [s]; inf on straights [mm2/s2]."""
+    """(P,) feed kappa sum T/2 <= angle [rad], as a bound of feed^2, for T = time_constants [s]; inf on
+    straights [mm2/s2]."""
     return over(angle, kappa * sum(time_constants) / 2.0) ** 2
 
 

@@ -1,25 +1,29 @@
 """The feedrate problem: the fastest speed profile along a sampled path.
 
-In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u on each of the N intervals of a piece:
+In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u on each of the N intervals of
+a piece:
 
     minimise   T = sum_i 2 h_i / (sqrt(x_i) + sqrt(x_{i+1}))
     subject to x_{i+1} = x_i + 2 h_i u_i
                0 <= x_i <= feed_sq_max_i
                | r'_k u_i + r''_k x | <= a_k (1 - margin_i)     at the left end (x = x_i, r'' to the right of the point)
-                                                                and the right end (x = x_{i+1}, r'' to its left), every axis k
+                                                                and the right end (x = x_{i+1}, r'' to its
+                                                                left), every axis k
                x = feed_sq_start, feed_sq_end at the ends of each piece.
 
-`margin` is the grid's interpolation error (feedrate/sampling/samples.py), so that the constraint holds in between as well. The jerk
-limits are carried along for solvers of third order; a second-order solver says that it does not use them.
+`margin` is the grid's interpolation error (feedrate/sampling/samples.py), so that the constraint holds in
+between as well. The jerk limits are carried along for solvers of third order; a second-order solver says that
+it does not use them.
 
-`limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask for
-(planning/optimal/tighten.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk over lam^3,
-so that every row of the point has the limit
+`limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask
+for (planning/optimal/tighten.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk
+over lam^3, so that every row of the point has the limit
 
     feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3
 
-and a motion that is slower by lam everywhere uses exactly the shares of them that the motion itself uses of the machine's limits. Path
-and machine stay what they are. (`margin` cannot say it: it is of the accelerations alone, and of intervals.)
+and a motion that is slower by lam everywhere uses exactly the shares of them that the motion itself uses of
+the machine's limits. Path and machine stay what they are. (`margin` cannot say it: it is of the accelerations
+alone, and of intervals.)
 """
 
 from __future__ import annotations
@@ -58,15 +62,18 @@ class FeedrateProblem:
     bound_names           : names of the bounds on x ("feed", "velocity.x", "chord_error", ...)
     margin                : (P,) of the interval to the right, share of the acceleration limits [-]
     feed_sq_start, feed_sq_end : (G,) x at both ends of each piece; 0 = rest
-    limit_scale           : (P,) by what factor the motion has to be slower around each point (module text) [-]; 1 if not given
-    own                   : how many of the axes, the last ones, are limits of one's own (machine/user_limit.py): functions of the
-                            position with rows like an axis
-    own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger at each point [-]
-    own_least             : (3, own) their least bounds of velocity, acceleration and jerk on the path, in units of their own; inf
-                            where they bound nothing
+    limit_scale           : (P,) by what factor the motion has to be slower around each point (module text)
+                            [-]; 1 if not given
+    own                   : how many of the axes, the last ones, are limits of one's own
+                            (machine/user_limit.py): functions of the position with rows like an axis
+    own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger at each
+                            point [-]
+    own_least             : (3, own) their least bounds of velocity, acceleration and jerk on the path, in
+                            units of their own; inf where they bound nothing
 
-    Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in them and are made when they
-    are asked for: of a long job there are several problems, and these take 7 bytes in 10 of what one has of its own.
+    Solvers take limits from `feed_sq_limit`, `acceleration_limit` and `jerk_limit`, which have the scale in
+    them and are made when they are asked for: of a long job there are several problems, and these take 7
+    bytes in 10 of what one has of its own.
     """
 
     piece: Array

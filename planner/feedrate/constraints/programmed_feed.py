@@ -1,7 +1,8 @@
 """The limit of the programmed feed, the F word or the machine's largest feed:  feed <= F,  so x <= F^2.
 
-At a point between two blocks the smaller of both counts. With rotary axes F is the speed of the linear ones (geometry/word_feed.py):
-on a curve that rounds a corner or a spline their part of the path is another one than on the block, and F holds there too.
+At a point between two blocks the smaller of both counts. With rotary axes F is the speed of the linear ones
+(geometry/word_feed.py): on a curve that rounds a corner or a spline their part of the path is another one
+than on the block, and F holds there too.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
-"""The limit of the tangential acceleration: |d feed/dt| <= A_t, the acceleration along the path of x, y and z together.
+"""The limit of the tangential acceleration: |d feed/dt| <= A_t, the acceleration along the path of x, y and z
+together.
 
 With l the length run in x, y and z, l' = dl/ds = |(r'_x, r'_y, r'_z)|, it is a row like that of an axis,
 
     | l' u + l'' x | <= A_t,         l' = 1 and l'' = 0 where no other axes move,
 
-and of a motion in time |a.t| <= A_t with t = v/|v| of x, y and z. Rotary axes and u, v, w do not count: turning alone is not limited by
-it. No motion has more than the norm of what x, y and z accelerate with: a limit above that is none, and nothing is done for it.
+and of a motion in time |a.t| <= A_t with t = v/|v| of x, y and z. Rotary axes and u, v, w do not count:
+turning alone is not limited by it. No motion has more than the norm of what x, y and z accelerate with: a
+limit above that is none, and nothing is done for it.
 """
 
 from __future__ import annotations

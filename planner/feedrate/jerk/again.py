@@ -1,22 +1,27 @@
-"""A problem whose limits became tighter in places is solved again around these places only; elsewhere the known profile stays.
+"""A problem whose limits became tighter in places is solved again around these places only; elsewhere the
+known profile stays.
 
-What a limit changes dies out within about a way to brake. So around every changed point a range of `REACH` such ways to both sides, or
-more, is solved again, from the state that the known profile has at the range's first point to the one that it has at its last point: a
-task of chain.py between two states. Ranges that overlap are one.
+What a limit changes dies out within about a way to brake. So around every changed point a range of `REACH`
+such ways to both sides, or more, is solved again, from the state that the known profile has at the range's
+first point to the one that it has at its last point: a task of chain.py between two states. Ranges that
+overlap are one.
 
-An optimal profile is nearly always at some limit, and most of its states are at the edge of what can be continued: while it brakes
-into a bend, or takes its acceleration back below the largest feed, with all its jerk. A problem that begins there has no room, and no
-solution is found (a relief of 6,000 blocks: 13 ranges of 70). So ranges end at rest, where the feed is held without acceleration, and
-at dips of the feed, where feed^2 is below `DEEP` of that of the peaks on both sides.
+An optimal profile is nearly always at some limit, and most of its states are at the edge of what can be
+continued: while it brakes into a bend, or takes its acceleration back below the largest feed, with all its
+jerk. A problem that begins there has no room, and no solution is found (a relief of 6,000 blocks: 13 ranges
+of 70). So ranges end at rest, where the feed is held without acceleration, and at dips of the feed, where
+feed^2 is below `DEEP` of that of the peaks on both sides.
 
-From such a state the range's solution is looked for beside the known profile slowed down to rest, x W over the way s with
+From such a state the range's solution is looked for beside the known profile slowed down to rest, x W over
+the way s with
 
     W = (1 - q^2)^2,    q = s / way,    u = (x W)'/2 = u W - 2 q (1 - q^2) x / way,
 
-which has the state at q = 0. A range that gets no solution is tried once more with `WIDER` ways to brake on both sides. If that has
-none either, it keeps its profile, and its limits what they were.
+which has the state at q = 0. A range that gets no solution is tried once more with `WIDER` ways to brake on
+both sides. If that has none either, it keeps its profile, and its limits what they were.
 
-Multipliers stay those of the solution before: between two states that are fixed they would price these instead of the limits.
+Multipliers stay those of the solution before: between two states that are fixed they would price these
+                                               instead of the limits.
 """
 
 from __future__ import annotations
@@ -35,7 +40,8 @@ from planner.feedrate.solution import FeedrateSolution
 
 MULTIPLIERS = ("rows", "feed", "dynamics")  # columns of a profile
 REACH = 0.5  # to each side of a changed point [ways to brake]
-# The same where that has no solution: 16 of 507 ranges of 20,000 blocks of stellabee1, all of which have one then.
+# The same where that has no solution: 16 of 507 ranges of 20,000 blocks of stellabee1, all of which have one
+# then.
 WIDER = 3.0
 DEEP = 0.9  # feed^2 at a dip, over that of the peaks beside it, at most [-]
 EDGE = 8  # points at least on each side of a changed one: on coarse grids few points lie on a way to brake
@@ -51,7 +57,8 @@ class Range(NamedTuple):
 def ranges_of(
     problem: FeedrateProblem, known: FeedrateSolution, changed: Array, reach: float = REACH
 ) -> list[Range]:
-    """The ranges to solve again, ascending, for points (P,) that changed (module text); `known` has multipliers.
+    """The ranges to solve again, ascending, for points (P,) that changed (module text); `known` has
+    multipliers.
 
     reach : to each side of them at least [ways to brake]
     """
@@ -73,7 +80,8 @@ def ranges_of(
 
 
 def _open_points(problem: FeedrateProblem, known: FeedrateSolution) -> Array:
-    """(n,) points where ranges may end (module text), ascending: the first and the last of each piece, dips and held feeds."""
+    """(n,) points where ranges may end (module text), ascending: the first and the last of each piece, dips
+    and held feeds."""
     x, u, jerk = known.feed_sq, known.acc_s, known.jerk_s
     dip = np.flatnonzero((x[1:-1] <= x[:-2]) & (x[1:-1] < x[2:])) + 1
     peak = np.maximum.reduceat(x, np.append(0, dip))
@@ -129,8 +137,8 @@ class RangeAgain:
 
 
 def _slowed_to_rest(s: FloatArray, x: FloatArray, u: FloatArray, a: float, j: float) -> Way | None:
-    """A way to rest (module text) from the first of some states x, u at the distances s (n,), as far as these points go; None from
-    rest. The profile must not rest before that."""
+    """A way to rest (module text) from the first of some states x, u at the distances s (n,), as far as these
+    points go; None from rest. The profile must not rest before that."""
     if x[0] == 0.0:
         return None
     reach = reach_of_end(float(x[0]), a, j)

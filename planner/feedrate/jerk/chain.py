@@ -1,4 +1,5 @@
-"""A part of a piece, solved window by window: where windows end, what of them is kept, and what is done if one fails.
+"""A part of a piece, solved window by window: where windows end, what of them is kept, and what is done if
+one fails.
 
 See solver.py.
 """
@@ -19,28 +20,31 @@ from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Way, Window
 
-# Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4 of some profiles' time, 5
-# gains nothing.
+# Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4
+# of some profiles' time, 5 gains nothing.
 BRAKING_WAYS = 3.0
-# Share of a^3/j^2 that counts as a way to brake [-] (4 mm on `mill`): of motions in windows of 150 and 300 intervals that are joined at
-# slow points some take 5e-4 longer with 1/6, 3e-4 with 0.7, 1e-4 with 1; then 6 % more has to be solved (relief of 10,000 blocks).
+# Share of a^3/j^2 that counts as a way to brake [-] (4 mm on `mill`): of motions in windows of 150 and 300
+# intervals that are joined at slow points some take 5e-4 longer with 1/6, 3e-4 with 0.7, 1e-4 with 1; then 6
+# % more has to be solved (relief of 10,000 blocks).
 BUILDING = 0.7
 # At most this fraction of a window is kept [-]: the rest is the way ahead that the next window starts with.
 KEPT_SHARE_MAX = 0.95
 # ... and at least this fraction of what can be [-]. In between, the point where more speed would help most: to keep all, whatever
 # the state there, costs up to 0.8 % of a profile's time.
 JOIN_SHARE = 0.92
-# A window is meant to be kept up to a point between these numbers of usual windows from its beginning [-]: there where the least has
-# to be solved for each interval that is kept.
+# A window is meant to be kept up to a point between these numbers of usual windows from its beginning [-]:
+# there where the least has to be solved for each interval that is kept.
 NEAREST, FARTHEST = 0.4, 1.25
 # An interval in a window twice as large costs so much more [-]: iterations grow, and memory leaves the cache.
 LARGER_COSTS = 0.2
-# The start keeps shares of the limits (start.py), the motion keeps them in full: its feed^2 is so many times that of the start [-].
+# The start keeps shares of the limits (start.py), the motion keeps them in full: its feed^2 is so many times
+# that of the start [-].
 FASTER = 1.6
-# A window ends where the grid is finest on this part of a usual window behind what is needed [-]: a stop needs points.
+# A window ends where the grid is finest on this part of a usual window behind what is needed [-]: a stop
+# needs points.
 END_SHARE = 0.1
-# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start does for so few. (The last
-# one may have `INTERVALS_MIN` more.)
+# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start
+# does for so few. (The last one may have `INTERVALS_MIN` more.)
 SMALLEST_WINDOW = 100
 # Into so many smaller windows one that does not converge is divided.
 DIVISION = 5
@@ -49,7 +53,8 @@ INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Task:
-    """The points first..last of a problem, to be solved from rest, or from a given feed, to rest, or to a given feed.
+    """The points first..last of a problem, to be solved from rest, or from a given feed, to rest, or to a
+    given feed.
 
     profile    : of all points of the problem; these points are written
     tell       : called with the number of points that are new; may end the work by an exception
@@ -76,8 +81,8 @@ class Chain:
     """
 
     def __init__(self, task: Task, ahead: Way | None = None, back: Way | None = None):
-        """The task, or one with other states at its ends: ways to rest from the first point on, and from the last point on, backward,
-        None from rest; the profile has these states already."""
+        """The task, or one with other states at its ends: ways to rest from the first point on, and from the
+        last point on, backward, None from rest; the profile has these states already."""
         self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
         self.at, self.first, self.last = task.first, task.first, task.last
         self.rest: Window | None = None
@@ -123,8 +128,8 @@ class Chain:
             size, divided = self.solver.window, False
 
     def _window_end(self, begin: int, size: int) -> int:
-        """The last point of a window: behind the way to brake from the point up to which it is likely to be kept, where the grid is
-        finest; no sooner than the stop that the way ahead knows."""
+        """The last point of a window: behind the way to brake from the point up to which it is likely to be
+        kept, where the grid is finest; no sooner than the stop that the way ahead knows."""
         if self.last - begin <= size + INTERVALS_MIN:
             return self.last
         s = self.columns.s
@@ -161,7 +166,8 @@ class Chain:
         return way_felt(FASTER * slow, a, j)
 
     def _stop(self, begin: int, end: int) -> int:
-        """Where no window converges: down to the last window's stop, or from rest with the plain start; returns where it ends."""
+        """Where no window converges: down to the last window's stop, or from rest with the plain start;
+        returns where it ends."""
         if self.rest is not None and self.profile.x[begin] > 0.0:
             end = begin + len(self.rest.x) - 1
             self._keep(begin, end, self.rest)
@@ -174,8 +180,8 @@ class Chain:
         return ScaledWindow.of(self.columns, begin, end, self._room, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
-        """Solve the points begin..end, from the state at `begin` to rest at `end`, or to the end of the task; None if that does not
-        converge."""
+        """Solve the points begin..end, from the state at `begin` to rest at `end`, or to the end of the task;
+        None if that does not converge."""
         behind, scaled = None, self._scaled(begin, end)
         if begin == self.first and self._ahead is not None:
             behind = self._ahead
@@ -197,11 +203,12 @@ class Chain:
         return found
 
     def _unfelt(self, begin: int, end: int, found: Window) -> int:
-        """Where to go on from: a point from which the window's end is far beyond the way to brake, one of the last such points.
+        """Where to go on from: a point from which the window's end is far beyond the way to brake, one of the
+        last such points.
 
-        Of these the one where more speed would help most (costate times feed^2). Where less would help, while the motion brakes into a
-        bend with all its jerk, its state is at the edge of what can still be continued: a problem that starts there has hardly any
-        room, and its multipliers say nothing.
+        Of these the one where more speed would help most (costate times feed^2). Where less would help, while
+        the motion brakes into a bend with all its jerk, its state is at the edge of what can still be
+        continued: a problem that starts there has hardly any room, and its multipliers say nothing.
         """
         own = slice(begin, end + 1)
         a, j = self.columns.acceleration[own].min(), self.columns.jerk[own].min()
@@ -221,8 +228,8 @@ class Chain:
 
 
 def way_to_rest(columns: ProblemColumns, first: int, last: int, x: float) -> Way:
-    """A way that brakes from feed^2 x and no acceleration at the point `first`, as far as it is not beyond the point `last`, for the
-    solver to start from: X (1 - q^2)^2 over the share q of some ways to brake."""
+    """A way that brakes from feed^2 x and no acceleration at the point `first`, as far as it is not beyond
+    the point `last`, for the solver to start from: X (1 - q^2)^2 over the share q of some ways to brake."""
     own = slice(first, last + 1)
     reach = reach_of_end(x, columns.acceleration[own].min(), columns.jerk[own].min())
     s = columns.s[own] - columns.s[first]
@@ -241,5 +248,6 @@ def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
 
 
 def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its acceleration and takes it back."""
+    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its
+    acceleration and takes it back."""
     return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2

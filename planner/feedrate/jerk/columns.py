@@ -1,4 +1,5 @@
-"""The rows of a third-order problem as compiled functions take them: the solver (layout.py), and the Lagrangian of its solution."""
+"""The rows of a third-order problem as compiled functions take them: the solver (layout.py), and the
+Lagrangian of its solution."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def columns_of(problem: FeedrateProblem) -> ProblemColumns:
 
 
 def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
-    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each point [mm/s2]."""
+    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each
+    point [mm/s2]."""
     margin = problem.margin.copy()
     margin[problem.piece[1:] - 1] = 0.0
     before = np.concatenate([[0.0], margin[:-1]])

@@ -1,15 +1,18 @@
-"""Where a motion keeps the largest feed all along: its solution is known there, and only what lies between has to be solved.
+"""Where a motion keeps the largest feed all along: its solution is known there, and only what lies between
+has to be solved.
 
-With u = j = 0 and x = X the rows of rows.py are |r''_k| X <= a_k and |r'''_k| X^(3/2) <= j_k. Where X is the bound of the feed at every
-point, and these rows leave at least `FREE` of accelerations and jerks,
+With u = j = 0 and x = X the rows of rows.py are |r''_k| X <= a_k and |r'''_k| X^(3/2) <= j_k. Where X is the
+bound of the feed at every point, and these rows leave at least `FREE` of accelerations and jerks,
 
     x = X (1 - LESS),    u = 0,    j = 0
 
-keeps all limits, and no motion takes less time by more than LESS/2 of it. What comes before and after reaches in by about the way to
-brake. So a range is held from `BRAKING_WAYS` such ways (chain.py) behind its beginning up to as many before its end, if `POINTS` lie
-between. What lies between held ranges are problems of their own: from X or rest to X or rest.
+keeps all limits, and no motion takes less time by more than LESS/2 of it. What comes before and after reaches
+in by about the way to brake. So a range is held from `BRAKING_WAYS` such ways (chain.py) behind its beginning
+up to as many before its end, if `POINTS` lie between. What lies between held ranges are problems of their
+own: from X or rest to X or rest.
 
-Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), for which the bound alone answers,
+Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), for
+             which the bound alone answers,
 
     lam_i = X (ds_{i-1} + ds_i) / (4 X^(3/2)),
 
@@ -69,8 +72,8 @@ def held_ranges(columns: ProblemColumns, first: int, last: int) -> list[Held]:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _could_be_held(columns, first, last):
-    """(n+1,) True for points of first..last, but the two ends, at which the bound of the feed is that of both neighbours, and can be
-    kept with `FREE` of accelerations and jerks to spare."""
+    """(n+1,) True for points of first..last, but the two ends, at which the bound of the feed is that of both
+    neighbours, and can be kept with `FREE` of accelerations and jerks to spare."""
     x_max = columns.x_max
     found = np.zeros(last - first + 1, np.bool_)
     for i in range(first + 1, last):
@@ -88,7 +91,8 @@ def _could_be_held(columns, first, last):
 
 
 def hold(profile: Profile, columns: ProblemColumns, held: Held) -> None:
-    """Write a held range and its multipliers into a profile; those of the states at its ends belong to it too."""
+    """Write a held range and its multipliers into a profile; those of the states at its ends belong to it
+    too."""
     points, inside = slice(held.first, held.last + 1), slice(held.first, held.last)
     v = np.sqrt(held.x)
     ds = np.diff(columns.s[held.first - 1 : held.last + 2])

@@ -1,16 +1,21 @@
-"""The interior-point method behind `JerkLimited` (solver.py), in numba: model, weigh, factorise, step. All in scaled units.
+"""The interior-point method behind `JerkLimited` (solver.py), in numba: model, weigh, factorise, step. All in
+scaled units.
 
-It is a primal-dual method for optimal control whose every step is a linear-quadratic problem, solved by a Riccati recursion
-over the grid (Rao, Wright & Rawlings 1998, J. Optim. Theory Appl. 99:723; as a library HPIPM, Frison & Diehl 2020, IFAC-PapersOnLine
-53:6563), here with two states and one control written out, and with the end fixed too (riccati.py).
+It is a primal-dual method for optimal control whose every step is a linear-quadratic problem, solved by a
+Riccati recursion over the grid (Rao, Wright & Rawlings 1998, J. Optim. Theory Appl. 99:723; as a library
+HPIPM, Frison & Diehl 2020, IFAC-PapersOnLine 53:6563), here with two states and one control written out, and
+with the end fixed too (riccati.py).
 
-Each row of rows.py has slacks s and multipliers lam. Eliminating their Newton steps adds lam/s times the row's square to the
-Hessian; what remains is the linear-quadratic problem. The Hessian is that of the Lagrangian; where it is not convex, only a fraction
-of the curvature of rows and dynamics counts, or none. Steps are predictor-corrector (Mehrotra 1992, SIAM J. Optim. 2:575): the step
-without a barrier says how far the barrier may fall, and its second-order terms are made up for.
+Each row of rows.py has slacks s and multipliers lam. Eliminating their Newton steps adds lam/s times the
+row's square to the Hessian; what remains is the linear-quadratic problem. The Hessian is that of the
+Lagrangian; where it is not convex, only a fraction of the curvature of rows and dynamics counts, or none.
+Steps are predictor-corrector (Mehrotra 1992, SIAM J. Optim. 2:575): the step without a barrier says how far
+the barrier may fall, and its second-order terms are made up for.
 
-The barrier counts by time: an interval's rows share mu times its duration h, as if the barrier were integrated along the motion. So a
-ramp of a nanometre beside millimetres at constant speed has no more than its part in it, and finer grids do not change the problem.
+The barrier counts by time: an interval's rows share mu times its duration h, as if the barrier were
+                            integrated along the motion. So a
+ramp of a nanometre beside millimetres at constant speed has no more than its part in it, and finer grids do
+not change the problem.
 
 What every number is set to, and why: settings.py.
 """
@@ -63,7 +68,8 @@ class Minimum(NamedTuple):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _beyond(g, w, primal, edge, beyond, m):
-    """By how much p ds exceeds a share of the domain 3 vm^2 after a step: into `beyond` (LANES,); negative inside."""
+    """By how much p ds exceeds a share of the domain 3 vm^2 after a step: into `beyond` (LANES,); negative
+    inside."""
     for i in range(m):
         vm = 0.5 * (
             np.sqrt(w[X + i] + primal * w[STEP + i]) + np.sqrt(w[X_END + i] + primal * w[STEP_END + i])
@@ -87,7 +93,8 @@ def within_domain(blocks, primal, settings):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def advance(blocks, primal, dual):
-    """Take the step of the profile and of the dynamics' multipliers; returns the largest relative change of x."""
+    """Take the step of the profile and of the dynamics' multipliers; returns the largest relative change of
+    x."""
     change = np.zeros(LANES)
     for b in range(len(blocks.work)):
         w, m = blocks.work[b], min(LANES, blocks.n - b * LANES)
@@ -103,7 +110,8 @@ def advance(blocks, primal, dual):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def minimise_time(blocks, tol, iterations, settings):
-    """The fastest profile over a window from the one that `blocks` holds, in its place; x_0, u_0, x_N = u_N = 0 are given.
+    """The fastest profile over a window from the one that `blocks` holds, in its place; x_0, u_0, x_N = u_N =
+    0 are given.
 
     tol        : relative gap that is asked for [-]
     iterations : at most
@@ -147,7 +155,8 @@ def minimise_time(blocks, tol, iterations, settings):
         sigma = 1.0 if far else min((affine_gap / gap) ** 3, settings.sigma_max)
         mu = max(sigma * gap / total, settings.gap_floor * tol) / sides
 
-        # Corrector: the step to that barrier, second-order terms of the predictor made up for; the factorisation stays.
+        # Corrector: the step to that barrier, second-order terms of the predictor made up for; the
+        # factorisation stays.
         second_order = 1.0 if min(primal, dual) > settings.predicted_min else 0.0
         barrier = mu, second_order
         correct(blocks, barrier)

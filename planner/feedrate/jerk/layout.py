@@ -1,8 +1,9 @@
 """How a window lies in memory: blocks of `LANES` intervals, every quantity of a block in one row.
 
-All but the recursions along the path is the same arithmetic for every interval. So a window of N intervals is cut into blocks, a block
-is one row of a two-dimensional array, and quantity Q of interval `LANES b + l` is `array[b, Q + l]`: Q, one of the names below, is a
-multiple of `LANES` known to the compiler, which then does several intervals in one instruction. The last block may be shorter.
+All but the recursions along the path is the same arithmetic for every interval. So a window of N intervals is
+cut into blocks, a block is one row of a two-dimensional array, and quantity Q of interval `LANES b + l` is
+`array[b, Q + l]`: Q, one of the names below, is a multiple of `LANES` known to the compiler, which then does
+several intervals in one instruction. The last block may be shorter.
 
     grid  (B, FIXED + A AXIS)    what does not change: lengths and limits, in scaled units
     work  (B, WORK)              profile, model, feedback and step of the intervals
@@ -22,8 +23,8 @@ from planner.base.kernels import njit
 from planner.feedrate.jerk.columns import ProblemColumns
 
 LANES = 32  # intervals of a block: a multiple of the 4 or 8 doubles that one instruction takes
-# What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the inverse of a constant,
-# take -0 for 0. Sums keep their order, NaN stays NaN.
+# What the compiler may do to the arithmetic of a block: multiply and add in one instruction, multiply by the
+# inverse of a constant, take -0 for 0. Sums keep their order, NaN stays NaN.
 LANE_MATH = {"contract", "arcp", "nsz"}
 
 
@@ -31,7 +32,8 @@ def _names(count: int) -> range:
     return range(0, count * LANES, LANES)
 
 
-# grid: length; 1/x_max at the start, 2/x_max in the middle; 1 but in the last interval; 1 in the first and the last interval, else 0
+# grid: length; 1/x_max at the start, 2/x_max in the middle; 1 but in the last interval; 1 in the first and
+# the last interval, else 0
 DS, PER_X, PER_MIDDLE, INNER_END, EDGE = _names(5)
 FIXED = 5 * LANES
 # ... and of each axis, after `FIXED`: factors of the rows (rows.py) of x and u (acceleration), of j, v u and v x (jerk at the start and
@@ -53,8 +55,8 @@ STEP, STEP_END, STEP_PI = (k * LANES for k in (35, 38, 39))
 BY_BARRIER, BY_BENT = (k * LANES for k in (40, 43))
 WORK = 46 * LANES
 
-# rows, of each: value; gradient in (x, u, p); and of its upper and its lower side: slack, multiplier, one over their product, step of
-# the slack (before that the predicted step as a share of the slack)
+# rows, of each: value; gradient in (x, u, p); and of its upper and its lower side: slack, multiplier, one
+# over their product, step of the slack (before that the predicted step as a share of the slack)
 VALUE, BY_X, BY_U, BY_P = _names(4)
 SLACK_UP, LAM_UP, PER_GAP_UP, MOVE_UP, SLACK_LOW, LAM_LOW, PER_GAP_LOW, MOVE_LOW = (
     k * LANES for k in range(4, 12)
@@ -65,7 +67,8 @@ JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
 
 
 class Blocks(NamedTuple):
-    """The arrays of a window of n intervals (module text), x, u (n+1,), p and pi (n,) of the profile that they are made at, ."""
+    """The arrays of a window of n intervals (module text), x, u (n+1,), p and pi (n,) of the profile that
+    they are made at, ."""
 
     n: int
     axes: int
@@ -102,7 +105,8 @@ class Room:
         self._kept: dict[str, FloatArray] = {}
 
     def blocks(self, columns: ProblemColumns, begin: int, end: int, feed: float, time: float) -> Blocks:
-        """`Blocks` with the grid of the points begin..end, in units of speed and time; whatever was there before is overwritten."""
+        """`Blocks` with the grid of the points begin..end, in units of speed and time; whatever was there
+        before is overwritten."""
         n, axes, jumps = end - begin, columns.d1.shape[1], _jumps(columns, begin, end)
         blocks = Blocks(
             n=n,

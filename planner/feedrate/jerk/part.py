@@ -1,9 +1,10 @@
 """A part of a piece, from rest or a given feed to rest or a given feed; a long one from both ends at a time.
 
-The problem is the same forward and backward in time. So a long part is solved from its first point forward and from its last point
-backward, on two cores if there are two, and a window in the middle joins the two profiles: both of its ends are given. Where that does
-not converge the profile that came forward goes on to the end. Where the two meet depends on the problem alone, so that a problem has
-the same solution on any number of cores.
+The problem is the same forward and backward in time. So a long part is solved from its first point forward
+and from its last point backward, on two cores if there are two, and a window in the middle joins the two
+profiles: both of its ends are given. Where that does not converge the profile that came forward goes on to
+the end. Where the two meet depends on the problem alone, so that a problem has the same solution on any
+number of cores.
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from planner.feedrate.jerk.profile import Profile, backward
 from planner.feedrate.jerk.window import ScaledWindow, Way
 
 LONG = SIZES.solved_windows
-# The joining window starts and ends at points so far from the middle, in windows [-]; of these, where most speed would help.
+# The joining window starts and ends at points so far from the middle, in windows [-]; of these, where most
+# speed would help.
 NEAR, FAR = 0.25, 0.5
-# What is passed backward reaches so far beyond the middle [windows]: its windows end in a stop of their own before that.
+# What is passed backward reaches so far beyond the middle [windows]: its windows end in a stop of their own
+# before that.
 BEYOND = 3.0
 
 

@@ -1,12 +1,13 @@
-"""The passes over all rows of an interior-point iteration: their weights, the predicted step, the step, and how far it may go.
+"""The passes over all rows of an interior-point iteration: their weights, the predicted step, the step, and
+how far it may go.
 
-Each row -1 <= g <= 1 has a slack s and a multiplier lam on either side, g + s = 1 and s - g = 1. With the residuals r of these two,
-eliminating their Newton steps
+Each row -1 <= g <= 1 has a slack s and a multiplier lam on either side, g + s = 1 and s - g = 1. With the
+residuals r of these two, eliminating their Newton steps
 
     ds = -r -+ dg,      dlam = (mu h - second-order terms)/s - lam (1 + ds/s)
 
-adds lam/s times the row's square to the Hessian. One pass is a loop over the blocks, over the rows and over the block's intervals, of
-which the innermost is done several at a time (layout.py).
+adds lam/s times the row's square to the Hessian. One pass is a loop over the blocks, over the rows and over
+the block's intervals, of which the innermost is done several at a time (layout.py).
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ from planner.feedrate.jerk.rows import linearise
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _weigh(w, rows, count, worst, m):
-    """Add the rows' weights to the convex Hessian and the gradient of a block, without a barrier, and keep what later passes need of
-    slacks and multipliers; `worst` (LANES,) grows to the rows' residuals."""
+    """Add the rows' weights to the convex Hessian and the gradient of a block, without a barrier, and keep
+    what later passes need of slacks and multipliers; `worst` (LANES,) grows to the rows' residuals."""
     for r in range(count):
         row = rows[r * ROW :]
         for i in range(m):
@@ -71,15 +72,16 @@ def _weigh(w, rows, count, worst, m):
             w[GRADIENT + 2 * LANES + i] += push * c
 
 
-# What `predicted` finds of all rows of an interval: smallest and largest share, and the sums of s lam, of it times the share, and times
-# the share squared.
+# What `predicted` finds of all rows of an interval: smallest and largest share, and the sums of s lam, of it
+# times the share, and times the share squared.
 LEAST, MOST, PLAIN, ONCE, TWICE = range(0, 5 * LANES, LANES)
 
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _predict(w, rows, count, seen, m):
-    """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the multipliers are -(1 +
-    share) of them. Also what a barrier and the steps' second-order terms dslack dlam add to the gradient."""
+    """Newton's steps of the slacks of a block without a barrier, as shares of them, into MOVE; those of the
+    multipliers are -(1 + share) of them. Also what a barrier and the steps' second-order terms dslack dlam
+    add to the gradient."""
     w[BY_BARRIER : BY_BARRIER + 6 * LANES] = 0.0
     for r in range(count):
         row = rows[r * ROW :]
@@ -110,7 +112,8 @@ def _predict(w, rows, count, seen, m):
 
 @njit(cache=True, error_model="numpy")
 def predicted(blocks, settings):
-    """How far profile and slacks, and multipliers can go along Newton's step without a barrier, and sum(slack * lam) after it."""
+    """How far profile and slacks, and multipliers can go along Newton's step without a barrier, and sum(slack
+    * lam) after it."""
     to_boundary, count = settings.to_boundary, rows_of(blocks.axes, blocks.jumps)
     seen = np.zeros(5 * LANES)
     seen[MOST : MOST + LANES] = -1.0
@@ -128,8 +131,8 @@ def predicted(blocks, settings):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def correct(blocks, barrier):
-    """Second half of a predictor-corrector step: add the barrier mu h to the gradient, less the predicted steps' second-order terms
-    if they count. `barrier` is mu and 1 if they do, else 0."""
+    """Second half of a predictor-corrector step: add the barrier mu h to the gradient, less the predicted
+    steps' second-order terms if they count. `barrier` is mu and 1 if they do, else 0."""
     mu, second_order = barrier
     for b in range(len(blocks.work)):
         w = blocks.work[b]
@@ -139,8 +142,8 @@ def correct(blocks, barrier):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _direct(w, rows, count, barrier, nearest, m):
-    """Newton's steps of the slacks of a block, into MOVE, and of the multipliers, into PER_GAP; `nearest` (2 LANES,) falls to their
-    shares of slack and multiplier."""
+    """Newton's steps of the slacks of a block, into MOVE, and of the multipliers, into PER_GAP; `nearest` (2
+    LANES,) falls to their shares of slack and multiplier."""
     mu, second_order = barrier
     for r in range(count):
         row = rows[r * ROW :]
@@ -169,8 +172,8 @@ def _direct(w, rows, count, barrier, nearest, m):
 
 @njit(cache=True, error_model="numpy")
 def direction(blocks, barrier, settings):
-    """The Newton step to the barrier mu h, after `correct`. Returns the lengths that profile and slacks, and that multipliers can
-    go."""
+    """The Newton step to the barrier mu h, after `correct`. Returns the lengths that profile and slacks, and
+    that multipliers can go."""
     to_boundary, count = settings.to_boundary, rows_of(blocks.axes, blocks.jumps)
     nearest = np.zeros(2 * LANES)
     primal, dual = forward(blocks, settings.feed_sq_shrink), 1.0
@@ -201,8 +204,8 @@ def _advance_rows(rows, count, primal, dual, gap, m):
 
 @njit(cache=True, error_model="numpy")
 def modelled(blocks, passing, primal, dual):
-    """Take the step of slacks and multipliers and make the model of all blocks. Returns sum(slack * lam), the total time, and the
-    largest residual of the rows and defect of the dynamics."""
+    """Take the step of slacks and multipliers and make the model of all blocks. Returns sum(slack * lam), the
+    total time, and the largest residual of the rows and defect of the dynamics."""
     gap, residual, defect, total = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), 0.0
     count = rows_of(blocks.axes, blocks.jumps)
     for b in range(len(blocks.work)):
@@ -216,7 +219,8 @@ def modelled(blocks, passing, primal, dual):
 
 @njit(cache=True, error_model="numpy")
 def first_slacks(blocks, passing, settings):
-    """Slacks of at least `slack_min`, multipliers that have the first barrier as complementarity, and no step."""
+    """Slacks of at least `slack_min`, multipliers that have the first barrier as complementarity, and no
+    step."""
     blocks.rows[:] = 0.0
     defect = np.zeros(LANES)
     for b in range(len(blocks.work)):

@@ -1,6 +1,8 @@
-"""A piece between two full stops: ranges on which the feed is held, known beforehand (held.py), and the parts between them.
+"""A piece between two full stops: ranges on which the feed is held, known beforehand (held.py), and the parts
+between them.
 
-The parts are solved side by side, each by itself. If one of them has no solution from feed to feed the piece is solved as one part.
+The parts are solved side by side, each by itself. If one of them has no solution from feed to feed the piece
+is solved as one part.
 """
 
 from __future__ import annotations
@@ -76,8 +78,8 @@ class Piece:
 
 
 def slowed_piece(profile: Profile, columns: ProblemColumns, first: int, last: int) -> float:
-    """Slow a profile down between two full stops, at the points first and last, until it keeps every limit at the grid points; returns
-    by what factor."""
+    """Slow a profile down between two full stops, at the points first and last, until it keeps every limit at
+    the grid points; returns by what factor."""
     own, intervals = slice(first, last + 1), slice(first, last)
     x, u, jerk = profile.x[own], profile.u[own], profile.jerk[intervals]
     by = float(slower_by(columns, first, x, u, jerk, 1.0))

@@ -14,7 +14,8 @@ from planner.feedrate.solution import FeedrateSolution
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Profile:
-    """P points: x, u, jerk, duration (P,), and rows (P, A, 4), feed (P, 2), dynamics (P,) as in `Multipliers`."""
+    """P points: x, u, jerk, duration (P,), and rows (P, A, 4), feed (P, 2), dynamics (P,) as in
+    `Multipliers`."""
 
     x: FloatArray
     u: FloatArray
@@ -58,10 +59,12 @@ class Profile:
             getattr(self, name)[begin : begin + beyond] = getattr(found, name)[:beyond]
 
     def put_backward(self, last: int, found: Profile, count: int) -> None:
-        """Take over the first intervals of a profile of the way backward from point `last`, and the state at their end.
+        """Take over the first intervals of a profile of the way backward from point `last`, and the state at
+        their end.
 
-        Passed backward, accelerations change sign and so does r'; the rows of the acceleration keep theirs, those of the jerk change
-        it, and so do the dynamics. What was at the start of an interval is at its end.
+        Passed backward, accelerations change sign and so does r'; the rows of the acceleration keep theirs,
+        those of the jerk change it, and so do the dynamics. What was at the start of an interval is at its
+        end.
         """
         points, own = slice(last - count, last + 1), slice(count, None, -1)
         self.x[points], self.u[points] = found.x[own], -found.u[own]

@@ -1,12 +1,15 @@
-"""The linear-quadratic problem of one interior-point iteration: two states (dx, du), one control dp, solved by a Riccati recursion.
+"""The linear-quadratic problem of one interior-point iteration: two states (dx, du), one control dp, solved
+by a Riccati recursion.
 
     minimise   sum_i  g_i z_i + z_i H_i z_i / 2,     z_i = (dx, du, dp)_i
     subject to dx_{i+1} = D0 dx_i + D1 du_i + D2 dp_i + D3,     du_{i+1} = du_i + dp_i
 
-with dx_0 = du_0 = 0 and dx_N = du_N = 0: the last two controls are fixed by the two conditions at the end. The recursion is linear in
-N, and its factors serve the predictor and the corrector alike (Rao, Wright & Rawlings 1998; interior_point.py).
+with dx_0 = du_0 = 0 and dx_N = du_N = 0: the last two controls are fixed by the two conditions at the end.
+The recursion is linear in N, and its factors serve the predictor and the corrector alike (Rao, Wright &
+Rawlings 1998; interior_point.py).
 
-What belongs to interval i (layout.py): the feedback GAIN, dp_i = K0 dx_i + K1 du_i + K2, and of the cost to go from its *end* the
+What belongs to interval i (layout.py): the feedback GAIN, dp_i = K0 dx_i + K1 du_i + K2, and of the cost to
+                                        go from its *end* the
 second derivatives TO_GO (xx, xu, uu) and the slope TO_GO_X.
 """
 
@@ -32,8 +35,9 @@ from planner.feedrate.jerk.layout import (
     X_END,
 )
 
-# Of the positive parts: smallest reduced Hessian taken for convex [-]. Far above the rounding of the parts' difference, so that a model
-# that is taken has a minimum, and far below what a model with any row near its limit has.
+# Of the positive parts: smallest reduced Hessian taken for convex [-]. Far above the rounding of the parts'
+# difference, so that a model that is taken has a minimum, and far below what a model with any row near its
+# limit has.
 PIVOT_MIN = 1e-6
 
 
@@ -50,7 +54,8 @@ def _set_three(w, first, a, b, c):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(w, i, fraction):
-    """The Hessian (xx, xu, xp, uu, up, pp) of the interval in lane i, with a fraction of the curvature of rows and dynamics."""
+    """The Hessian (xx, xu, xp, uu, up, pp) of the interval in lane i, with a fraction of the curvature of
+    rows and dynamics."""
     xx, xu, xp = _three(w, CONVEX + i)
     uu, up, pp = _three(w, CONVEX + 3 * LANES + i)
     cxx, cxu, cxp = _three(w, CURVED + i)
@@ -119,7 +124,8 @@ def riccati(blocks, fraction):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def offsets(blocks, fraction):
-    """The part of the recursion that depends on the gradient, after `riccati`: the last part of GAIN, and TO_GO_X."""
+    """The part of the recursion that depends on the gradient, after `riccati`: the last part of GAIN, and
+    TO_GO_X."""
     n, work = blocks.n, blocks.work
     last, at = work[(n - 1) // LANES], (n - 1) % LANES
     w, i = work[(n - 2) // LANES], (n - 2) % LANES
@@ -155,7 +161,8 @@ def offsets(blocks, fraction):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def forward(blocks, shrink):
-    """The steps dx, du, dp of all intervals. Returns what part of them takes no more than a share `shrink` of any x away."""
+    """The steps dx, du, dp of all intervals. Returns what part of them takes no more than a share `shrink` of
+    any x away."""
     n, work = blocks.n, blocks.work
     dx, du, length = 0.0, 0.0, 1.0
     for b in range(len(work)):

@@ -1,25 +1,29 @@
-"""The jerk-limited problem on one window, linearised, with its curvature: what the interior-point step of interior_point.py works on.
+"""The jerk-limited problem on one window, linearised, with its curvature: what the interior-point step of
+interior_point.py works on.
 
-Unknowns of a window with N intervals: z_i = (x_i, u_i), feed^2 and acceleration along the path at the N+1 points (both ends
-given), and p_i = u_{i+1} - u_i on the intervals. The jerk is constant on an interval, so the kinematics are exact cubics: with
-vm = (v_i + v_{i+1})/2, v = sqrt(x),
+Unknowns of a window with N intervals: z_i = (x_i, u_i), feed^2 and acceleration along the path at the N+1
+                                       points (both ends
+given), and p_i = u_{i+1} - u_i on the intervals. The jerk is constant on an interval, so the kinematics are
+exact cubics: with vm = (v_i + v_{i+1})/2, v = sqrt(x),
 
     ds = vm h - p h^2/12                    =>  h = 2 ds / (vm + sqrt(vm^2 - p ds/3))           duration
     x_{i+1} = x_i + (2u + p) ds + p (2u + p) h^2/12,   u_{i+1} = u_i + p                           dynamics
     jerk j = p/h
 
-In (x, u, p) this is linear but for the last term, which is why these coordinates are used: the second-order limits are linear,
-the time is convex, and only the jerk rows and that term are curved. Inequalities are scaled to -1 <= g <= 1:
+In (x, u, p) this is linear but for the last term, which is why these coordinates are used: the second-order
+limits are linear, the time is convex, and only the jerk rows and that term are curved. Inequalities are
+scaled to -1 <= g <= 1:
 
     r'_k u + r''_k x                                      / a_k        acceleration at point i (also left of it, where r'' jumps)
     r'_k j + v (3 r''_k u + r'''_k x)                     / j_k        jerk at both ends of the interval
     x_i / x_max,  ((v_i + v_{i+1})/2 - p h/8)^2 / x_max               feed at the point and mid-interval (g <= 1 only)
 
-With multipliers lam of the rows, sum lam g = lam_j p/h + (terms of single points) + ..., so that the second derivatives of the
-Lagrangian need one sum over the axes, lam_j = sum lam r'_k/j_k, and those of h(vm, p).
+With multipliers lam of the rows, sum lam g = lam_j p/h + (terms of single points) + ..., so that the second
+derivatives of the Lagrangian need one sum over the axes, lam_j = sum lam r'_k/j_k, and those of h(vm, p).
 
-All is written for a block of up to `LANES` intervals (layout.py). The rows of an axis are, in this order, acceleration at the start,
-jerk at the start, jerk at the end, and where r'' jumps acceleration at the end; after those of all axes come the two of the feed.
+All is written for a block of up to `LANES` intervals (layout.py). The rows of an axis are, in this order,
+acceleration at the start, jerk at the start, jerk at the end, and where r'' jumps acceleration at the end;
+after those of all axes come the two of the feed.
 """
 
 from __future__ import annotations
@@ -71,8 +75,9 @@ from planner.feedrate.jerk.layout import (
 DOMAIN = 0.95  # share of the kinematics' domain p ds <= 3 vm^2 that an interval may use [-]; a start with constant jerk uses 8/9
 SLOPE_MIN = 1e-3  # of the mean feed: floor of vm - p h/6, which is 0 at the domain's edge [-]
 
-# What the steps of `linearise` hand on, in the array `passing`: the mean of the end speeds; d mean/dx_i and d mean/dx_{i+1}; dh/dmean,
-# dh/dp, and with the dynamics put in dh/dx, dh/du, dh/dp and its defect; vm - p h/6; the end speed where it is free, else 0
+# What the steps of `linearise` hand on, in the array `passing`: the mean of the end speeds; d mean/dx_i and d
+# mean/dx_{i+1}; dh/dmean, dh/dp, and with the dynamics put in dh/dx, dh/du, dh/dp and its defect; vm - p h/6;
+# the end speed where it is free, else 0
 MEAN, M0, M1, H_V, H_P, HX, HU, HP, H0, SLOPE, FREE = range(0, 11 * LANES, LANES)
 # ... both end speeds, one over h;
 V0, V1, PER_H = range(11 * LANES, 14 * LANES, LANES)
@@ -90,8 +95,8 @@ def duration(v0, v1, p, ds):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def kinematics(g, w, t, worst, m):
-    """The first m intervals of a block to first order: durations and dynamics into `w`, what else its derivatives are made of into `t`.
-    `worst` (LANES,) grows to the defect of the dynamics, as a speed."""
+    """The first m intervals of a block to first order: durations and dynamics into `w`, what else its
+    derivatives are made of into `t`. `worst` (LANES,) grows to the defect of the dynamics, as a speed."""
     for i in range(m):
         x0, x1, u, p, ds = w[X + i], w[X_END + i], w[U + i], w[P + i], g[DS + i]
         v0, v1 = np.sqrt(x0), np.sqrt(x1)
@@ -119,8 +124,8 @@ def kinematics(g, w, t, worst, m):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _axis_rows(g, w, t, rows, m):
-    """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and `rows` begin with the
-    axis."""
+    """The rows of an axis without that before a jump, and what their multipliers add to the sums. `g` and
+    `rows` begin with the axis."""
     for i in range(m):
         x0, x1, u, p, per_h = w[X + i], w[X_END + i], w[U + i], w[P + i], t[PER_H + i]
         e0, e1, e2, e3 = w[DYN + i], w[DYN + LANES + i], w[DYN + 2 * LANES + i], w[DYN + 3 * LANES + i]
@@ -170,9 +175,11 @@ def _jump_row(g, w, t, rows, m):
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)
 def _curvature(g, w, t, rows, m):
-    """The rows of the feed, with which `rows` begin, and the cost: gradient, Hessian, and what its derivative by x_{i+1} is.
+    """The rows of the feed, with which `rows` begin, and the cost: gradient, Hessian, and what its derivative
+    by x_{i+1} is.
 
-    The Lagrangian of the interval is h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p, u, h), q = p (2u + p).
+    The Lagrangian of the interval is h + lam_j p/h + pi q h^2/12 + the last row's, as a function L(mean, p,
+    u, h), q = p (2u + p).
     """
     for i in range(m):
         x0, u, p, w_pi, h = w[X + i], w[U + i], w[P + i], w[PI + i], w[H + i]
@@ -261,8 +268,8 @@ def _curvature(g, w, t, rows, m):
 
 @njit(cache=True, error_model="numpy")
 def linearise(model, b, t, worst):
-    """Fill block b of the model at its profile and multipliers; `t` is room for `PASSING`, `worst` (LANES,) grows to the defect of the
-    dynamics, as a speed."""
+    """Fill block b of the model at its profile and multipliers; `t` is room for `PASSING`, `worst` (LANES,)
+    grows to the defect of the dynamics, as a speed."""
     g, w, rows = model.grid[b], model.work[b], model.rows[b]
     m, axes, of_axis = min(LANES, model.n - b * LANES), model.axes, 3 + model.jumps
     kinematics(g, w, t, worst, m)

@@ -1,8 +1,9 @@
 """The settings of the interior-point method of interior_point.py: one record, the same for every problem.
 
-"Iterations" below are those of 156 problems, 150 of benchmarks/solvers/jerk_campaign.py and three jobs, in windows of 1,000
-intervals, with one number changed at a time: 3889 with the numbers as they are. None is critical: of 38 other values that were
-tried only a first barrier of 3 and a defect of 1e-7 left problems without a solution.
+"Iterations" below are those of 156 problems, 150 of benchmarks/solvers/jerk_campaign.py and three jobs, in
+windows of 1,000 intervals, with one number changed at a time: 3889 with the numbers as they are. None is
+critical: of 38 other values that were tried only a first barrier of 3 and a defect of 1e-7 left problems
+without a solution.
 """
 
 from __future__ import annotations
@@ -17,30 +18,38 @@ class InteriorPointSettings(NamedTuple):
     """Numbers without a unit; the problem's units are scaled to fastest feed 1 and largest acceleration 1.
 
     Start
-    slack_min       : smallest of the first slacks; smaller ones block the way of a start that violates other rows (0.03: 4063)
-    start_gap       : the first barrier, complementarity of every row per time. Larger than this the first steps leave the start, one
-                      problem then fails (3: 4524); smaller, slacks that must grow cannot (0.03: 4242)
+    slack_min       : smallest of the first slacks; smaller ones block the way of a start that violates other
+                      rows (0.03: 4063)
+    start_gap       : the first barrier, complementarity of every row per time. Larger than this the first
+                      steps leave the start, one problem then fails (3: 4524); smaller, slacks that must grow
+                      cannot (0.03: 4242)
 
     End
-    residual        : of the rows, as a fraction of the limits; what is left is removed by slowing down, so that it is far below `tol`
-                      (1e-5: 4 % fewer iterations, but multipliers whose sum was 0.7 % off on a job of two windows)
-    defect          : of the kinematics, as a fraction of the largest feed. Nothing removes it, and starts must have no more of it
-                      either: from 1e-7 windows behind motion begin to fail (1e-7: 4922)
-    gap_floor       : the barrier stays above this fraction of the gap that is asked for; below, iterations gain nothing (1e-3: 4034)
+    residual        : of the rows, as a fraction of the limits; what is left is removed by slowing down, so
+                      that it is far below `tol` (1e-5: 4 % fewer iterations, but multipliers whose sum was
+                      0.7 % off on a job of two windows)
+    defect          : of the kinematics, as a fraction of the largest feed. Nothing removes it, and starts
+                      must have no more of it either: from 1e-7 windows behind motion begin to fail (1e-7:
+                      4922)
+    gap_floor       : the barrier stays above this fraction of the gap that is asked for; below, iterations
+                      gain nothing (1e-3: 4034)
 
     Steps
-    to_boundary     : fraction of the way to the nearest slack or multiplier of zero that a step may take; the usual one (0.9: 4311)
-    domain_edge     : fraction of the kinematics' domain that a step may reach; the rows ask for less (rows.DOMAIN), so that no
-                      solution lies here
+    to_boundary     : fraction of the way to the nearest slack or multiplier of zero that a step may take; the
+                      usual one (0.9: 4311)
+    domain_edge     : fraction of the kinematics' domain that a step may reach; the rows ask for less
+                      (rows.DOMAIN), so that no solution lies here
     shortening      : of a step that leaves the domain, until it does not
     shortest        : steps are not shortened below this; the next model is another one
     feed_sq_shrink  : largest fraction of x that one step may take away: x stays positive
 
     Barrier
-    sigma_max       : the barrier falls by at least this factor; without it one that the predictor cannot lower would stay for ever
-    predicted_min   : a predictor step shorter than this says nothing about second-order terms. Without these terms: 5276
-    change_max      : while some x changes by more than this fraction the barrier stays: far from the solution it must not fall first.
-                      Without: 3752, but one profile is 1.3e-4 slower
+    sigma_max       : the barrier falls by at least this factor; without it one that the predictor cannot
+                      lower would stay for ever
+    predicted_min   : a predictor step shorter than this says nothing about second-order terms. Without these
+                      terms: 5276
+    change_max      : while some x changes by more than this fraction the barrier stays: far from the solution
+                      it must not fall first. Without: 3752, but one profile is 1.3e-4 slower
 
     Curvature
     fraction_less   : factor on the fraction of the curvature that counts, until the model is convex
@@ -48,7 +57,8 @@ class InteriorPointSettings(NamedTuple):
 
     Giving up
     stall_step      : steps shorter than this ...
-    stall_rounds    : ... so often in a row lead nowhere: another start is better than the rest of the iterations (never: 4091)
+    stall_rounds    : ... so often in a row lead nowhere: another start is better than the rest of the
+                      iterations (never: 4091)
     """
 
     slack_min: float = 0.3

@@ -1,6 +1,7 @@
 """By how much a profile has to be slower to keep its limits at the grid points.
 
-Slower by a factor is speeds over it, accelerations over its square and jerks over its cube, on kinematics that stay exact.
+Slower by a factor is speeds over it, accelerations over its square and jerks over its cube, on kinematics
+that stay exact.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from planner.feedrate.jerk.rows import duration
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def slower_by(columns, begin, x, u, jerk, room):
-    """The smallest factor >= 1 by which a profile over points from `begin` on has to be slower to keep every limit times `room` at the
-    points, the feed, and both ends of the intervals, acceleration and jerk.
+    """The smallest factor >= 1 by which a profile over points from `begin` on has to be slower to keep every
+    limit times `room` at the points, the feed, and both ends of the intervals, acceleration and jerk.
 
     x, u : (N+1,)
     jerk : (N,)

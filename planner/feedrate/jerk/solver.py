@@ -1,35 +1,41 @@
-"""Own kernel for the jerk-limited problem: an interior-point method with a Riccati recursion, linear in the grid.
+"""Own kernel for the jerk-limited problem: an interior-point method with a Riccati recursion, linear in the
+grid.
 
 Minimise the time subject to all second-order limits of `FeedrateProblem` and to the axis jerks
 
     | r'_k j + 3 r''_k v u + r'''_k v^3 | <= j_k                      at both ends of every interval,
 
-with constant jerk j along the path on every interval, the same transcription as nlp.py, so that both can be compared on one grid.
-One window's problem is in window.py, its second-order model in rows.py, the step in interior_point.py. One iteration models
-the Lagrangian at the current profile, minimises the barrier problem's linear-quadratic model exactly and goes as far as slacks,
-multipliers and kinematics stay in their domains. 15 to 25 iterations, whatever the size.
+with constant jerk j along the path on every interval, the same transcription as nlp.py, so that both can be
+compared on one grid. One window's problem is in window.py, its second-order model in rows.py, the step in
+interior_point.py. One iteration models the Lagrangian at the current profile, minimises the barrier problem's
+linear-quadratic model exactly and goes as far as slacks, multipliers and kinematics stay in their domains. 15
+to 25 iterations, whatever the size.
 
-**Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is long beside that. Each
-window ends in a full stop, which is only there to end it. The part of the window that the stop cannot influence is kept, up to three
-braking distances before it, and the next window starts from the state reached there, at a point where the costate of the kinematics
-says that more speed would help (chain.py). A start during hard braking into a bend would leave a problem with hardly any feasible
-points, and multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that of one window
-per thread.
+**Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is
+long beside that. Each window ends in a full stop, which is only there to end it. The part of the window that
+the stop cannot influence is kept, up to three braking distances before it, and the next window starts from
+the state reached there, at a point where the costate of the kinematics says that more speed would help
+(chain.py). A start during hard braking into a bend would leave a problem with hardly any feasible points, and
+multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that
+of one window per thread.
 
-**Held ranges.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py). That divides a piece
-into parts with given feeds at their ends.
+**Held ranges.** Where nothing but the bound of the feed can hold the motion it is not solved for (held.py).
+That divides a piece into parts with given feeds at their ends.
 
-**Threads.** Parts are independent, and a long one is solved from both of its ends (part.py). What can be done side by side is, on as
-many cores as planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on any number.
+**Threads.** Parts are independent, and a long one is solved from both of its ends (part.py). What can be done
+side by side is, on as many cores as planner/base/threads.py says; the kernels let go of Python's lock. The
+solution is the same, byte by byte, on any number.
 
-**Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into smaller ones if it starts
-at rest; else, or where even that fails, the profile stops: at the end of the window before, if the motion comes from there, or after
-the plain start, which always keeps the limits. The solution's status is then ACCEPTABLE, and its sentence names the places.
-Of 16,390 windows of small problems (benchmarks/solvers/jerk_campaign.py) 19 converged from the plain start only, and 7 from none.
+**Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into
+smaller ones if it starts at rest; else, or where even that fails, the profile stops: at the end of the window
+before, if the motion comes from there, or after the plain start, which always keeps the limits. The
+solution's status is then ACCEPTABLE, and its sentence names the places. Of 16,390 windows of small problems
+(benchmarks/solvers/jerk_campaign.py) 19 converged from the plain start only, and 7 from none.
 
-**Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece down by lam >= 1
-divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics exact; with the smallest lam that
-satisfies every row the profile is feasible, always. Its cost, lam - 1, is in the sentence of the solution.
+**Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece
+down by lam >= 1 divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics
+exact; with the smallest lam that satisfies every row the profile is feasible, always. Its cost, lam - 1, is
+in the sentence of the solution.
 """
 
 from __future__ import annotations
@@ -115,8 +121,9 @@ class JerkLimited(WindowSettings):
     def _solve_pieces(
         self, ends: list[tuple[int, int]], task: Callable[..., Task], counted: _Counted
     ) -> list[Solved]:
-        """Solve the pieces of these first points and points behind the last, on several cores if it is worth it. Long ones come first,
-        as many at a time as there are threads for their two ends: each takes a third of a kilobyte a point while it is being solved."""
+        """Solve the pieces of these first points and points behind the last, on several cores if it is worth
+        it. Long ones come first, as many at a time as there are threads for their two ends: each takes a
+        third of a kilobyte a point while it is being solved."""
         order = sorted(range(len(ends)), key=lambda g: ends[g][0] - ends[g][1])
         long = sum(beyond - 1 - first > LONG * self.window for first, beyond in ends)
         at_once = max(threads() // 2, 1)
@@ -131,9 +138,10 @@ class JerkLimited(WindowSettings):
     def again(
         self, before: FeedrateProblem, known: FeedrateSolution, problem: FeedrateProblem
     ) -> tuple[FeedrateProblem, FeedrateSolution] | None:
-        """The solution of a problem that differs from the one `before` in the scales of its limits, a little and at few points, from
-        that one's solution `known` (again.py): with the problem itself, whose scales are those of before where no solution was found;
-        None where limits changed by so much that all has to be solved."""
+        """The solution of a problem that differs from the one `before` in the scales of its limits, a little
+        and at few points, from that one's solution `known` (again.py): with the problem itself, whose scales
+        are those of before where no solution was found; None where limits changed by so much that all has to
+        be solved."""
         began = time.perf_counter()
         change = problem.limit_scale / before.limit_scale
         if known.multipliers is None or np.abs(change - 1.0).max() > CHANGE_MAX:
@@ -188,8 +196,8 @@ def _ranges_again(
     task: Callable[..., Task],
     counted: _Counted,
 ) -> tuple[list[RangeAgain], list[Range]]:
-    """Solve ranges again, and wider ones where they have no solution (again.py): what was tried, and the ranges that keep their
-    profile."""
+    """Solve ranges again, and wider ones where they have no solution (again.py): what was tried, and the
+    ranges that keep their profile."""
     work = [RangeAgain(task(first=own.first, last=own.last)) for own in ranges]
     _do([(one.last - one.first, one) for one in work], counted)
     failed = [own for own, one in zip(ranges, work, strict=True) if not one.solved]
@@ -209,7 +217,8 @@ def _ranges_again(
 
 
 def _whole_pieces(problem: FeedrateProblem, ranges: list[Range]) -> tuple[list[tuple[int, int]], list[Range]]:
-    """Pieces, first points and points behind the last, of which the ranges are more than `SHARE_MAX`; and the ranges of the others."""
+    """Pieces, first points and points behind the last, of which the ranges are more than `SHARE_MAX`; and the
+    ranges of the others."""
     piece = problem.piece
     of = np.searchsorted(piece, [own.first for own in ranges], side="right") - 1
     size = np.bincount(of, [own.last - own.first for own in ranges], len(piece) - 1)

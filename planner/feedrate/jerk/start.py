@@ -2,14 +2,17 @@
 
 `envelope` is what the solver starts from, turned into a motion where that is found (track.py):
 
-1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k, nor of what axis jerks
+1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k,
+         nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
-2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share of the jerk, up to a share
+2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share
+of the jerk, up to a share
    of the acceleration. Near rest that is s = j t^3/6.
 
-`plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that acceleration for about
-a quarter of the way, constant speed after one interval of transition, and the same backwards from the end. Every interval has
-constant jerk, so that the kinematics are exact, and slowed down enough it keeps any limits.
+`plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that
+acceleration for about a quarter of the way, constant speed after one interval of transition, and the same
+backwards from the end. Every interval has constant jerk, so that the kinematics are exact, and slowed down
+enough it keeps any limits.
 """
 
 from __future__ import annotations
@@ -19,8 +22,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 
-# Fractions of the limits, so that a start lies inside them and yet is fast [-]: half or nearly twice of any of these five changes the
-# iterations by no more than 4 % (settings.py: on which problems).
+# Fractions of the limits, so that a start lies inside them and yet is fast [-]: half or nearly twice of any
+# of these five changes the iterations by no more than 4 % (settings.py: on which problems).
 ACCELERATION_SHARE = 0.4  # of the axis accelerations, for speeding up and braking
 NORMAL_SHARE = 0.7  # of the axis accelerations, for the caps
 JERK_SHARE = 0.5  # of the axis jerks, for the caps and the first motion from rest
@@ -61,9 +64,10 @@ def envelope(columns, begin, end):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def envelope_profile(x, s):
-    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over the points s of n >= 4 intervals, in any units:
-    harmonic means of the accelerations on both sides, none where they differ in sign (central differences overshoot where intervals
-    grow), and constant jerk on the first and the last interval, with no more of it than the next interval can take back."""
+    """Feed^2 and acceleration (n + 1,) of a motion close to the envelope x over the points s of n >= 4
+    intervals, in any units: harmonic means of the accelerations on both sides, none where they differ in sign
+    (central differences overshoot where intervals grow), and constant jerk on the first and the last
+    interval, with no more of it than the next interval can take back."""
     n = len(x) - 1
     x, u = x.copy(), np.zeros(n + 1)
     first, last = s[1] - s[0], s[n] - s[n - 1]
@@ -80,7 +84,8 @@ def envelope_profile(x, s):
 
 
 def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with fastest speed 1."""
+    """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with
+    fastest speed 1."""
     n = len(s) - 1
     x, u = np.zeros(n + 1), np.zeros(n + 1)
     tops = []
@@ -104,8 +109,8 @@ def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @njit(cache=True, error_model="numpy")
 def _growing(caps, rate, jerk, s, way):
-    """The largest x (N+1,) below the caps that grows, forward (way 1) or backward (-1), with no more than a jerk from u = 0 up to an
-    acceleration: from every dip like a motion that starts there."""
+    """The largest x (N+1,) below the caps that grows, forward (way 1) or backward (-1), with no more than a
+    jerk from u = 0 up to an acceleration: from every dip like a motion that starts there."""
     n = len(s) - 1
     x = caps.copy()
     i, u = (0, 0.0) if way > 0 else (n, 0.0)

@@ -1,5 +1,5 @@
-"""Profiles on exact kinematics, near one whose kinematics are not: what the interior-point method starts from, and its result
-polished."""
+"""Profiles on exact kinematics, near one whose kinematics are not: what the interior-point method starts
+from, and its result polished."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from planner.feedrate.jerk.rows import PASSING, kinematics
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def track(blocks, jerk, smoothing, rounds, defect_max, settings):
-    """A motion on exact kinematics, not far from the x of the profile in `blocks`, in its place: Gauss-Newton on the time integral of
-    (dx/x)^2 J + j^2/J, with the jerk j of the result and a jerk J of the machine's size; without smoothing, j is the change of the
-    jerk. Both ends stay.
+    """A motion on exact kinematics, not far from the x of the profile in `blocks`, in its place: Gauss-Newton
+    on the time integral of (dx/x)^2 J + j^2/J, with the jerk j of the result and a jerk J of the machine's
+    size; without smoothing, j is the change of the jerk. Both ends stay.
 
     rounds     : at most
     defect_max : that it ends with, if it gets there

@@ -1,8 +1,9 @@
-"""One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point kernel, to its result.
+"""One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point
+kernel, to its result.
 
-A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the envelope tracked by a motion,
-where that is found, then from the envelope itself, whose kinematics are not exact, and then from the plain start as fast as the
-envelope (start.py).
+A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the
+envelope tracked by a motion, where that is found, then from the envelope itself, whose kinematics are not
+exact, and then from the plain start as fast as the envelope (start.py).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 from planner.feedrate.jerk.track import track
 
-# A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6 % more iterations) ...
+# A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6
+# % more iterations) ...
 START_ROOM = 0.9
 # ... if it takes no more than this slowing down [-]; from too slow a profile the way is as long as from outside the limits.
 SLOWER_MAX = 2.0
@@ -59,7 +61,8 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Window:
-    """The profile of a window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in `Multipliers`."""
+    """The profile of a window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in
+    `Multipliers`."""
 
     x: FloatArray
     u: FloatArray
@@ -133,15 +136,15 @@ class ScaledWindow:
         )
 
     def solve(self, behind: Way | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
-        """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that does not converge.
-        Also the iterations of the longest try, and from how many starts it was tried."""
+        """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that
+        does not converge. Also the iterations of the longest try, and from how many starts it was tried."""
         return self._from(self._starts(behind), tol, iterations)
 
     def between(
         self, left: Way | None, right: Way, tol: float, iterations: int
     ) -> tuple[Window | None, int, int]:
-        """The fastest profile between two ways to rest, `left` from the window's first point on, None from rest, and `right` from its
-        last point on, backward; as `solve`."""
+        """The fastest profile between two ways to rest, `left` from the window's first point on, None from
+        rest, and `right` from its last point on, backward; as `solve`."""
         return self._from(self._starts(left, right), tol, iterations)
 
     def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
@@ -162,8 +165,8 @@ class ScaledWindow:
         return self._without_multipliers()
 
     def near(self, x: FloatArray, u: FloatArray) -> Window | None:
-        """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to rest; None where there is
-        none. It may exceed its limits a little, and has no multipliers."""
+        """The motion with exact kinematics near a profile x, u (N+1,) in the problem's units, from rest to
+        rest; None where there is none. It may exceed its limits a little, and has no multipliers."""
         put(self.blocks, x / self.feed**2, u * self.time / self.feed)
         if self._track(0.0, TRACKING_ROUNDS, POLISHED) > self.settings.defect:
             return None
@@ -198,7 +201,8 @@ class ScaledWindow:
         yield self._slowed(*self._plain(near[0].max()), SLOWER_MAX)
 
     def _joined(self, way: Way, x: FloatArray, u: FloatArray) -> Way:
-        """A profile from rest put behind a way in the problem's units, which leads to the last point where it is faster."""
+        """A profile from rest put behind a way in the problem's units, which leads to the last point where it
+        is faster."""
         ahead, rate = way.x[: len(x)] / self.feed**2, way.u * self.time / self.feed
         beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
         return Way(np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:]))
@@ -219,7 +223,8 @@ class ScaledWindow:
         return Way(fastest * x, fastest * u)
 
     def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
-        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times slower."""
+        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times
+        slower."""
         feed_sq, rate = x * self.feed**2, u * self.feed / self.time
         jerk = jerk_of(self.s, feed_sq, rate)
         slower = min(float(slower_by(self.columns, self.begin, feed_sq, rate, jerk, START_ROOM)), most)
@@ -253,7 +258,8 @@ def _mirrored(x: FloatArray, u: FloatArray) -> Way:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _found(blocks):
-    """Jerk and duration (N,) of the intervals, and the multipliers of rows (N, A, 4), feed (N, 2) and dynamics (N,), scaled."""
+    """Jerk and duration (N,) of the intervals, and the multipliers of rows (N, A, 4), feed (N, 2) and
+    dynamics (N,), scaled."""
     n, of_axis = blocks.n, 3 + blocks.jumps
     count = rows_of(blocks.axes, blocks.jumps)
     jerk, times, dynamics = np.empty(n), np.empty(n), np.empty(n)

@@ -1,14 +1,18 @@
-"""From a profile of another transcription to one that can be delivered: constant jerk in time on every interval, within all limits.
+"""From a profile of another transcription to one that can be delivered: constant jerk in time on every
+interval, within all limits.
 
-A solution in the path domain (sequential_convex.py) has a jerk that varies on its intervals. Two steps make a motion of it:
+A solution in the path domain (sequential_convex.py) has a jerk that varies on its intervals. Two steps make a
+motion of it:
 
-1. The nearest profile with constant jerk on every interval and exact kinematics, by least squares over time (`ScaledWindow.near`).
-2. Every piece is slowed down until all limits hold at its grid points. Slower by lam is a speed over lam, an acceleration over lam^2
+1. The nearest profile with constant jerk on every interval and exact kinematics, by least squares over time
+(`ScaledWindow.near`). 2. Every piece is slowed down until all limits hold at its grid points. Slower by lam
+is a speed over lam, an acceleration over lam^2
    and a jerk over lam^3, so the largest ratio to a limit says by how much.
 
-On the grids of the planner that costs some 0.1 to 1 % of the time, more where few points carry a motion that jerk limits all the way;
-it is in the sentence. The multipliers stay those of the other transcription, which has the same limits: they differ from
-those of the delivered profile by what the transcriptions differ, and the prices made of them too.
+On the grids of the planner that costs some 0.1 to 1 % of the time, more where few points carry a motion that
+jerk limits all the way; it is in the sentence. The multipliers stay those of the other transcription, which
+has the same limits: they differ from those of the delivered profile by what the transcriptions differ, and
+the prices made of them too.
 """
 
 from __future__ import annotations
@@ -41,7 +45,8 @@ class ExactMotion:
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the status of the whole."""
+        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the
+        status of the whole."""
         began = time.perf_counter()
         found = self.solver.solve(problem, progress)
         if not found.solved:
@@ -67,18 +72,20 @@ class ExactMotion:
 
 
 def polished(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:
-    """A profile whose kinematics hold to a solver's tolerance, made exact, and slower by what limits it then exceeds; as it is where
-    there is no such profile near.
+    """A profile whose kinematics hold to a solver's tolerance, made exact, and slower by what limits it then
+    exceeds; as it is where there is no such profile near.
 
-    ipopt leaves 2e-7 mm/s between the speeds at a point. On the intervals of a um beside a jump of a limit of one's own, differences of
-    the positions then show 8 % more jerk than there is; this costs 1e-8 of the time.
+    ipopt leaves 2e-7 mm/s between the speeds at a point. On the intervals of a um beside a jump of a limit of
+    one's own, differences of the positions then show 8 % more jerk than there is; this costs 1e-8 of the
+    time.
     """
     exact = with_exact_kinematics(problem, solution)
     return solution if exact is None else slowed_to_limits(problem, exact)
 
 
 def with_exact_kinematics(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution | None:
-    """The profile nearest to a solution whose jerk is constant on every interval; None where there is none."""
+    """The profile nearest to a solution whose jerk is constant on every interval; None where there is
+    none."""
     limits, room = columns_of(problem), Room()
     columns: list[FloatArray] = []
     for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):

@@ -20,7 +20,8 @@ class IntervalShape:
     """How u goes from 0 to 1 on each of n intervals, over the share of the interval.
 
     mean                   : (n,)
-    integrals              : (nodes, n) of the shape, from the start of the interval to the nodes of Gauss's rule
+    integrals              : (nodes, n) of the shape, from the start of the interval to the nodes of Gauss's
+                             rule
     slope_start, slope_end : (n,) where an interval touches rest, the one there is infinite and not used
     """
 
@@ -31,7 +32,8 @@ class IntervalShape:
 
     @classmethod
     def of(cls, s: FloatArray) -> IntervalShape:
-        """The shapes on a grid s (n+1,) [mm] from rest to rest: cube roots near its ends (sequential_convex.py), linear elsewhere."""
+        """The shapes on a grid s (n+1,) [mm] from rest to rest: cube roots near its ends
+        (sequential_convex.py), linear elsewhere."""
         ds = np.diff(s)
         back = s[-1] - s[1:] < s[:-1] - s[0]  # nearer to the last point: the mirror image
         away = np.where(back, s[-1] - s[1:], s[:-1] - s[0]) / ds
@@ -55,8 +57,9 @@ class IntervalShape:
 
 
 def beside_rest(problem: FeedrateProblem, rest: int, step: int) -> tuple[float, tuple[int, int]]:
-    """Largest x at the point before or after a rest, what the jerks on the interval between them allow (sequential_convex.py); also the
-    axis of the jerk that says so, and its row in `Multipliers.rows`: 1 at the start of the interval, 2 at its end."""
+    """Largest x at the point before or after a rest, what the jerks on the interval between them allow
+    (sequential_convex.py); also the axis of the jerk that says so, and its row in `Multipliers.rows`: 1 at
+    the start of the interval, 2 at its end."""
     beside = rest + step
     d = abs(problem.s[beside] - problem.s[rest])
     d2 = problem.d2_left[beside] if step > 0 else problem.d2_right[beside]

@@ -1,7 +1,9 @@
-"""The reference solver of the jerk-limited feedrate problem: one nonlinear program per piece, for ipopt or fatrop through casadi.
+"""The reference solver of the jerk-limited feedrate problem: one nonlinear program per piece, for ipopt or
+fatrop through casadi.
 
-Every interval of a piece has constant jerk j_i along the path and a duration h_i; every point a feed v_i and an acceleration a_i.
-The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) needs no trick:
+Every interval of a piece has constant jerk j_i along the path and a duration h_i; every point a feed v_i and
+an acceleration a_i. The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) needs no
+trick:
 
     minimise   T = sum_i h_i
     subject to v_{i+1} = v_i + a_i h_i + j_i h_i^2/2,     a_{i+1} = a_i + j_i h_i
@@ -10,32 +12,38 @@ The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) n
     and at both ends of every interval (r', r'', r''' of that side; jerk of that interval), for every axis k
                | r'_k a + r''_k v^2 |                     <= a_k (1 - margin_i)
                | r'_k j + 3 r''_k v a + r'''_k v^3 |      <= j_k
-               v = sqrt(feed_sq_start), sqrt(feed_sq_end) at the ends; a = 0 where that is rest, free where it is not
-               (a piece that starts in motion continues something whose acceleration the problem does not know).
+               v = sqrt(feed_sq_start), sqrt(feed_sq_end) at the ends; a = 0 where that is rest, free where it
+               is not (a piece that starts in motion continues something whose acceleration the problem does
+               not know).
 
-The row v + a h/2 keeps the feed within its bounds between the points as well: v(t) is a parabola whose Bezier ordinates are v_i,
-v_i + a_i h_i/2 and v_{i+1}. Without it, coarse grids overshoot the programmed feed where the acceleration ends (0.2 % of the time
-of a line of 100 mm). It costs nothing where a ramp of constant jerk ends in a constant feed: there all ordinates are on the bound.
+The row v + a h/2 keeps the feed within its bounds between the points as well: v(t) is a parabola whose Bezier
+ordinates are v_i, v_i + a_i h_i/2 and v_{i+1}. Without it, coarse grids overshoot the programmed feed where
+the acceleration ends (0.2 % of the time of a line of 100 mm). It costs nothing where a ramp of constant jerk
+ends in a constant feed: there all ordinates are on the bound.
 
-So that all rows of a point depend on that point alone, as fatrop's stages ask for, the jerk of the interval to its left is a state
+So that all rows of a point depend on that point alone, as fatrop's stages ask for, the jerk of the interval
+to its left is a state
 of the point as well. A stage is the state (v, a, j_left), the control (j, h), and the gap  state_{i+1} - f(state_i, control_i) = 0;
-fatrop's interface wants exactly this sign and order (gap rows of a stage, then its other rows), ipopt does not mind.
+fatrop's interface wants exactly this sign and order (gap rows of a stage, then its other rows), ipopt does
+not mind.
 
-Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same optimum. Every
-row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed duration 1), so that the iterates do not
-depend on the unit of length or time.
+Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same
+optimum. Every row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed
+duration 1), so that the iterates do not depend on the unit of length or time.
 
-The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices, reshaping and sensitivities need
-not know who solved the problem. Rows of axis limits are the same there; a bound on v is one on x = v^2, with half of its multiplier
-when both count relative changes. The kernel's only equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e
-in it shifts v_{i+1} by e/(2 vm), vm = (v_i + v_{i+1})/2, and the length of the interval by h e/(4 vm), so that with the multipliers
-nu_v of v's gap and nu_s of the row of ds_i
+The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices,
+reshaping and sensitivities need not know who solved the problem. Rows of axis limits are the same there; a
+bound on v is one on x = v^2, with half of its multiplier when both count relative changes. The kernel's only
+equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e in it shifts v_{i+1} by e/(2
+vm), vm = (v_i + v_{i+1})/2, and the length of the interval by h e/(4 vm), so that with the multipliers nu_v
+of v's gap and nu_s of the row of ds_i
 
     pi = dT/de = (nu_s h/(2 ds) - nu_v) / (2 vm).
 
-Costs 1-5 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface grows with the square of
-the points and costs more than it saves above a few hundred (docs/methods.md has the numbers).
-References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023, arXiv 2303.16746 (fatrop).
+Costs 1-5 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface
+grows with the square of the points and costs more than it saves above a few hundred (docs/methods.md has the
+numbers). References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023,
+arXiv 2303.16746 (fatrop).
 """
 
 from __future__ import annotations
@@ -62,12 +70,13 @@ from planner.feedrate.reference.piecewise import (
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# The guess is the second-order optimum, everywhere this much slower [-]. Of 0.3 to 1, and of optima at a third or a tenth of the
-# acceleration, the best by iterations (23-41); all of them lead to the same optimum.
+# The guess is the second-order optimum, everywhere this much slower [-]. Of 0.3 to 1, and of optima at a
+# third or a tenth of the acceleration, the best by iterations (23-41); all of them lead to the same optimum.
 SLOWER = 0.7
 # Largest violation of a scaled row or bound that a solution may have [-].
 VIOLATION_MAX = 1e-6
-# Grid points of the largest problem that is tried: one that takes about a minute (benchmarks/results/solver-sizes.md).
+# Grid points of the largest problem that is tried: one that takes about a minute
+# (benchmarks/results/solver-sizes.md).
 POINTS_MAX = {"ipopt": 20_000, "fatrop": 5_000}
 # Residual of ipopt's rows [-]; its default of 1e-4 leaves ratios to the limits of 1 + 1e-5 on long pieces.
 FEASIBILITY = 1e-8
@@ -117,8 +126,8 @@ class JerkLimitedNLP:
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status of the whole. From rest
-        to rest its kinematics are exact."""
+        """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status
+        of the whole. From rest to rest its kinematics are exact."""
         began = time.perf_counter()
         most = POINTS_MAX[self.solver] if self.points_max is None else self.points_max
         if len(problem) > most:
@@ -150,7 +159,8 @@ def _solve_piece(
     if v_start == 0.0 and v_end == 0.0 and intervals < INTERVALS_MIN:
         return too_few(intervals)
 
-    # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
+    # ---- scaling: units in which the mean interval and its guessed duration are 1
+    # --------------------------------------------
     h_guess = guess.duration[here][:-1] / SLOWER
     lasts = np.isfinite(h_guess)  # not where the guess stands still at both ends of a tiny interval
     slow = ds / np.sqrt(
@@ -160,14 +170,17 @@ def _solve_piece(
     length, second = ds.mean(), h_guess.mean()
     speed, acc, jerk = length / second, length / second**2, length / second**3
 
-    # ---- variables: state (v, a, j_left) and control (j, h) of each point; the last has no control ----------------------------
+    # ---- variables: state (v, a, j_left) and control (j, h) of each point; the last has no control
+    # ----------------------------
     w = ca.MX.sym("w", 5 * points - 2)
     stages = ca.reshape(ca.vertcat(w, ca.DM.zeros(2)), 5, points)
 
-    # ---- objective ------------------------------------------------------------------------------------------------------------
+    # ---- objective
+    # ------------------------------------------------------------------------------------------------------------
     total = ca.sum2(stages[4, :])
 
-    # ---- dynamics and constraints of one stage; its numbers are parameters ----------------------------------------------------
+    # ---- dynamics and constraints of one stage; its numbers are parameters
+    # ----------------------------------------------------
     v, a, j_left, j, h, ds_i, cap_i = (
         ca.SX.sym(name) for name in ("v", "a", "j_left", "j", "h", "ds", "cap")
     )
@@ -179,7 +192,8 @@ def _solve_piece(
     numbers = ca.vertcat(ds_i, cap_i, *(ca.vec(c) for c in rows_of))
     stage = ca.Function("stage", [ca.vertcat(v, a, j_left, j, h), numbers], [following, ca.vertcat(*rows)])
 
-    # ---- constraints of all stages, in stage order; the last one has no interval ----------------------------------------------
+    # ---- constraints of all stages, in stage order; the last one has no interval
+    # ----------------------------------------------
     feed_max = np.sqrt(problem.feed_sq_limit[here])
     cap = (feed_max[:-1] + feed_max[1:]) / 2  # of v + a h/2
     data = _stage_numbers(problem, here, ds / length, cap / speed, speed, acc, jerk)
@@ -192,14 +206,16 @@ def _solve_piece(
     lower[:, 0], upper[:, 0] = 0.0, feed_max / speed
     lower[:, 4] = 0.0
 
-    # ---- boundary -------------------------------------------------------------------------------------------------------------
+    # ---- boundary
+    # -------------------------------------------------------------------------------------------------------------
     for end, v_there in ((0, v_start), (-1, v_end)):
         lower[end, 0] = upper[end, 0] = v_there / speed
         if v_there == 0.0:
             lower[end, 1] = upper[end, 1] = 0.0
     lower[0, 2] = upper[0, 2] = 0.0  # nothing to the left of the first point
 
-    # ---- initial guess: the second-order optimum, slower; its acceleration made continuous ------------------------------------
+    # ---- initial guess: the second-order optimum, slower; its acceleration made continuous
+    # ------------------------------------
     start = np.zeros((points, 5))
     start[:, 0] = np.sqrt(guess.feed_sq[here]) * SLOWER / speed
     u = guess.acc_s[here][:-1] * SLOWER**2 / acc
@@ -207,7 +223,8 @@ def _solve_piece(
     start[:-1, 4] = h_guess / second
     start[:-1, 3] = start[1:, 2] = np.diff(start[:, 1]) / start[:-1, 4]
 
-    # ---- solve ----------------------------------------------------------------------------------------------------------------
+    # ---- solve
+    # ----------------------------------------------------------------------------------------------------------------
     program = {"x": w, "f": total, "g": constraints}
     solver = ca.nlpsol(
         "solver", settings.solver, program, _options(settings, points, row_max == 0.0, 4 * axes + 2)
@@ -227,14 +244,16 @@ def _solve_piece(
     if status not in (Status.OPTIMAL, Status.ACCEPTABLE):
         return Found(status=status, sentence=sentence, iterations=iterations)
 
-    # ---- unpack ---------------------------------------------------------------------------------------------------------------
+    # ---- unpack
+    # ---------------------------------------------------------------------------------------------------------------
     found = np.append(result["x"], [0.0, 0.0]).reshape(points, 5)
     v, h = found[:, 0], found[:, 4]
     profile = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]
     profile[:, 0] = np.clip(profile[:, 0], 0.0, feed_max)
     profile[[0, -1], 0] = v_start, v_end
 
-    # ---- multipliers, in time [s]: gaps of v, a, j_left; length; feed between the points; then right and left of the point ------
+    # ---- multipliers, in time [s]: gaps of v, a, j_left; length; feed between the points; then right and
+    # left of the point ------
     lam = second * np.insert(result["lam_g"], -4 * axes, np.zeros(5)).reshape(points, -1)
     of_speed = second * np.maximum(np.append(result["lam_x"], [0.0, 0.0]).reshape(points, 5)[:, 0], 0.0)
     of_speed[[0, -1]] = 0.0  # given, not limited
@@ -265,8 +284,9 @@ def _stage_numbers(
     acc: float,
     jerk: float,
 ) -> FloatArray:
-    """(n, 2 + 10 A) what a stage needs to know: length and cap of its interval, then for the right and the left side the factors
-    of a, v^2 (acceleration) and j, v a, v^3 (jerk), all rows as shares of their limits; 0 on the side where a piece ends."""
+    """(n, 2 + 10 A) what a stage needs to know: length and cap of its interval, then for the right and the
+    left side the factors of a, v^2 (acceleration) and j, v a, v^3 (jerk), all rows as shares of their limits;
+    0 on the side where a piece ends."""
     d1 = problem.d1[here]
     acceleration, jerk_limit = problem.acceleration_limit[here], problem.jerk_limit[here]
     room = 1.0 - problem.margin[here, None]

@@ -1,4 +1,5 @@
-"""Common to the reference solvers: the jerk-limited problem falls into pieces between prescribed speeds, solved one by one."""
+"""Common to the reference solvers: the jerk-limited problem falls into pieces between prescribed speeds,
+solved one by one."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ INTERVALS_MIN = 3
 class Found:
     """The n points of a piece, or of all pieces; `iterations`: the most of any piece.
 
-    columns : (n, 7 + 4 A) feed_sq, acc_s, jerk_s and duration, then the multipliers: feed (2), dynamics (1) and rows (A x 4) of
-              `Multipliers`; None on failure
+    columns : (n, 7 + 4 A) feed_sq, acc_s, jerk_s and duration, then the multipliers: feed (2), dynamics (1)
+              and rows (A x 4) of `Multipliers`; None on failure
     """
 
     status: Status
@@ -76,7 +77,8 @@ def solve_pieces(
 def solution_of(
     problem: FeedrateProblem, found: Found, solver: str, began: float, *, priced: bool
 ) -> FeedrateSolution:
-    """The values found, as a solution; `priced` where its jerk is constant on every interval, which prices are made for."""
+    """The values found, as a solution; `priced` where its jerk is constant on every interval, which prices
+    are made for."""
     took = time.perf_counter() - began
     if found.columns is None:
         return FeedrateSolution.failed(problem, found.status, found.sentence, solver, took, found.iterations)

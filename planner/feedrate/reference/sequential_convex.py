@@ -1,50 +1,60 @@
-"""The jerk-limited feedrate problem once more, in the path domain: a sequence of convex problems, for comparison with nlp.py.
+"""The jerk-limited feedrate problem once more, in the path domain: a sequence of convex problems, for
+comparison with nlp.py.
 
-Where nlp.py has time, this formulation has arc length: x = feed^2 and u = acceleration along the path at the points, w = du/ds on
-the intervals. There u goes from one point to the next along a given shape, and x with it, so that all dynamics are linear:
+Where nlp.py has time, this formulation has arc length: x = feed^2 and u = acceleration along the path at the
+points, w = du/ds on the intervals. There u goes from one point to the next along a given shape, and x with
+it, so that all dynamics are linear:
 
     minimise   T = sum_i integral over interval i of ds / sqrt(x(s))
     subject to x_{i+1} = x_i + 2 ds_i (u_i + m_i (u_{i+1} - u_i))          m_i: mean of the shape, 1/2 where w is constant
                0 <= x_i <= c_i = feed_sq_limit_i,            x_i + u_i ds_i <= (c_i + c_{i+1})/2
-    and at both ends of every interval (r', r'', r''' of that side; w there, in that interval), for every axis k
+    and at both ends of every interval (r', r'', r''' of that side; w there, in that interval), for every axis
+    k
                | r'_k u + r''_k x |                         <= a_k (1 - margin_i)
                | r'_k w + 3 r''_k u + r'''_k x | sqrt(x)    <= j_k          (the jerk along the path is w sqrt(x))
                x = u = 0 at both ends.
 
-The row x + u ds keeps the feed within its bounds between the points: where w is constant it is the middle Bezier ordinate of x(s).
-The time is convex, because x(s) is linear in the unknowns and 1/sqrt is convex; it is taken by Gauss's rule, which has positive
-weights and keeps that. Only the jerk rows are not convex. Divided by sqrt(x) they read |g| <= j x^(-1/2), and x^(-1/2), which is
-convex, lies above its tangent at the last profile X:
+The row x + u ds keeps the feed within its bounds between the points: where w is constant it is the middle
+Bezier ordinate of x(s). The time is convex, because x(s) is linear in the unknowns and 1/sqrt is convex; it
+is taken by Gauss's rule, which has positive weights and keeps that. Only the jerk rows are not convex.
+Divided by sqrt(x) they read |g| <= j x^(-1/2), and x^(-1/2), which is convex, lies above its tangent at the
+last profile X:
 
     | r'_k w + 3 r''_k u + r'''_k x |  <=  j_k X^(-1/2) (3/2 - x/(2 X))  <=  j_k x^(-1/2).
 
-Each pass solves the convex problem with the tangent. Its solution keeps the true rows. The last profile, if it keeps them, keeps
-the tangent's as well, which touches there: no pass is slower than the one before. The first X need keep nothing, because whatever
-X > 0, a profile that is slow enough obeys the tangent's rows. It is the second-order optimum.
+Each pass solves the convex problem with the tangent. Its solution keeps the true rows. The last profile, if
+it keeps them, keeps the tangent's as well, which touches there: no pass is slower than the one before. The
+first X need keep nothing, because whatever X > 0, a profile that is slow enough obeys the tangent's rows. It
+is the second-order optimum.
 
-**Rest.** With constant w a motion never leaves x = u = 0 (x = w s^2 takes forever). With constant jerk in time, s = j t^3/6, it is
+**Rest.** With constant w a motion never leaves x = u = 0 (x = w s^2 takes forever). With constant jerk in
+time, s = j t^3/6, it is
 
     u = j^(2/3) (6 s)^(1/3),     x = (3/2) u s,     duration 3 s / sqrt(x),     j = (2/(9 s^2)) x^(3/2):
 
-u is linear in the cube root of the distance from rest. So on intervals nearer to rest than `NEAR` times their length the shape is
-that of the cube root (m = 3/4 on the first), elsewhere w is constant. The dynamics stay linear, the time is exact on the first
-interval, and its jerk rows are exact bounds on the x_1 at its end, d from rest, without a tangent:
+u is linear in the cube root of the distance from rest. So on intervals nearer to rest than `NEAR` times their
+length the shape is that of the cube root (m = 3/4 on the first), elsewhere w is constant. The dynamics stay
+linear, the time is exact on the first interval, and its jerk rows are exact bounds on the x_1 at its end, d
+from rest, without a tangent:
 
     | (2/(9 d^2)) r'_0 | x_1^(3/2) <= j_k,       | (2/(9 d^2)) r' + (2/d) r'' + r''' | x_1^(3/2) <= j_k.
 
-The last interval is its mirror image (r'' has the other sign). With constant w on all intervals but the first and the last, a line
-from rest to rest, all of it limited by jerk, takes 1 to 3 % longer, and refining the grid helps only with its cube root.
+The last interval is its mirror image (r'' has the other sign). With constant w on all intervals but the first
+and the last, a line from rest to rest, all of it limited by jerk, takes 1 to 3 % longer, and refining the
+grid helps only with its cube root.
 
-**What is delivered.** A `FeedrateSolution` means constant jerk in time on every interval; here the jerk varies on it. Its
-`feed_sq`, `acc_s` and `duration` (the integral above) are those of this formulation, `jerk_s` is the time mean of the jerk on the
-interval, (u_{i+1} - u_i)/h. The rows above hold at the points to 1e-6; those of `constraint_ratios`, which takes the jerk for
-constant, do not where it varies much on an interval. Compare it, do not deliver it.
+**What is delivered.** A `FeedrateSolution` means constant jerk in time on every interval; here the jerk
+varies on it. Its `feed_sq`, `acc_s` and `duration` (the integral above) are those of this formulation,
+`jerk_s` is the time mean of the jerk on the interval, (u_{i+1} - u_i)/h. The rows above hold at the points to
+1e-6; those of `constraint_ratios`, which takes the jerk for constant, do not where it varies much on an
+interval. Compare it, do not deliver it.
 
-On one grid its optimum differs from nlp.py's by the transcription: 3 % where few intervals make a motion, half of it or less with
-each halving of the spacing, 0.01 % on fine grids. Not convex as a whole, and no certificate of a global optimum. It takes 2 to 5
-passes, each of which costs about one solution by nlp.py.
-References: Debrouwere et al. 2013, doi 10.1109/TRO.2013.2277565 (the tangent of x^(-1/2)); Verscheure et al. 2009,
-doi 10.1109/TAC.2009.2028959 (path domain); Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt).
+On one grid its optimum differs from nlp.py's by the transcription: 3 % where few intervals make a motion,
+half of it or less with each halving of the spacing, 0.01 % on fine grids. Not convex as a whole, and no
+certificate of a global optimum. It takes 2 to 5 passes, each of which costs about one solution by nlp.py.
+References: Debrouwere et al. 2013, doi 10.1109/TRO.2013.2277565 (the tangent of x^(-1/2)); Verscheure et al.
+2009, doi 10.1109/TAC.2009.2028959 (path domain); Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y
+(ipopt).
 """
 
 from __future__ import annotations
@@ -115,8 +125,9 @@ class SequentialConvex:
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the status of the whole.
-        `iterations` are those of ipopt, summed over the passes, of the piece that took most."""
+        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the
+        status of the whole. `iterations` are those of ipopt, summed over the passes, of the piece that took
+        most."""
         began = time.perf_counter()
         if problem.feed_sq_start.any() or problem.feed_sq_end.any():
             raise ValueError("SequentialConvex: pieces must start and end at rest")
@@ -142,16 +153,19 @@ def _solve_piece(
     if n < INTERVALS_MIN:
         return too_few(n)
 
-    # ---- scaling: units in which the mean interval and its guessed duration are 1 --------------------------------------------
+    # ---- scaling: units in which the mean interval and its guessed duration are 1
+    # --------------------------------------------
     length, second = ds.mean(), guess.duration[here][:-1].mean()
     speed, acc = length / second, length / second**2
     ds = ds / length
 
-    # ---- variables: x and u at the points; the profile X at which the tangents touch is a parameter ---------------------------
+    # ---- variables: x and u at the points; the profile X at which the tangents touch is a parameter
+    # ---------------------------
     x, u, last = ca.MX.sym("x", n + 1), ca.MX.sym("u", n + 1), ca.MX.sym("last", n + 1)
     inner = slice(1, n - 1)  # the intervals, or their left ends, that do not touch rest
 
-    # ---- objective: the time, by Gauss's rule; exact on the first and the last interval ---------------------------------------
+    # ---- objective: the time, by Gauss's rule; exact on the first and the last interval
+    # ---------------------------------------
     shape = IntervalShape.of(problem.s[here])
     gain = u[1:] - u[:-1]
     times = ca.vertcat(3.0 * ds[0] / ca.sqrt(x[1]), ca.MX(n - 2, 1), 3.0 * ds[-1] / ca.sqrt(x[n - 1]))
@@ -159,10 +173,12 @@ def _solve_piece(
         between = x[:-1] + 2.0 * ds * (node * u[:-1] + part * gain)
         times[inner] += weight * ds[inner] / ca.sqrt(between[inner])
 
-    # ---- dynamics -------------------------------------------------------------------------------------------------------------
+    # ---- dynamics
+    # -------------------------------------------------------------------------------------------------------------
     gap = x[1:] - x[:-1] - 2.0 * ds * (u[:-1] + shape.mean * gain)
 
-    # ---- constraints: the feed between the points, then acceleration and tangents of the jerk at both ends of every interval --
+    # ---- constraints: the feed between the points, then acceleration and tangents of the jerk at both ends
+    # of every interval --
     cap = problem.feed_sq_limit[here] / speed**2
     rows = [(x[inner] + ds[inner] * u[inner]) / ((cap[inner] + cap[2:n]) / 2.0)]
     row_min, row_max = [np.full(n - 2, -np.inf)], [np.ones(n - 2)]
@@ -185,7 +201,8 @@ def _solve_piece(
             row_min += [np.full(n, -1.0), np.full(n - 2, -np.inf), np.full(n - 2, -1.5)]
             row_max += [np.full(n, 1.0), np.full(n - 2, 1.5), np.full(n - 2, np.inf)]
 
-    # ---- boundary: rest, and what the jerk of the first and last interval allows next to it -----------------------------------
+    # ---- boundary: rest, and what the jerk of the first and last interval allows next to it
+    # -----------------------------------
     free = np.full(n + 1, np.inf)
     lower, upper = np.concatenate([np.zeros(n + 1), -free]), np.concatenate([cap, free])
     beside = (1, *beside_rest(problem, here.start, 1)), (n - 1, *beside_rest(problem, here.stop - 1, -1))
@@ -194,10 +211,12 @@ def _solve_piece(
     for at_rest in (0, n):
         lower[[at_rest, n + 1 + at_rest]] = upper[[at_rest, n + 1 + at_rest]] = 0.0
 
-    # ---- initial guess: the feed of the second-order optimum; without acceleration, x is positive between the points too -------
+    # ---- initial guess: the feed of the second-order optimum; without acceleration, x is positive between
+    # the points too -------
     profile = np.concatenate([guess.feed_sq[here] / speed**2, np.zeros(n + 1)])
 
-    # ---- solve, pass by pass; nlpsol returns numbers whatever happened: only its statistics tell -------------------------------
+    # ---- solve, pass by pass; nlpsol returns numbers whatever happened: only its statistics tell
+    # -------------------------------
     bounds = {
         "lbx": lower,
         "ubx": upper,
@@ -210,7 +229,8 @@ def _solve_piece(
     if passed.result is None:
         return Found(status=passed.status, sentence=passed.sentence, iterations=passed.iterations)
 
-    # ---- unpack ---------------------------------------------------------------------------------------------------------------
+    # ---- unpack
+    # ---------------------------------------------------------------------------------------------------------------
     lam_x, lam_g = passed.result["lam_x"], passed.result["lam_g"]
     profile = np.clip(passed.result["x"], lower, upper)
     x_found, u_found = profile[: n + 1] * speed**2, profile[n + 1 :] * acc
@@ -219,7 +239,8 @@ def _solve_piece(
     profile_columns[:, 0], profile_columns[:, 1] = x_found, u_found
     profile_columns[:-1, 2], profile_columns[:-1, 3] = np.diff(u_found) / h, h
 
-    # ---- multipliers of the last pass, in time [s]: where the tangents touch, their rows have the gradients of the true ones --------
+    # ---- multipliers of the last pass, in time [s]: where the tangents touch, their rows have the gradients
+    # of the true ones --------
     of_gap, of_feed, *of_axes = np.split(
         second * lam_g, np.cumsum([n, n - 2, *[n, n - 2, n - 2] * 2 * axes])[:-1]
     )

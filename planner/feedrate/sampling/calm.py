@@ -1,16 +1,21 @@
-"""Where nothing happens along a path: ranges on which a motion keeps the programmed feed, or tracks smoothly what the curve allows.
+"""Where nothing happens along a path: ranges on which a motion keeps the programmed feed, or tracks smoothly
+what the curve allows.
 
-A grid for jerk-limited motions needs intervals of a fraction of a/j where the acceleration switches; a machine whose a/j is a
-thousandth of the time that its motions last would fill the memory with them. Two bounds say where they are not needed:
+A grid for jerk-limited motions needs intervals of a fraction of a/j where the acceleration switches; a
+machine whose a/j is a thousandth of the time that its motions last would fill the memory with them. Two
+bounds say where they are not needed:
 
-* An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds. With h = 0.03 v/a that is
-  1e-4 of v/a, the time which lies between two such switches because the speed has to change between them.
-* A curve is calm where the programmed feed F is the smallest bound, and leaves half of the axes' accelerations and jerks free:
+* An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds.
+  With h = 0.03 v/a that is 1e-4 of v/a, the time which lies between two such switches because the speed has
+  to change between them.
+* A curve is calm where the programmed feed F is the smallest bound, and leaves half of the axes'
+  accelerations and jerks free:
 
       F <= v_k,    |r''_k| F^2 <= a_k/2,    |r'''_k| F^3 <= j_k/2                                    for all axes k.
 
-  A time-optimal motion runs there at F, but where it still comes from, or already prepares for, something else. Half of acceleration
-  and jerk change the speed by F within 2 F/a + a/j [s], so within `quiet_way` of it; beyond, intervals grow with the distance.
+  A time-optimal motion runs there at F, but where it still comes from, or already prepares for, something
+  else. Half of acceleration and jerk change the speed by F within 2 F/a + a/j [s], so within `quiet_way` of
+  it; beyond, intervals grow with the distance.
 """
 
 from __future__ import annotations
@@ -32,8 +37,8 @@ PLACES = 9  # on every curve, at which it is looked at
 
 
 class Calm(NamedTuple):
-    """busy (B, 2) ascending ranges of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,) a lower bound of
-    feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
+    """busy (B, 2) ascending ranges of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,)
+    a lower bound of feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
 
     busy: FloatArray
     feed_sq: FloatArray
@@ -72,7 +77,8 @@ def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatA
 
 
 def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(M,) how far from what is not calm a motion at `feed` (M,) [mm/s] may still change its speed [mm] (module text).
+    """(M,) how far from what is not calm a motion at `feed` (M,) [mm/s] may still change its speed [mm]
+    (module text).
 
     acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
     """
@@ -124,8 +130,8 @@ def _merged(ranges: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def interval_ends(start, left, right, base, most, quiet, busy):
-    """Ends (n+1,) of the intervals of a row from `left` to `right`: of `base` at most, longer ones, up to `most`, where the path is
-    calm and `quiet` away from what is not.
+    """Ends (n+1,) of the intervals of a row from `left` to `right`: of `base` at most, longer ones, up to
+    `most`, where the path is calm and `quiet` away from what is not.
 
     start                     : place that left and right are counted from [mm]
     left, right, base, most   : [mm]

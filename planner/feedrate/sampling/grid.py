@@ -1,8 +1,8 @@
 """The kernels behind feedrate/sampling/samples.py: where the grid points go, and what the path is there.
 
-`divide` halves the rows of feedrate/sampling/rows.py until the errors of feedrate/sampling/samples.py's text are small enough,
-`grade` until no interval is much longer than its neighbours; `evaluate` then fills in arc length, derivatives, margins and
-effective curvatures. All are linear in the number of points.
+`divide` halves the rows of feedrate/sampling/rows.py until the errors of feedrate/sampling/samples.py's text
+are small enough, `grade` until no interval is much longer than its neighbours; `evaluate` then fills in arc
+length, derivatives, margins and effective curvatures. All are linear in the number of points.
 """
 
 from __future__ import annotations
@@ -35,14 +35,16 @@ HALVINGS_MAX = 20
 SMALLEST = 2.0**-HALVINGS_MAX
 # Intervals may be this share of their distance from the nearest full stop [-], for solvers of third order.
 REST_GROWTH = 0.5
-# Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by this share of the distance.
+# Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by
+# this share of the distance.
 STEEPEST, SLOPE = 4.0, 1.0
 # ... but not down to neighbours, nor parts of them, that are shorter than this share of them [-]: those are rounding.
 FINEST = 1e-4
 
 
 class Intervals(NamedTuple):
-    """Where the P points of a grid are: the interval to the right of each; of the last one at the end of a piece (`PathSamples`)."""
+    """Where the P points of a grid are: the interval to the right of each; of the last one at the end of a
+    piece (`PathSamples`)."""
 
     element: Array
     w0: FloatArray
@@ -68,7 +70,8 @@ class Columns(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def _interval_error(points, x, u, h, acceleration, jerk):
-    """max_k e_k / a_k of the module's text, from arc-length derivatives (3, 4, A) at left end, middle and right end."""
+    """max_k e_k / a_k of the module's text, from arc-length derivatives (3, 4, A) at left end, middle and
+    right end."""
     worst = 0.0
     for k in range(points.shape[2]):
         left, mid, right = points[0, 2, k], points[1, 2, k], points[2, 2, k]
@@ -82,7 +85,8 @@ def _interval_error(points, x, u, h, acceleration, jerk):
 
 @njit(cache=True, error_model="numpy")
 def _fastest(point, feed_max, limits):
-    """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4, A)."""
+    """Bounds (x, u) of feed^2 and of the acceleration along the path that the limits allow at a point (4,
+    A)."""
     _, velocity, acceleration, jerk = limits
     u = 0.0
     normal = 0.0
@@ -110,8 +114,8 @@ def _fastest(point, feed_max, limits):
 
 @njit(cache=True, error_model="numpy")
 def _measure(table, element, segment, ends, limits, work, points):
-    """Evaluate the interval with the ends (wa, wb) at left end, middle and right end into points (3, 4, A), with `work` (2, 4, A) for
-    what is in between; returns its interpolation error."""
+    """Evaluate the interval with the ends (wa, wb) at left end, middle and right end into points (3, 4, A),
+    with `work` (2, 4, A) for what is in between; returns its interpolation error."""
     legs, corners, spans = table
     wa, wb = ends
     w_ref = 0.5 * (wa + wb)
@@ -133,8 +137,9 @@ def _measure(table, element, segment, ends, limits, work, points):
 def _subdivide(table, row, limits, resolution, rest, work, out):
     """Halve a row until every part's error is below `resolution`; right ends into out, returns their number.
 
-    rest : distances from the last full stop of the row's ends, of the next stop from the last, and the length of the first interval
-           after a stop; intervals grow in proportion to their distance from the nearer stop
+    rest : distances from the last full stop of the row's ends, of the next stop from the last, and the length
+           of the first interval after a stop; intervals grow in proportion to their distance from the nearer
+           stop
     work : (5, 4, A)
     """
     from_a, from_b, to_next, shortest = rest
@@ -210,8 +215,9 @@ def _set_part(out, row, w0, w1):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def grade(legs, rows):
-    """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE` times the distance from
-    them: between a short and a long interval the kinematics of a jerk-limited profile are far from linear."""
+    """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE`
+    times the distance from them: between a short and a long interval the kinematics of a jerk-limited profile
+    are far from linear."""
     size = np.empty(
         len(rows) + 1
     )  # at the start of each row; a closing row parts what is before it from what is after it
@@ -297,7 +303,8 @@ def evaluate(table: ElementTable, grid: Intervals, limits: PathLimits) -> Column
 
 
 def _begin(last: Array, point: int) -> int:
-    """The point, or the first one behind it that does not end a piece: what is left of that is found with it."""
+    """The point, or the first one behind it that does not end a piece: what is left of that is found with
+    it."""
     while point < len(last) and last[point]:
         point += 1
     return point
@@ -305,7 +312,8 @@ def _begin(last: Array, point: int) -> int:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _evaluate(table, grid, limits, first, beyond, found):
-    """The `Columns` of the intervals first .. beyond - 1, with the length of each in place of s of its end."""
+    """The `Columns` of the intervals first .. beyond - 1, with the length of each in place of s of its
+    end."""
     legs, corners, spans = table
     element, w0, w1, segment, last = grid
     axes = len(limits.velocity)

@@ -1,13 +1,15 @@
-"""Limits of one's own on the grid: their rows, how far these are from linear between the points, and where more points are needed.
+"""Limits of one's own on the grid: their rows, how far these are from linear between the points, and where
+more points are needed.
 
-A limit (machine/user_limit.py) with the bounds v, a, j on velocity, acceleration and jerk of q(s) is an axis more to a solver: the rows
-q', q'', q''' with the limits a, j, and the cap feed^2 <= (v/q')^2.
+A limit (machine/user_limit.py) with the bounds v, a, j on velocity, acceleration and jerk of q(s) is an axis
+more to a solver: the rows q', q'', q''' with the limits a, j, and the cap feed^2 <= (v/q')^2.
 
-* Rows between grid points leave the chord of their end values by e as those of the axes do (samples.py); an interval is halved
-  until e is below the resolution, and what remains adds to its margin.
-* A bound that varies is asked for at both ends and in the middle of an interval. Where it is less in the middle than the mean of its
-  ends both ends get that much less; the interval is halved until that is below `BOUND_SHARE` resolutions, or the bound jumps: where it
-  changes by more than `JUMP` on an interval of the least length, both ends have the least of the three.
+* Rows between grid points leave the chord of their end values by e as those of the axes do (samples.py); an
+  interval is halved until e is below the resolution, and what remains adds to its margin.
+* A bound that varies is asked for at both ends and in the middle of an interval. Where it is less in the
+  middle than the mean of its ends both ends get that much less; the interval is halved until that is below
+  `BOUND_SHARE` resolutions, or the bound jumps: where it changes by more than `JUMP` on an interval of the
+  least length, both ends have the least of the three.
 """
 
 from __future__ import annotations
@@ -25,8 +27,8 @@ from planner.feedrate.sampling.grid import JERK_SHARE, MARGIN_SAFETY
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine.user_limit import OwnLimit, Place, bounds_at, limit_derivatives
 
-# Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-]; it costs as much as the grid's
-# own error where bounds vary, and nothing elsewhere.
+# Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-]; it
+# costs as much as the grid's own error where bounds vary, and nothing elsewhere.
 BOUND_SHARE = 5.0
 JUMP = 0.3  # change of a bound across an interval, from which on the interval is halved down to `LEAST` [share of the larger]
 LEAST = 1e-3  # shortest interval that is halved [mm]: what a motion does within is less than any period shows
@@ -42,7 +44,8 @@ class OwnRows:
     names              : of the limits
     d1                 : (P, V) q'
     d2_left, d2_right, d3_left, d3_right : (P, V) as those of the axes
-    least              : (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
+    least              : (3, V) least bounds of velocity, acceleration and jerk that were met, inf where
+                         nothing is bounded
     acceleration, jerk : (P, V) bounds at the points
     feed_sq_max        : (P, V) what the bounds of the velocity allow; inf where nothing
     error              : (P,) of the interval to the right, share of the acceleration bounds [-]
@@ -80,7 +83,8 @@ def _points(legs, corners, spans, element, w, axes):
 
 
 def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> OwnRows:
-    """The rows of the limits `along`; `resolution` is the share of the limits that they may leave the chord by (module text)."""
+    """The rows of the limits `along`; `resolution` is the share of the limits that they may leave the chord
+    by (module text)."""
     axes = samples.path.toolpath.axes
     at = samples.intervals
     middle = 0.5 * (samples.w0[at] + samples.w1[at])
@@ -116,7 +120,8 @@ def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Real:
-    """The bounds by the machine's axes on each interval (n,): feed^2, acceleration along the path, and jerk."""
+    """The bounds by the machine's axes on each interval (n,): feed^2, acceleration along the path, and
+    jerk."""
 
     feed_sq: FloatArray
     acceleration: FloatArray
@@ -247,7 +252,8 @@ def _between(
     cap_middle: FloatArray | None,
     at: Array,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A bound (P,) made to hold between the points, by how much it was short in the middles (n,), and by how much it changes.
+    """A bound (P,) made to hold between the points, by how much it was short in the middles (n,), and by how
+    much it changes.
 
     cap, cap_middle : what else bounds the quantity: what is beyond does not count
     """

@@ -13,17 +13,20 @@ from planner.corners.smooth import SmoothPath
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PathSamples:
-    """The path on a grid: G pieces between full stops, P points in all, one interval to the right of every point but the last of
-    each piece. At a full stop the point is there twice, as the end of one piece and the start of the next.
+    """The path on a grid: G pieces between full stops, P points in all, one interval to the right of every
+    point but the last of each piece. At a full stop the point is there twice, as the end of one piece and the
+    start of the next.
 
     piece     : (G+1,) piece g holds the points piece[g] : piece[g+1]
     stop      : (G+1,) joint (0..R) at which each piece starts; the last entry is the end of the path
     s         : (P,) arc length from the start of the job [mm]
     position  : (P, A) [mm]
     d1        : (P, A) r' = dr/ds
-    d2_left, d2_right : (P, A) r'' just before and just after the point [1/mm]; they differ where the curvature jumps
+    d2_left, d2_right : (P, A) r'' just before and just after the point [1/mm]; they differ where the
+                        curvature jumps
     d3_left, d3_right : (P, A) r''' [1/mm2]
-    element   : (P,) element of the interval to the right (corners/elements.py); of the last interval at a piece's end
+    element   : (P,) element of the interval to the right (corners/elements.py); of the last interval at a
+                piece's end
     w0, w1    : (P,) parameter range of that interval on its element
     segment   : (P,) toolpath segment of that interval
     margin    : (P,) interpolation error of that interval, share of the acceleration limits [-]

@@ -1,9 +1,10 @@
 """The smooth path cut into rows of one element and one block each, which the grid then divides (kernels of
 feedrate/sampling/samples.py).
 
-In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans that begins there. Free
-parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a piece ends there is a
-closing row.
+In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans
+                          that begins there. Free
+parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a
+piece ends there is a closing row.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from planner.geometry.legs import leg_point
 ARC_STEP = np.pi / 8
 # ... and with so many at least, so that a short arc between two stops can start and stop.
 ARC_INTERVALS_MIN = 4
-# Free parts of legs shorter than this fraction of the leg are nothing but rounding: longer ones are at least CLOSE [-].
+# Free parts of legs shorter than this fraction of the leg are nothing but rounding: longer ones are at least
+# CLOSE [-].
 FREE_PART_MIN = 1e-9
 
-# curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from the start of the job [mm];
-# last: a closing row
+# curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from
+# the start of the job [mm]; last: a closing row
 ROW = np.dtype(
     [
         ("curve", np.int64),
@@ -42,7 +44,8 @@ ROW = np.dtype(
 
 
 class PathLimits(NamedTuple):
-    """The bounds of a motion along the path: programmed feed of each segment, and limits of each axis; inf for none."""
+    """The bounds of a motion along the path: programmed feed of each segment, and limits of each axis; inf
+    for none."""
 
     feed: FloatArray  # (M,) [mm/s]
     velocity: FloatArray  # (A,) [mm/s]
@@ -110,8 +113,8 @@ def _corner_parameter(corners, k, z):
 
 @njit(cache=True, error_model="numpy")
 def _corner_passes(legs, corners, k, leg, x, z, changes):
-    """w of corner k where it passes the place x [mm] on a leg, z after the vertex: its matched point, or, where the feed changes there,
-    the nearest one to rounding, from which on the next feed holds."""
+    """w of corner k where it passes the place x [mm] on a leg, z after the vertex: its matched point, or,
+    where the feed changes there, the nearest one to rounding, from which on the next feed holds."""
     if not changes:
         return _corner_parameter(corners, k, z) if z != 0.0 else 0.5
     axes = len(legs[leg].start)
@@ -138,7 +141,8 @@ def _corner_passes(legs, corners, k, leg, x, z, changes):
 
 @njit(cache=True, error_model="numpy")
 def _arc_feed(leg, feed, limits):
-    """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn with."""
+    """A bound of the feed on an arc: programmed, what all axes reach together, and what they can turn
+    with."""
     v_sq, a_sq = 0.0, 0.0
     for k in range(len(limits.velocity)):
         v_sq += limits.velocity[k] * limits.velocity[k]
@@ -148,7 +152,8 @@ def _arc_feed(leg, feed, limits):
 
 @njit(cache=True, error_model="numpy")
 def _cut_leg(rows, n, leg, seg, start, ends):
-    """Rows of the free part of a leg that starts at the place `start`, cut at `ends` on it; returns the rows and their number."""
+    """Rows of the free part of a leg that starts at the place `start`, cut at `ends` on it; returns the rows
+    and their number."""
     rows = grown(rows, n + len(ends) - 1)
     for i in range(len(ends) - 1):
         left, right = ends[i], ends[i + 1]
@@ -159,7 +164,8 @@ def _cut_leg(rows, n, leg, seg, start, ends):
 
 @njit(cache=True, error_model="numpy")
 def _cut_corner(rows, n, corners, k, seg, between, vertex, breaks):
-    """Rows of corner k, vertex at `vertex` [mm], between (wa, wb), cut at its breaks; returns the rows and their number."""
+    """Rows of corner k, vertex at `vertex` [mm], between (wa, wb), cut at its breaks; returns the rows and
+    their number."""
     wa, wb = between
     rows = grown(rows, n + len(breaks) + 1)
     cut = 0
@@ -179,8 +185,9 @@ def _cut_corner(rows, n, corners, k, seg, between, vertex, breaks):
 
 @njit(cache=True, error_model="numpy")
 def _base(longest, feed, feed_sq, acceleration):
-    """Longest interval on a curve [mm] that switches of the acceleration allow (feedrate/sampling/calm.py): `longest` [s] at the
-    fastest feed, or by the time to change the speed where feed^2 is at least `feed_sq` by its curvature."""
+    """Longest interval on a curve [mm] that switches of the acceleration allow (feedrate/sampling/calm.py):
+    `longest` [s] at the fastest feed, or by the time to change the speed where feed^2 is at least `feed_sq`
+    by its curvature."""
     return max(longest * feed, SWITCHING_WAY * min(feed * feed, feed_sq) / acceleration)
 
 
@@ -206,8 +213,8 @@ def _pace(limits):
 
 @njit(cache=True, error_model="numpy")
 def _cut_span(rows, n, span, curve, seg, passed, limits, longest):
-    """Rows of the span that is element `curve` and begins in segment `seg`, cut where the feed changes; returns the rows, their number
-    and the segment in which the span ends.
+    """Rows of the span that is element `curve` and begins in segment `seg`, cut where the feed changes;
+    returns the rows, their number and the segment in which the span ends.
 
     passed  : (M+1,) as in `Joints`
     limits  : `_Pace`

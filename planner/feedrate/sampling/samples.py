@@ -1,20 +1,22 @@
-"""The smooth path sampled along its arc length, on a grid that adapts until linear interpolation is good enough.
+"""The smooth path sampled along its arc length, on a grid that adapts until linear interpolation is good
+enough.
 
-A second-order solver sees the axis acceleration g(s) = r'(s) u + r''(s) x(s) only at grid points; in an interval u is constant
-and x = feed^2 linear. Between the points g leaves the chord of its end values by at most (midpoint values, one interval of
-length h, fastest x and largest u that the limits allow there)
+A second-order solver sees the axis acceleration g(s) = r'(s) u + r''(s) x(s) only at grid points; in an
+interval u is constant and x = feed^2 linear. Between the points g leaves the chord of its end values by at
+most (midpoint values, one interval of length h, fastest x and largest u that the limits allow there)
 
     e_k = x |r''_mid - (r''_0 + r''_1)/2|  +  u h |r''_1 - r''_0|/2  +  u |r'_mid - (r'_0 + r'_1)/2|        per axis k
 
-(the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k is below
-`RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to its limit, may be `JERK_SHARE`
-times as large, and x is bounded by the jerk limits as well. What remains is kept per interval as `margin`, and the constraints are
-tightened by it, so that they hold between
-grid points and not only at them. Straight elements need one interval: there g is exactly linear.
+(the second term comes from the product of two linear functions). An interval is halved until max_k e_k / a_k
+is below `RESOLUTION`; for solvers of third order the error of the axis jerk at constant speed, relative to
+its limit, may be `JERK_SHARE` times as large, and x is bounded by the jerk limits as well. What remains is
+kept per interval as `margin`, and the constraints are tightened by it, so that they hold between grid points
+and not only at them. Straight elements need one interval: there g is exactly linear.
 
-PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex of a corner. A cap X/kappa
-is convex there, so a line through two caps would cut the corner; the end with the larger curvature keeps its cap and the other
-end gets a slightly larger *effective* curvature, such that the line meets X/kappa_mid in the middle:
+PathLimits of the form kappa x <= X hold between the points by another device that costs nothing at the apex
+of a corner. A cap X/kappa is convex there, so a line through two caps would cut the corner; the end with the
+larger curvature keeps its cap and the other end gets a slightly larger *effective* curvature, such that the
+line meets X/kappa_mid in the middle:
 
     1/kappa_low = min(1/kappa_low, 2/kappa_mid - 1/kappa_high);     both ends kappa_mid where that is the largest.
 """
@@ -38,15 +40,16 @@ from planner.feedrate.sampling.rows import Joints, Longest, PathLimits, cut_path
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 
-# Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is then 0.6e-3 to 3e-3
-# above that of an infinitely fine grid on the shared jobs (tests/feedrate/sampling): first order in the step, because u is constant
-# on it.
+# Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is
+# then 0.6e-3 to 3e-3 above that of an infinitely fine grid on the shared jobs (tests/feedrate/sampling):
+# first order in the step, because u is constant on it.
 RESOLUTION = 2e-3
-# Jobs with more corners than the first number get the second resolution instead, or their grids would fill the memory (a relief of
-# 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the cycle time.
+# Jobs with more corners than the first number get the second resolution instead, or their grids would fill
+# the memory (a relief of 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the
+# cycle time.
 MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
-# For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis needs for its
-# acceleration [-], where feedrate/sampling/calm.py does not say that it may last longer.
+# For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis
+# needs for its acceleration [-], where feedrate/sampling/calm.py does not say that it may last longer.
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
@@ -61,8 +64,8 @@ def sample_path(
 ) -> PathSamples:
     """Sample a smooth path on an adaptive grid.
 
-    resolution  : interpolation error allowed between grid points [share of the acceleration limits]; None for `RESOLUTION`, or
-                  `COARSE_RESOLUTION` where there are many corners
+    resolution  : interpolation error allowed between grid points [share of the acceleration limits]; None for
+                  `RESOLUTION`, or `COARSE_RESOLUTION` where there are many corners
     third_order : the grid is for a solver with jerk limits
 
     Raises InputError if the machine lacks an axis of the path.
@@ -156,8 +159,8 @@ def _joints(path: SmoothPath) -> Joints:
 
 
 def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
-    """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the free part of each leg
-    is scaled from its first and last block's ends, and the margins stay as they are."""
+    """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the
+    free part of each leg is scaled from its first and last block's ends, and the margins stay as they are."""
     legs, element, segment = path.legs, samples.element, samples.segment
     free = element >= 0
     leg = np.maximum(element, 0)
@@ -184,7 +187,8 @@ def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
-    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
+    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by
+    place.
 
     Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
     """
@@ -227,7 +231,8 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
 
 
 def straight(legs: Array, element: Array) -> Array:
-    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of geometry/legs.py."""
+    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of
+    geometry/legs.py."""
     leg = (element >= 0) & (element < len(legs))
     return leg & ~legs["round"][np.where(leg, element, 0)]
 

@@ -1,7 +1,8 @@
-"""The joints along a path of the tip, with their first three derivatives, and the tip along one of the joints.
+"""The joints along a path of the tip, with their first three derivatives, and the tip along one of the
+joints.
 
-A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the derivatives that the chain rule
-gives to third order (base/series.py), exact but for rounding.
+A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the
+derivatives that the chain rule gives to third order (base/series.py), exact but for rounding.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from planner.machine.kinematics.chain import LINEAR, Chain, Kinematics
 def joints_along(
     kinematics: Kinematics, axes: tuple[str, ...], motion: FloatArray, radius: float = 1.0
 ) -> FloatArray:
-    """(4, n, A) the joints of the axes, rotary ones as they are, and their first three derivatives with respect to what those of
-    `motion` (4, n, A) are with respect to: path length or time.
+    """(4, n, A) the joints of the axes, rotary ones as they are, and their first three derivatives with
+    respect to what those of `motion` (4, n, A) are with respect to: path length or time.
 
     radius : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
     """
@@ -29,7 +30,8 @@ def joints_along(
 
 
 def points_along(chain: Chain, axes: tuple[str, ...], motion: FloatArray, radius: float = 1.0) -> FloatArray:
-    """(4, n, A) the controlled point where `motion` (4, n, A) is that of the joints; the rest as in `joints_along`."""
+    """(4, n, A) the controlled point where `motion` (4, n, A) is that of the joints; the rest as in
+    `joints_along`."""
     return _along(chain.point, axes, motion, radius)
 
 

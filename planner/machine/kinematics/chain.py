@@ -1,8 +1,9 @@
-"""Closed forms of five-axis machines: linear joints q from the controlled point p and the rotary angles, and back.
+"""Closed forms of five-axis machines: linear joints q from the controlled point p and the rotary angles, and
+back.
 
-p is what a program says with the tool centre point switched on, in coordinates that turn with the workpiece: the tool's tip, with the
-tool's length L added to z as G43 does. q are the linear joints. Where both rotary angles are 0, q = p. Rz, Rx, Ry turn right-handed;
-T is Rx(a) or Ry(b). R is the point of rotation.
+p is what a program says with the tool centre point switched on, in coordinates that turn with the workpiece:
+the tool's tip, with the tool's length L added to z as G43 does. q are the linear joints. Where both rotary
+angles are 0, q = p. Rz, Rx, Ry turn right-handed; T is Rx(a) or Ry(b). R is the point of rotation.
 
     xyzac-trt, xyzbc-trt   q = R + d + T (Rz(c) (p - R) - d)            d = (x_offset, y_offset, z_offset + L)
     head-table             q = R + Rz(c) (p - R) + l - T l              l = (x_offset, y_offset, -(pivot_length + L))
@@ -14,13 +15,14 @@ T is Rx(a) or Ry(b). R is the point of rotation.
       [table] c turns        \\ tool               \\ tool
       (a) tilts            [table] c turns       [table] still
 
-The first two are LinuxCNC's (src/emc/kinematics/trtfuncs.c), held against its compiled component in tests/machine/kinematics; its
-5axiskins is head-head with tilt "b" reversed. Where an axis turns the workpiece LinuxCNC's positive direction turns it
-right-handed, so the tool's direction, seen from the workpiece, is
+The first two are LinuxCNC's (src/emc/kinematics/trtfuncs.c), held against its compiled component in
+tests/machine/kinematics; its 5axiskins is head-head with tilt "b" reversed. Where an axis turns the workpiece
+LinuxCNC's positive direction turns it right-handed, so the tool's direction, seen from the workpiece, is
 
     tables  u = Rz(-c) T^-1 e_z        head-table  u = Rz(-c) T e_z        head-head  u = Rz(c) T e_z
 
-always with u_z = cos(tilt): the pole, where c has no influence on the direction, is u = +-e_z. `reversed` axes turn the other way.
+always with u_z = cos(tilt): the pole, where c has no influence on the direction, is u = +-e_z. `reversed`
+axes turn the other way.
 """
 
 from __future__ import annotations
@@ -52,7 +54,8 @@ class Kinematics(Protocol):
         ...
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:
-        """The linear joints x, y, z at a place: numbers, arrays (n,), or series of derivatives, by their letters [mm, rad]."""
+        """The linear joints x, y, z at a place: numbers, arrays (n,), or series of derivatives, by their
+        letters [mm, rad]."""
         ...
 
 
@@ -73,7 +76,8 @@ class Chain:
         return dataclasses.replace(self, length=length)
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:
-        """q from p and the angles; values are numbers, arrays (n,), series or casadi expressions [mm, rad]."""
+        """q from p and the angles; values are numbers, arrays (n,), series or casadi expressions [mm,
+        rad]."""
         p = (place["x"], place["y"], place["z"])
         tilt, turn = self._angles(place)
         if self.data.type == HEAD_HEAD:
@@ -88,7 +92,8 @@ class Chain:
         return dict(zip(LINEAR, q, strict=True))
 
     def point(self, place: dict[str, Any]) -> dict[str, Any]:
-        """p from the joints, x, y, z and the rotary ones, all alike: numbers, arrays (n,) or series [mm, rad]."""
+        """p from the joints, x, y, z and the rotary ones, all alike: numbers, arrays (n,) or series [mm,
+        rad]."""
         q = (place["x"], place["y"], place["z"])
         tilt, turn = self._angles(place)
         if self.data.type == HEAD_HEAD:
@@ -103,8 +108,8 @@ class Chain:
         return dict(zip(LINEAR, p, strict=True))
 
     def direction(self, place: dict[str, Any]) -> Vector:
-        """Unit vector along the tool, from its tip to the spindle, seen from the workpiece; angles as numbers, arrays (n,) or
-        series."""
+        """Unit vector along the tool, from its tip to the spindle, seen from the workpiece; angles as
+        numbers, arrays (n,) or series."""
         tilt, turn = self._angles(place)
         up = (0.0, 0.0, 1.0)
         if self.data.type == HEAD_HEAD:
@@ -112,8 +117,9 @@ class Chain:
         return _turned(-turn, self._tilted(tilt if self.data.type == HEAD_TABLE else -tilt, up))
 
     def angles(self, direction: FloatArray) -> FloatArray:
-        """(n, 2, 2) both pairs (tilt, c) of angles for unit vectors `direction` (n, 3) along the tool [rad]; c is 0 at the pole. c lies
-        within -pi to pi, the tilt of the first pair within 0 to pi, that of the second is its negative."""
+        """(n, 2, 2) both pairs (tilt, c) of angles for unit vectors `direction` (n, 3) along the tool [rad];
+        c is 0 at the pole. c lies within -pi to pi, the tilt of the first pair within 0 to pi, that of the
+        second is its negative."""
         tilt = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
         own = [sign * tilt for sign in (1.0, -1.0)]
         pairs = []
@@ -159,8 +165,8 @@ class Chain:
 
 
 def kinematics_of(machine: Machine, tool_length: float | None = None) -> Chain:
-    """The kinematics of a machine file, with a tool of that length [mm], or that of the table [kinematics]. Raises InputError if
-    the machine has none."""
+    """The kinematics of a machine file, with a tool of that length [mm], or that of the table [kinematics].
+    Raises InputError if the machine has none."""
     if machine.kinematics is None:
         raise InputError(
             f"machine '{machine.name}' has no kinematics: the tool centre point needs a table [kinematics] with type and offsets"

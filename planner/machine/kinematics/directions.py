@@ -1,13 +1,15 @@
 """Rotary angles from directions of the tool, and the pole.
 
-A direction has two pairs of angles (`Chain.angles`), each up to full turns of c. Along a path of directions the pairs are chosen that
-move the axes least in the sum of all steps (Viterbi over the two pairs; c always the shortest way).
+A direction has two pairs of angles (`Chain.angles`), each up to full turns of c. Along a path of directions
+the pairs are chosen that move the axes least in the sum of all steps (Viterbi over the two pairs; c always
+the shortest way).
 
-At the pole, tilt 0 or pi, the direction does not depend on c. Within e of it any c leaves the direction within 2 e of the right one;
-with e half of the angular tolerance c is free there, and goes at an even rate from where it was before the pole to where it
-has to be behind it. Closer passages are smooth in this way, others turn c as far as the directions ask. Between two points the
-axes move in proportion; where the direction then leaves the plane of the two directions by more than the tolerance, which happens near
-the pole alone, the path has too few points for the machine, and is refused with the place.
+At the pole, tilt 0 or pi, the direction does not depend on c. Within e of it any c leaves the direction
+within 2 e of the right one; with e half of the angular tolerance c is free there, and goes at an even rate
+from where it was before the pole to where it has to be behind it. Closer passages are smooth in this way,
+others turn c as far as the directions ask. Between two points the axes move in proportion; where the
+direction then leaves the plane of the two directions by more than the tolerance, which happens near the pole
+alone, the path has too few points for the machine, and is refused with the place.
 """
 
 from __future__ import annotations
@@ -90,7 +92,8 @@ def _nearest(angle: float, to: float) -> float:
 def _check_between(
     chain: Chain, angles: FloatArray, unit: FloatArray, tolerance: float, lines: Sequence[int] | None
 ) -> None:
-    """Raise InputError where the axes moving in proportion take the tool out of the plane of two directions."""
+    """Raise InputError where the axes moving in proportion take the tool out of the plane of two
+    directions."""
     tilt, turn = chain.data.rotary
     normal = np.cross(unit[:-1], unit[1:])
     sine = np.linalg.norm(normal, axis=1)

@@ -1,10 +1,10 @@
 """Kinematics of one's own as a casadi expression:
 
-    mine = expression("xyzbc", lambda x, y, z, b, c: (x + 80 * casadi.sin(b), y, z + 80 * (casadi.cos(b) - 1)))
-    planner.plan(path, at_tip(machine, mine))
+    mine = expression("xyzbc", lambda x, y, z, b, c: (x + 80 * casadi.sin(b), y, z + 80 * (casadi.cos(b) -
+    1))) planner.plan(path, at_tip(machine, mine))
 
-Derivatives along a path are those of the Taylor polynomial p + p' t + p'' t^2/2 + p''' t^3/6 put into the expression, by casadi's
-automatic differentiation.
+Derivatives along a path are those of the Taylor polynomial p + p' t + p'' t^2/2 + p''' t^3/6 put into the
+expression, by casadi's automatic differentiation.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class Expression:
 
 
 def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
-    """Kinematics from a function that makes the joints x, y, z [mm] from casadi symbols of the axes, in mm and rad.
+    """Kinematics from a function that makes the joints x, y, z [mm] from casadi symbols of the axes, in mm
+    and rad.
 
     axes : letters of the path of the tip in the order of the function's arguments, such as "xyzbc"
 

@@ -1,10 +1,11 @@
 """The limits of the joints on a path of the tip.
 
-On such a path the machine's limits of x, y and z are limits of functions of the position: joints q(p, angles), which enter every
-solver as rows with q', q'', q''' (machine/user_limit.py) and are held between grid points as those are. The coordinates of the tip
-have no limits of their own. Grids, corners and splines want some, so they get the joints' ones times a factor, `WIDE`: above the
-root of 3, by which three joints together are stronger than one, so that where the angles stand still it is the joints that hold the
-motion. A tip that a fast table carries far from its axis may be held by it; the verdict then has velocity.x, acceleration.x or
+On such a path the machine's limits of x, y and z are limits of functions of the position: joints q(p,
+angles), which enter every solver as rows with q', q'', q''' (machine/user_limit.py) and are held between grid
+points as those are. The coordinates of the tip have no limits of their own. Grids, corners and splines want
+some, so they get the joints' ones times a factor, `WIDE`: above the root of 3, by which three joints together
+are stronger than one, so that where the angles stand still it is the joints that hold the motion. A tip that
+a fast table carries far from its axis may be held by it; the verdict then has velocity.x, acceleration.x or
 jerk.x at 1.
 """
 
@@ -20,8 +21,9 @@ from planner.machine.kinematics.along_path import in_rad
 from planner.machine.kinematics.chain import LINEAR, Kinematics, kinematics_of
 from planner.machine.user_limit import JointLimit, Place
 
-# Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by them, not by those of the
-# joints: with 10 a path of three axes is planned 3 % slower than by a machine without kinematics, with 2 1 %, with 1 as fast.
+# Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by
+# them, not by those of the joints: with 10 a path of three axes is planned 3 % slower than by a machine
+# without kinematics, with 2 1 %, with 1 as fast.
 WIDE = 2.0
 
 
@@ -39,12 +41,13 @@ class LinearJoint(JointLimit):
 
 
 def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: float | None = WIDE) -> Machine:
-    """The machine as it is planned for on paths of the tool's tip: limits of the linear joints through the kinematics, those of the
-    rotary ones as they are.
+    """The machine as it is planned for on paths of the tool's tip: limits of the linear joints through the
+    kinematics, those of the rotary ones as they are.
 
     kinematics : None for those of the machine file
-    wide       : limits of the tip's coordinates, of the largest ones of the linear joints (module text) [-]; None for those of the
-                 machine, for methods that do not know limits of joints: where the rotary axes stand at 0 they are the same
+    wide       : limits of the tip's coordinates, of the largest ones of the linear joints (module text) [-];
+                 None for those of the machine, for methods that do not know limits of joints: where the
+                 rotary axes stand at 0 they are the same
 
     Raises InputError if it has none, if it lacks one of their axes, and for a factor below 1.
     """
@@ -64,6 +67,7 @@ def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: floa
         )
         axes = {letter: free if letter in LINEAR else axis for letter, axis in axes.items()}
     joints = [LinearJoint(letter, machine.axes[letter], found, radius) for letter in LINEAR]
-    # joints that run on cubics do not lead the tip along one: between setpoints it is taken to run along its chord
+    # joints that run on cubics do not lead the tip along one: between setpoints it is taken to run along its
+    # chord
     way = "linear" if machine.interpolation == "cubic" else machine.interpolation
     return machine.model_copy(update={"axes": axes, "interpolation": way}).with_own([*machine.own, *joints])

@@ -1,7 +1,7 @@
 """The blocks and events of a drawing while it is read; `finish` makes the record.
 
-The pen is an event with a full stop, because it takes its time to rise and to fall: M3 down, M5 up, T a pen from the carousel. The
-numbers are those of NC programs, so that the same drives, files and reports know them.
+The pen is an event with a full stop, because it takes its time to rise and to fall: M3 down, M5 up, T a pen
+from the carousel. The numbers are those of NC programs, so that the same drives, files and reports know them.
 
 The circle through three points, for AT and RT.
 
@@ -20,7 +20,8 @@ IP gives the scaling points P1 and P2 in plotter units; SC the user coordinates 
                                                below, in percent (50 each without the last two numbers)
     SC xmin,xfactor,ymin,yfactor,2             P1 and plotter units per user unit
 
-Without IP the scaling points depend on the paper in the plotter, which a file does not know: SC is then refused.
+Without IP the scaling points depend on the paper in the plotter, which a file does not know: SC is then
+refused.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ class ScalingError(ValueError):
 
 @dataclass(frozen=True)
 class Scaling:
-    """plotter units = origin + factor * user units; p1, p2 are the scaling points in plotter units, None where unknown."""
+    """plotter units = origin + factor * user units; p1, p2 are the scaling points in plotter units, None
+    where unknown."""
 
     p1: Point | None = None
     p2: Point | None = None
@@ -63,7 +65,8 @@ class Scaling:
         return self.origin[0] + self.factor[0] * x, self.origin[1] + self.factor[1] * y
 
     def handedness(self) -> float:
-        """1 where a left turn stays one, -1 where the scaling mirrors. Raises ScalingError where circles become ellipses."""
+        """1 where a left turn stays one, -1 where the scaling mirrors. Raises ScalingError where circles
+        become ellipses."""
         fx, fy = self.factor
         if abs(abs(fx) - abs(fy)) > SAME_FACTOR * abs(fx):
             raise ScalingError(
@@ -131,14 +134,17 @@ def _factors(window: Point, size: Point, numbers: Sequence[float], kind: float) 
     return factor, rest
 
 
-# Three points are on a line where the area of their parallelogram is below this share of |a| |b| [-]: a radius of 1e9 times the chord.
+# Three points are on a line where the area of their parallelogram is below this share of |a| |b| [-]: a
+# radius of 1e9 times the chord.
 ON_A_LINE = 1e-9
 
 
 def circle_through(start: Point, through: Point, end: Point) -> tuple[Point, float] | None:
-    """Centre [mm] and sweep [rad], counter-clockwise positive, of the arc from `start` through `through` to `end`.
+    """Centre [mm] and sweep [rad], counter-clockwise positive, of the arc from `start` through `through` to
+    `end`.
 
-    A full circle over the diameter start - through where the end is the start; None where the points are on a line.
+    A full circle over the diameter start - through where the end is the start; None where the points are on a
+    line.
     """
     ax, ay = through[0] - start[0], through[1] - start[1]
     bx, by = end[0] - start[0], end[1] - start[1]
@@ -161,7 +167,8 @@ PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
 
 
 class Drawing:
-    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and where in the source they stand [bytes]."""
+    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and where in the source they stand
+    [bytes]."""
 
     def __init__(self) -> None:
         self.kind: list[Kind] = []
@@ -173,7 +180,8 @@ class Drawing:
         self.events: list[tuple[int, int, str, float]] = []
 
     def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
-        """Append a block that ends at `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source [bytes]."""
+        """Append a block that ends at `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source
+        [bytes]."""
         self.kind.append(kind)
         self.end.append(end)
         self.feed.append(feed)

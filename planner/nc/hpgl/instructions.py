@@ -1,7 +1,9 @@
-"""The instructions of HP-GL and HP-GL/2: which are read, which change nothing in the path, and which are refused with what to do.
+"""The instructions of HP-GL and HP-GL/2: which are read, which change nothing in the path, and which are
+refused with what to do.
 
-A plotter leaves out instructions that it does not know. Here they are left out too, and counted in a note; of those that HP's plotters
-know, none that could change the path is left out: it is read, or ignored with a note, or a fault.
+A plotter leaves out instructions that it does not know. Here they are left out too, and counted in a note; of
+those that HP's plotters know, none that could change the path is left out: it is read, or ignored with a
+note, or a fault.
 
 From bytes to instructions, as plotters read them: two letters and numbers.
 
@@ -10,8 +12,9 @@ From bytes to instructions, as plotters read them: two letters and numbers.
     separator   = comma or white space, or nothing before a sign
     terminator  = ; or the letters of the next instruction
 
-Lines mean nothing. Between instructions may stand device control (ESC . letter), the frame of printers (ESC %, @PJL lines) and, at
-the end, characters that are no instruction; they are left out with a note. Small letters are read as capitals.
+Lines mean nothing. Between instructions may stand device control (ESC . letter), the frame of printers (ESC
+%, @PJL lines) and, at the end, characters that are no instruction; they are left out with a note. Small
+letters are read as capitals.
 """
 
 from __future__ import annotations
@@ -23,7 +26,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Form:
-    """How an instruction that is read is written: `name` with numbers, of which there may be `counts` (None: any even number)."""
+    """How an instruction that is read is written: `name` with numbers, of which there may be `counts` (None:
+    any even number)."""
 
     name: str
     numbers: str
@@ -37,7 +41,8 @@ class Form:
         return f"{self.name} {self.numbers}".rstrip()
 
 
-# By their names: the numbers that each takes, and how many of them there may be (None for any number of pairs).
+# By their names: the numbers that each takes, and how many of them there may be (None for any number of
+# pairs).
 FORMS = {
     form.name: form
     for form in (
@@ -87,7 +92,8 @@ IGNORED = {
     **_each("CO WD BL MG", "comments and messages"),
 }
 
-# Of these: what would change the path or its time, some with numbers only, without which they are the default.
+# Of these: what would change the path or its time, some with numbers only, without which they are the
+# default.
 CHANGING, WITH_NUMBERS = frozenset(("RP", "EC", "NR")), frozenset(("LT", "IW", "AS"))
 
 _OUTLINES = "convert it to lines and arcs in the drawing program ('export as outlines', 'as curves')"
@@ -121,7 +127,8 @@ TEXT = {
 ALLOWED = " ".join(form.name for form in FORMS.values())
 
 
-# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a mistake.
+# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a
+# mistake.
 NUMBER_MAX = 1e9
 
 _BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
@@ -139,7 +146,8 @@ Report = Callable[[int, int, str], None]  # from, to, message
 
 @dataclass(slots=True)
 class Instruction:
-    """One instruction: its two letters, its numbers, where it starts and ends in the source, and its text, if it takes any."""
+    """One instruction: its two letters, its numbers, where it starts and ends in the source, and its text, if
+    it takes any."""
 
     name: str
     numbers: list[float]
@@ -173,7 +181,8 @@ def instructions(data: bytes, report: Report, note: Callable[[str], None]) -> It
 
 
 def _passed_over(data: bytes, at: int, report: Report, note: Callable[[str], None]) -> int:
-    """Where to go on after what is no instruction: device control is left out with a note, everything else is a fault."""
+    """Where to go on after what is no instruction: device control is left out with a note, everything else is
+    a fault."""
     control = _CONTROL.match(data, at)
     if control:
         note("device control (ESC sequences, @PJL lines) is left out")

@@ -1,12 +1,14 @@
-"""Executing the instructions of a plotter file: where the pen goes, at which speed, and when it rises and falls.
+"""Executing the instructions of a plotter file: where the pen goes, at which speed, and when it rises and
+falls.
 
     position [mm] = plotter units * unit                                  without SC
                   = (P1 + (user - user_min) * (P2 - P1) / (user_max - user_min)) * unit     with SC
 
-The plotter unit is 0.025 mm unless the machine file says otherwise. Pen up the plotter moves as fast as it can (rapids), pen down at
-VS, in cm/s; without VS at the limits of its axes. Where the pen rises or falls it stands still for as long as the machine file says.
-A pen is changed with the pen up; afterwards it is down again if it was. CI and EA lower the pen for what they draw and leave pen
-and position as they found them. A file starts at (0, 0) with the pen up, without scaling, in absolute coordinates.
+The plotter unit is 0.025 mm unless the machine file says otherwise. Pen up the plotter moves as fast as it
+can (rapids), pen down at VS, in cm/s; without VS at the limits of its axes. Where the pen rises or falls it
+stands still for as long as the machine file says. A pen is changed with the pen up; afterwards it is down
+again if it was. CI and EA lower the pen for what they draw and leave pen and position as they found them. A
+file starts at (0, 0) with the pen up, without scaling, in absolute coordinates.
 
 A fault is recorded and reading goes on with the next instruction, so that `info` can show them all.
 """
@@ -108,7 +110,8 @@ class _Run:
         self.absolute = True
         self.speed, self.speed_of_pen = math.inf, dict[int, float]()
 
-    # --- what is said about it ------------------------------------------------------------------------------------------------
+    # --- what is said about it
+    # ------------------------------------------------------------------------------------------------
 
     def report(self, at: int, end: int, message: str) -> None:
         self.reports.append((at, end, message))
@@ -159,7 +162,8 @@ class _Run:
         line = bisect_left(self._line_ends, at)
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
-    # --- instructions -----------------------------------------------------------------------------------------------------------
+    # --- instructions
+    # -----------------------------------------------------------------------------------------------------------
 
     def execute(self, it: Instruction) -> None:
         try:
@@ -226,7 +230,8 @@ class _Run:
         self._turn(centre, sweep, end, it.at)
 
     def _arc_through(self, it: Instruction) -> None:
-        """An arc through a point to an end; a straight line where the three points lie on one, a circle where it ends at its start."""
+        """An arc through a point to an end; a straight line where the three points lie on one, a circle where
+        it ends at its start."""
         self.scaling.handedness()
         through = self._point(*it.numbers[:2], absolute=it.name == "AT")
         end = self._point(*it.numbers[2:4], absolute=it.name == "AT")
@@ -283,7 +288,8 @@ class _Run:
         else:
             self.speed, self.speed_of_pen = speed, {}
 
-    # --- what the pen does --------------------------------------------------------------------------------------------------------
+    # --- what the pen does
+    # --------------------------------------------------------------------------------------------------------
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
         """Where user coordinates lead [mm]."""

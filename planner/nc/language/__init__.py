@@ -1,4 +1,5 @@
-"""Programs that compute: parameters, expressions, loops, branches and subprograms, expanded into rows of words.
+"""Programs that compute: parameters, expressions, loops, branches and subprograms, expanded into rows of
+words.
 
 In reading order:
 
@@ -12,6 +13,6 @@ In reading order:
     source      the lines of a program: which are plain words, which belong to the language
     expand      a program through all of this;  flat: the expanded program as text
 
-A language is a parser that makes a `tree.Program` and a `tree.Language` that says what its operators and parameters mean; `compiled`,
-`rows` and `run` know no language.
+A language is a parser that makes a `tree.Program` and a `tree.Language` that says what its operators and
+parameters mean; `compiled`, `rows` and `run` know no language.
 """

@@ -1,16 +1,17 @@
 """APPR and DEP: approach to a contour and departure from it.
 
-With the first contour point A, the unit tangent t of the first move there, and n the unit normal of t towards the tool's side, the
-tool's centre begins the contour at C = A + r n (r: radius of the tool). It comes from where it is straight to H, and from H to C
+With the first contour point A, the unit tangent t of the first move there, and n the unit normal of t towards
+the tool's side, the tool's centre begins the contour at C = A + r n (r: radius of the tool). It comes from
+where it is straight to H, and from H to C
 
     LT    along the tangent          H = C - LEN t
     LN    along the normal           H = C + LEN n
     CT    on an arc of radius R      H: the angle CCA before C on the circle about M = C + R n; R < 0 puts M on the other side
     LCT   on an arc of radius R      H: where a line from where the tool is touches that circle
 
-Departure is the same, backwards, from the last contour point with the tangent of the last move. All of it in the plane; the coordinate
-along the tool axis changes at H (approach) or at the end (departure): so manuals up to TNC 640 have it, later ones move all axes at
-once.
+Departure is the same, backwards, from the last contour point with the tangent of the last move. All of it in
+the plane; the coordinate along the tool axis changes at H (approach) or at the end (departure): so manuals up
+to TNC 640 have it, later ones move all axes at once.
 
 R is that of the tool's centre: the manuals' examples approach with R5 and a tool of radius 10.
 """
@@ -124,8 +125,8 @@ class Approach(ContourWay):
     compensated: bool = True
 
     def begin(self, start: FloatArray, first: FloatArray, motion: int, radius: float, mirrored: bool) -> None:
-        """Take the state: where the tool is, `start` (3,), and the `first` point (3,) in the work system, the `motion` code, the
-        `radius` of the tool [mm], and whether the frame is `mirrored`."""
+        """Take the state: where the tool is, `start` (3,), and the `first` point (3,) in the work system, the
+        `motion` code, the `radius` of the tool [mm], and whether the frame is `mirrored`."""
         self._start, self._first = start.copy(), first.copy()
         self._motion = min(motion, 1)
         self._radius = radius if self.compensated else 0.0
@@ -166,13 +167,15 @@ class Approach(ContourWay):
 
 @dataclass
 class Departure(ContourWay):
-    """DEP. end : (3,) of LCT and of the tool axis in the program's coordinates [mm], or None; raised : its Z was given."""
+    """DEP. end : (3,) of LCT and of the tool axis in the program's coordinates [mm], or None; raised : its Z
+    was given."""
 
     end: FloatArray | None = None
     raised: bool = False
 
     def rows(self, offset: OffsetMoves, end: FloatArray | None) -> tuple[list[TravelRow], FloatArray]:
-        """The way from the contour, and where it ends (3,). `end` is in the work system. Raises ValueError."""
+        """The way from the contour, and where it ends (3,). `end` is in the work system. Raises
+        ValueError."""
         place, tangent = offset.place, offset.leaving
         normal = 1j * offset.side * tangent
         contour = in_plane(place, _NORMAL)

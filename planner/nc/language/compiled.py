@@ -8,13 +8,15 @@ Structured statements and jumps become the same thing: basic blocks, which end b
             else:      ... block 1 ...
         else: ...
 
-found by halving, so that a jump among a thousand blocks takes ten comparisons, and loops may be nested as deep as one likes (Python
-allows 20). A loop asks its condition at the end of its turn, in the block of its body: a turn of a simple loop is one block.
+found by halving, so that a jump among a thousand blocks takes ten comparisons, and loops may be nested as
+deep as one likes (Python allows 20). A loop asks its condition at the end of its turn, in the block of its
+body: a turn of a simple loop is one block.
 
-A line of the Python source belongs to a statement, so that an error of Python's arithmetic is told as the statement's.
+A line of the Python source belongs to a statement, so that an error of Python's arithmetic is told as the
+statement's.
 
-Loops that cannot end are told from their text (`never_ends`): nothing that they do changes their condition, and nothing leaves them.
-All others are bounded while they run (run.py).
+Loops that cannot end are told from their text (`never_ends`): nothing that they do changes their condition,
+and nothing leaves them. All others are bounded while they run (run.py).
 """
 
 from __future__ import annotations
@@ -149,7 +151,8 @@ class _Function:
         self.blocks.put("run.turns+=n;return None", place)
         return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *self.blocks.source()]
 
-    # --- statements -------------------------------------------------------------------------------------------------------
+    # --- statements
+    # -------------------------------------------------------------------------------------------------------
 
     def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:

@@ -2,16 +2,19 @@
 
 A program that computes nothing is told from the words that the lexer has made, without looking at its text.
 
-LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M98,
-M99, and sums without brackets behind an equals sign. Parameters and brackets alone belong to both and are read as LinuxCNC's.
+LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [
+with DO, G65, G66, M98, M99, and sums without brackets behind an equals sign. Parameters and brackets alone
+belong to both and are read as LinuxCNC's.
 
-Conversational Heidenhain programs and Siemens programs with their commands and assignments are read by `planner.nc.language`, plotter
-files (HPGL) by `planner.nc.hpgl`. The marks below occur in no RS274NGC program outside comments.
+Conversational Heidenhain programs and Siemens programs with their commands and assignments are read by
+`planner.nc.language`, plotter files (HPGL) by `planner.nc.hpgl`. The marks below occur in no RS274NGC program
+outside comments.
 
-Text before the first % of a program: names of parts, lists of tools, what a serial line needed. Controls skip it.
+Text before the first % of a program: names of parts, lists of tools, what a serial line needed. Controls skip
+it.
 
-It is skipped here too where it cannot be a program: some line of it is no words, and no line that is words has a code or a coordinate.
-Parameters and expressions (# [ < =) are no such text.
+It is skipped here too where it cannot be a program: some line of it is no words, and no line that is words
+has a code or a coordinate. Parameters and expressions (# [ < =) are no such text.
 """
 
 from __future__ import annotations
@@ -26,8 +29,8 @@ from planner.nc.hpgl.instructions import CONTROL
 from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, SIEMENS, Reading
 
-# What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one that fits nowhere is tried
-# in 2^n ways, such as n comments in a file of no language.
+# What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
+# that fits nowhere is tried in 2^n ways, such as n comments in a file of no language.
 _LOOKED_AT = (
     20_000  # bytes at the start of a file that tell its language, and in which the first % is looked for
 )
@@ -42,8 +45,9 @@ _SIEMENS = re.compile(
 )
 
 
-# A plotter file starts with one of these instructions and a number, the end of the instruction or the next one. No word of an NC
-# program is a letter followed by a letter. (A semicolon before it may start a comment of an NC program.)
+# A plotter file starts with one of these instructions and a number, the end of the instruction or the next
+# one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
+# of an NC program.)
 _FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
 _HPGL = re.compile(
     rb"\A(?:\s|\xef\xbb\xbf)*+(?>"
@@ -154,7 +158,8 @@ _DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 
 def without_leader(data: bytes) -> tuple[bytes, str]:
-    """The program with blanks for the text before its first %, and the beginning of that text; ("" where there is none).
+    """The program with blanks for the text before its first %, and the beginning of that text; ("" where
+    there is none).
 
     Offsets and lines stay as they are.
     """
@@ -174,7 +179,8 @@ def _is_text(text: bytes) -> bool:
 
 
 def may_compute(words: Words) -> list[int]:
-    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may be of a language."""
+    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may
+    be of a language."""
     found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
     found += [words.find(letter, *numbers) for letter, numbers in _CALLS.items()]
     return words.rows_with(np.concatenate(found))
@@ -191,7 +197,8 @@ def computes(text: str) -> bool:
 
 
 def dialect_of(words: Words, reading: Reading) -> str | None:
-    """The language that a program computes in, or None if it does not. `Reading.dialect` decides where it is given."""
+    """The language that a program computes in, or None if it does not. `Reading.dialect` decides where it is
+    given."""
     found, end = None, _first_end(words)
     for row in may_compute(words):
         if row > end and found is None:
@@ -210,10 +217,11 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
 
 
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
-    """True if a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of the machine decides.
+    """True if a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of
+    the machine decides.
 
-    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle G70 to G73 with P and Q,
-    a G76 with K and D, or another sign of a lathe (`_has_signs`).
+    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle
+    G70 to G73 with P and Q, a G76 with K and D, or another sign of a lathe (`_has_signs`).
     """
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
@@ -241,11 +249,13 @@ def has_two_axes(words: Words) -> bool:
 
 
 def _has_signs(words: Words) -> bool:
-    """True if a program without Y has a sign of a Fanuc or Haas lathe (G code system A), and none of a mill or of another lathe.
+    """True if a program without Y has a sign of a Fanuc or Haas lathe (G code system A), and none of a mill
+    or of another lathe.
 
-    Signs are a tool with its offset in one word of four digits (T0101), G50 or G96 with S, and G99 without the cycles whose retract it
-    is on mills. J, M6, planes but G18, feed modes and diameters of LinuxCNC (G93, G95, G7, G8), D beside G96, and G90, G91 or G94
-    without coordinates (G90 and G94 are cycles of system A) are of others.
+    Signs are a tool with its offset in one word of four digits (T0101), G50 or G96 with S, and G99 without
+    the cycles whose retract it is on mills. J, M6, planes but G18, feed modes and diameters of LinuxCNC (G93,
+    G95, G7, G8), D beside G96, and G90, G91 or G94 without coordinates (G90 and G94 are cycles of system A)
+    are of others.
     """
     if _has(words, "J") or _rows_with(words, "M", _TOOL_CHANGE) or _rows_with(words, "G", *_OF_OTHERS):
         return False
@@ -273,7 +283,8 @@ def _has(words: Words, letter: str) -> bool:
 
 
 def has_further_systems(words: Words) -> bool:
-    """True if a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas' know."""
+    """True if a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas'
+    know."""
     return _has(words, "L") and len(words.find("G", G_FURTHER)) > 0
 
 

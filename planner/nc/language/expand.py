@@ -1,4 +1,5 @@
-"""A program with parameters, expressions, loops or subprograms through the interpreter, and what was expanded on the way."""
+"""A program with parameters, expressions, loops or subprograms through the interpreter, and what was expanded
+on the way."""
 
 from __future__ import annotations
 
@@ -54,7 +55,8 @@ Tee = Callable[[Words], None]
 def expand(
     interpreter: Interpreter, words: Words, dialect: str, integers: Integers, tee: Tee | None = None
 ) -> tuple[Program, Sequence[Fault]]:
-    """Run a program of that dialect through the interpreter; returns it and its faults, those of its statements first.
+    """Run a program of that dialect through the interpreter; returns it and its faults, those of its
+    statements first.
 
     words    : of the whole program; rows that compute are read again as text
     integers : what numbers without a point mean, applied to the words already
@@ -142,7 +144,8 @@ class _Files:
         return []
 
     def load(self, name: str) -> bool:
-        """Read the file name.ngc in the program's folder, or in a folder below it; False if there is none. Raises ProgramFault."""
+        """Read the file name.ngc in the program's folder, or in a folder below it; False if there is none.
+        Raises ProgramFault."""
         path = self._find(name)
         if path is None:
             return False

@@ -1,4 +1,5 @@
-"""Reading expressions by the ranks of their operators (Pratt's method): one reader, and a table of operators for each dialect."""
+"""Reading expressions by the ranks of their operators (Pratt's method): one reader, and a table of operators
+for each dialect."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets th
 
 
 def ranked(*names: str) -> dict[str, int]:
-    """Ranks of operators from 1, of texts of names with blanks between them; those of a higher rank bind first."""
+    """Ranks of operators from 1, of texts of names with blanks between them; those of a higher rank bind
+    first."""
     return {name: rank for rank, of_rank in enumerate(names, start=1) for name in of_rank.split()}
 
 
@@ -51,7 +53,8 @@ class ExpressionReader:
         raise NotImplementedError
 
     def expression(self, rank: int = 1) -> Expression:
-        """Values with operators of at least that rank between them; those of one rank are taken from left to right."""
+        """Values with operators of at least that rank between them; those of one rank are taken from left to
+        right."""
         left, count = self.value(), 0
         while (its := self.ranks.get(operator := self.operator(), 0)) >= rank:
             self.skip(operator)

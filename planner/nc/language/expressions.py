@@ -1,4 +1,5 @@
-"""Python source of a language: expressions by its templates, and basic blocks, lines that run one after the other."""
+"""Python source of a language: expressions by its templates, and basic blocks, lines that run one after the
+other."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "binary": lambda x: float(int(f"{int(x):x}")),  # 0x25 read as the decimal digits 25
     "decimal": lambda x: float(int(str(int(x)), 16)),  # 25 as 0x25
 }
-# By name and number of operands. A dialect that means another thing by a name puts its own text in the place of this one.
+# By name and number of operands. A dialect that means another thing by a name puts its own text in the place
+# of this one.
 ARITHMETIC: dict[tuple[str, int], str] = {
     ("-", 1): "(-{0})",
     ("+", 2): "({0}+{1})",
@@ -85,8 +87,8 @@ ARITHMETIC: dict[tuple[str, int], str] = {
 
 @dataclass
 class _End:
-    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves the function.
-    With `computed` it goes to the label of the program whose number that text gives.
+    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves
+    the function. With `computed` it goes to the label of the program whose number that text gives.
     """
 
     place: tree.SourcePlace

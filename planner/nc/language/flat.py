@@ -1,8 +1,8 @@
 """The expanded program as text: the words of every executed line, in their order, as any control reads them.
 
-Resolved are parameters, expressions, loops, branches, subprograms and saved modes. Everything else stays as the program has it: moves,
-arcs, feeds, dwells, canned cycles, work offsets, tools, spindle, coolant. Line numbers and comments are left out. Numbers are rounded
-to `DECIMALS`.
+Resolved are parameters, expressions, loops, branches, subprograms and saved modes. Everything else stays as
+the program has it: moves, arcs, feeds, dwells, canned cycles, work offsets, tools, spindle, coolant. Line
+numbers and comments are left out. Numbers are rounded to `DECIMALS`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ _NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "
 class Flat:
     """Collects the lines of a program while it is expanded: `add` is the `tee` of `expand`.
 
-    points : write lengths and the times of dwells with a point, because the machine reads them otherwise without
+    points : write lengths and the times of dwells with a point, because the machine reads them otherwise
+             without
     """
 
     def __init__(self, source: str, *, points: bool = False):

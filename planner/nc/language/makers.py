@@ -2,7 +2,8 @@
 
 Programmed frames: shifts, rotations, mirror images and scales.
 
-Siemens: TRANS, ROT, SCALE and MIRROR replace the frame, ATRANS, AROT, ASCALE and AMIRROR add to it in the coordinates in force,
+Siemens: TRANS, ROT, SCALE and MIRROR replace the frame, ATRANS, AROT, ASCALE and AMIRROR add to it in the
+         coordinates in force,
 
     p -> A (B p + b) + t      from      p -> A p + t.
 
@@ -10,11 +11,13 @@ Heidenhain: cycles 7, 8, 10, 11 and 26 each set one part of
 
     p -> d + R D M p + (c - D c),
 
-d the datum shift, M the mirror image, D the scale (about c), R the rotation about the datum. In which order the parts act is not
-documented in what could be read; what depends on it is refused: a mirror image or a scale of single axes together with a rotation,
-and a datum shift (other than back to 0) while one of the others is in force.
+d the datum shift, M the mirror image, D the scale (about c), R the rotation about the datum. In which order
+the parts act is not documented in what could be read; what depends on it is refused: a mirror image or a
+scale of single axes together with a rotation, and a datum shift (other than back to 0) while one of the
+others is in force.
 
-Where the frame is a shift alone it becomes a G52; else the rows are written in the coordinates of the work system (`travel`).
+Where the frame is a shift alone it becomes a G52; else the rows are written in the coordinates of the work
+system (`travel`).
 """
 
 from __future__ import annotations
@@ -71,7 +74,8 @@ def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def heidenhain(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """Cycles 7, 8, 10, 11 and 26; `cycle` is the number. Letters behind I are incremental. Raises ValueError."""
+    """Cycles 7, 8, 10, 11 and 26; `cycle` is the number. Letters behind I are incremental. Raises
+    ValueError."""
     parts, cycle, unit = making.travel.parts, round(given["cycle"]), making.unit
     if cycle == 7:
         datum = parts.datum.copy()
@@ -183,7 +187,8 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _direction(making: Making) -> complex:
-    """Unit tangent of the last move at its end, in the program's plane. Raises ValueError where there is none."""
+    """Unit tangent of the last move at its end, in the program's plane. Raises ValueError where there is
+    none."""
     travel, interpreter = making.travel, making.interpreter
     if travel.compensated:
         raise ValueError(
@@ -267,7 +272,8 @@ def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises ValueError."""
+    """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises
+    ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
 
 

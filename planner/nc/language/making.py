@@ -1,14 +1,16 @@
 """Makers of rows.
 
-A maker is a function of the running program's state and the values of a command; it gives rows of words in the program's coordinates
-and units, each a list of letters and numbers, and raises ValueError for values that make no sense.
+A maker is a function of the running program's state and the values of a command; it gives rows of words in
+the program's coordinates and units, each a list of letters and numbers, and raises ValueError for values that
+make no sense.
 
-What programs of the languages mean that is planned otherwise, and may change geometry or time: sentences that are said first, by the
-names under which statements carry them (`assumed_row`).
+What programs of the languages mean that is planned otherwise, and may change geometry or time: sentences that
+are said first, by the names under which statements carry them (`assumed_row`).
 
-Makers of several dialects share the holes below: tapping, pecking with decreasing infeeds, and bores that are milled. Tapping goes in
-and out at the feed lead * speed of the spindle, with a full stop at the bottom, where the spindle turns round. It is planned with
-that feed as its upper limit, not in step with the spindle; a note says so.
+Makers of several dialects share the holes below: tapping, pecking with decreasing infeeds, and bores that are
+milled. Tapping goes in and out at the feed lead * speed of the spindle, with a full stop at the bottom, where
+the spindle turns round. It is planned with that feed as its upper limit, not in step with the spindle; a note
+says so.
 """
 
 from __future__ import annotations
@@ -86,7 +88,8 @@ class Making:
         return float(x), float(y), float(z)
 
     def tool_radius(self) -> float:
-        """Radius of the loaded tool in the program's unit. Raises ValueError where the machine file gives no diameter."""
+        """Radius of the loaded tool in the program's unit. Raises ValueError where the machine file gives no
+        diameter."""
         found = self.travel.radius()
         if found == 0.0:
             number = self.interpreter.state.tool_loaded
@@ -96,14 +99,16 @@ class Making:
         return found / self.unit
 
     def assume(self, text: str) -> None:
-        """Keep what is assumed of the command and may change geometry or time. Raises ValueError where nothing may be assumed."""
+        """Keep what is assumed of the command and may change geometry or time. Raises ValueError where
+        nothing may be assumed."""
         if self.interpreter.findings.strict:
             raise ValueError(f"{text} (assumed without --strict)")
         self.interpreter.findings.assume(text, self.place.line)
 
 
 def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
-    """The rows of a cycle under G90; behind them G91, the motion code, and with `feed` the feed as they were before."""
+    """The rows of a cycle under G90; behind them G91, the motion code, and with `feed` the feed as they were
+    before."""
     state, travel = making.interpreter.state, making.travel
     absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
     before = state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
@@ -121,7 +126,8 @@ def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
 
 
 def equal_steps(whole: float, most: float) -> int:
-    """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises ValueError."""
+    """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises
+    ValueError."""
     if whole <= 0.0 or most <= 0.0:
         return 1
     count = whole / most
@@ -142,7 +148,8 @@ BREAK = 0.2  # mm by which the tool goes back to break a chip, and above the dep
 
 @dataclass(frozen=True)
 class HolePlan:
-    """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell at the bottom [s].
+    """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell
+    at the bottom [s].
 
     Raises ValueError if the bottom is not below the surface.
     """
@@ -160,7 +167,8 @@ class HolePlan:
 
 
 def coarse_lead(size: float, unit: float) -> float:
-    """The lead of a metric thread by its size, in the program's unit. Raises ValueError for sizes without one."""
+    """The lead of a metric thread by its size, in the program's unit. Raises ValueError for sizes without
+    one."""
     if size not in _COARSE:
         raise ValueError(f"M{size:g} is no size of a metric coarse thread here; give the lead itself (PIT)")
     return _COARSE[int(size)] / unit
@@ -187,7 +195,8 @@ def tapped(
     up: float | None = None,
     start: bool = True,
 ) -> Iterator[Row]:
-    """In with lead * speed, out with lead * back (0: the same speed). Raises ValueError without a lead or a speed.
+    """In with lead * speed, out with lead * back (0: the same speed). Raises ValueError without a lead or a
+    speed.
 
     lead  : negative for a left-hand thread
     up    : where the way out ends, else at the clearance
@@ -271,7 +280,8 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
 
 
 def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
-    """A bore milled on a helix: infeed per turn, once round on the ground, back to the middle. Raises ValueError."""
+    """A bore milled on a helix: infeed per turn, once round on the ground, back to the middle. Raises
+    ValueError."""
     radius = making.tool_radius()
     size = diameter / 2.0 - radius
     if size <= 0.0:

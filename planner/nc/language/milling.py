@@ -1,21 +1,23 @@
 """Pockets and slots as rows: depth passes, paths from inside to outside, plunging, finishing.
 
-Roughing divides the depth, less the allowance at the bottom, into equal passes; each plunges where the core begins and clears the
-pocket from inside to outside up to the allowance at the walls. Finishing runs along the walls, which it meets and leaves on quarter
-circles, and clears the bottom in one pass.
+Roughing divides the depth, less the allowance at the bottom, into equal passes; each plunges where the core
+begins and clears the pocket from inside to outside up to the allowance at the walls. Finishing runs along the
+walls, which it meets and leaves on quarter circles, and clears the bottom in one pass.
 
-Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are this reader's own. Two
-paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t inside the outer path, is t from its sides and
-(s - t) sqrt(2) from the inner corner; both are more than the tool's radius r somewhere if s > (1 + 1/sqrt(2)) r. So that is the most.
+Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are
+this reader's own. Two paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t
+inside the outer path, is t from its sides and (s - t) sqrt(2) from the inner corner; both are more than the
+tool's radius r somewhere if s > (1 + 1/sqrt(2)) r. So that is the most.
 
-Paths are complex numbers in the plane of the pocket; shapes give closed ones at equal distances from the walls:
+Paths are complex numbers in the plane of the pocket; shapes give closed ones at equal distances from the
+walls:
 
     RoundedRectangle    also circles (both halves equal to the corner radius) and straight slots (corner radius half the width)
     ArcSlot             a slot along an arc
 
-`loop(d)` is the path at the distance d from the walls, 0 <= d < room; what is left at d = room is a line or an arc, the `core`, or a
-point. A tool of radius r whose centre runs along `loop(r)` touches all walls and cuts none of them, where corners have a radius of at
-least r.
+`loop(d)` is the path at the distance d from the walls, 0 <= d < room; what is left at d = room is a line or
+an arc, the `core`, or a point. A tool of radius r whose centre runs along `loop(r)` touches all walls and
+cuts none of them, where corners have a radius of at least r.
 """
 
 from __future__ import annotations
@@ -80,7 +82,8 @@ class RoundedRectangle:
         return start, legs
 
     def to_wall(self) -> list[PocketLeg]:
-        """From the start of the core to where a straight leg to the start of a loop stays inside: none is needed."""
+        """From the start of the core to where a straight leg to the start of a loop stays inside: none is
+        needed."""
         return []
 
     def core(self) -> Path:
@@ -91,7 +94,8 @@ class RoundedRectangle:
 
 @dataclass(frozen=True)
 class ArcSlot:
-    """A slot of half width b along an arc about 0 with a radius, from an angle on, by a sweep, counter-clockwise if positive [rad]."""
+    """A slot of half width b along an arc about 0 with a radius, from an angle on, by a sweep,
+    counter-clockwise if positive [rad]."""
 
     radius: float
     b: float
@@ -311,7 +315,8 @@ class _Cutting:
 def _passes(
     cut: _Cutting, shape: PocketShape, paths: list[Path], bottom: float, infeed: float, feed: float
 ) -> Iterator[Row]:
-    """Passes of equal depth down to the bottom, each along all paths and back to the start, and up at the end."""
+    """Passes of equal depth down to the bottom, each along all paths and back to the start, and up at the
+    end."""
     plan, start = cut.plan, paths[0][0]
     out = shape.to_wall()
     back = backwards(start, out)

@@ -1,8 +1,9 @@
 """Rows that a running program appends, and how they become rows of words for the interpreter.
 
-Appending has to be cheap, since a loop does it a million times: a statement appends its number to `pending` and the values it has
-computed to `values`. Everything else about its rows is constant and stands in tables: letters, places, the numbers that are not
-computed. `take` puts both together, some 100,000 rows at once, with a few numpy operations.
+Appending has to be cheap, since a loop does it a million times: a statement appends its number to `pending`
+and the values it has computed to `values`. Everything else about its rows is constant and stands in tables:
+letters, places, the numbers that are not computed. `take` puts both together, some 100,000 rows at once, with
+a few numpy operations.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ RowWord = tuple[int, int, float | None]  # letter code, place, value
 
 @dataclass
 class _Tables:
-    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed` words have no
-    value here."""
+    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed`
+    words have no value here."""
 
     letter: Array
     value: FloatArray
@@ -56,7 +57,8 @@ class AppendedRows:
         self._tables: _Tables | None = None
 
     def add_file(self, words: Words, name: str) -> tuple[int, int]:
-        """Take a file's words into the tables; returns the number of its first row, and where its bytes begin in `data`."""
+        """Take a file's words into the tables; returns the number of its first row, and where its bytes begin
+        in `data`."""
         self._settle()
         begin = len(self.data)
         if begin:
@@ -66,7 +68,8 @@ class AppendedRows:
         return self._rows - len(words.line), begin
 
     def add_row(self, line: int, words: Sequence[RowWord]) -> int:
-        """Make an entry of one row of (letter code, place, value), with None where the value is computed; returns its number."""
+        """Make an entry of one row of (letter code, place, value), with None where the value is computed;
+        returns its number."""
         self._new.append((line, words))
         row = self._rows + len(self._new) - 1
         return self.add_entry(row, row + 1)
@@ -85,7 +88,8 @@ class AppendedRows:
             self.frames.append((len(self.pending), frame))
 
     def take(self) -> Words:
-        """All pending rows as words, which are then no longer pending. A computed value of NaN was vacant: its word is left out.
+        """All pending rows as words, which are then no longer pending. A computed value of NaN was vacant:
+        its word is left out.
 
         Raises NotFinite if a computed value is infinite.
         """

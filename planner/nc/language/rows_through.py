@@ -1,12 +1,14 @@
-"""Between the rows of a program and the interpreter: the programmed frame, and radius compensation as Heidenhain and Siemens have it.
+"""Between the rows of a program and the interpreter: the programmed frame, and radius compensation as
+Heidenhain and Siemens have it.
 
 A point p of the program is at
 
     q = A p + t,      A (3, 3), t (3,),
 
-in the coordinates of the work system. Arcs stay arcs where A turns, mirrors and scales their plane evenly; where it mirrors the plane,
-their direction and the side of compensation change. Rows come out with absolute coordinates (G90), with centres as I J K, so that the
-expanded program needs neither frames nor compensation. Rows that only switch something pass.
+in the coordinates of the work system. Arcs stay arcs where A turns, mirrors and scales their plane evenly;
+where it mirrors the plane, their direction and the side of compensation change. Rows come out with absolute
+coordinates (G90), with centres as I J K, so that the expanded program needs neither frames nor compensation.
+Rows that only switch something pass.
 
 With no frame and no compensation in force rows pass as they are. All lengths here are in mm.
 """
@@ -78,10 +80,12 @@ class RowsThrough(Coordinates):
         """True if compensation is on, or waits for its approach."""
         return self._offset is not None or self._approach is not None
 
-    # --- rows -----------------------------------------------------------------------------------------------------------------
+    # --- rows
+    # -----------------------------------------------------------------------------------------------------------------
 
     def through(self, words: Words) -> Iterator[Words]:
-        """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises ProgramFault."""
+        """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises
+        ProgramFault."""
         self._files = words.files
         if not self.active:
             yield words
@@ -233,7 +237,8 @@ class RowsThrough(Coordinates):
         rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
         out += [self._in_units(one) for one in rows]
 
-    # --- inside -------------------------------------------------------------------------------------------------------------
+    # --- inside
+    # -------------------------------------------------------------------------------------------------------------
 
     def _no_corner(self) -> None:
         waits = self._corner or self._coming
@@ -273,7 +278,8 @@ class RowsThrough(Coordinates):
         self._beside = offset.started
 
     def _idle(self) -> bool:
-        """True if rows may pass as they are; not while a motion code that was turned round (G2, G3) may count behind."""
+        """True if rows may pass as they are; not while a motion code that was turned round (G2, G3) may count
+        behind."""
         waits = self.compensated or self._beside or self._coming is not None or self._corner is not None
         turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
         return self.is_plain and not (waits or turned)

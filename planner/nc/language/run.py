@@ -1,10 +1,11 @@
 """The running program: its parameters, its calls, its limits, and the errors of its arithmetic as sentences.
 
-Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset, the tool) is asked of the
-interpreter after everything pending has been executed.
+Rows go to the interpreter in chunks. A parameter that holds the state of the control (a position, an offset,
+the tool) is asked of the interpreter after everything pending has been executed.
 
-A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows (`BY_WORD_MAX` that are no
-plain straight moves), `IDLE_MAX` rows without a move, or at `DEPTH_MAX` open calls, with a sentence that names the line.
+A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jumps and calls, `ROWS_MAX` rows
+(`BY_WORD_MAX` that are no plain straight moves), `IDLE_MAX` rows without a move, or at `DEPTH_MAX` open
+calls, with a sentence that names the line.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class ProgramRun:
     numbered : values of the numbered parameters, by number
     shared   : values of the named parameters that all calls share
     makers   : of the rows of `tree.MadeRows`
-    leave_profile : gives up a profile that a cycle of a lathe has not read to its end, and says where that stands
+    leave_profile : gives up a profile that a cycle of a lathe has not read to its end, and says where that
+                    stands
     resume   : the label where the caller of a procedure goes on, or None
     """
 
@@ -120,7 +122,8 @@ class ProgramRun:
         for name, function in compiled.functions.items():
             self.functions.setdefault(name, function)
 
-    # --- what the compiled program calls ------------------------------------------------------------------------------------
+    # --- what the compiled program calls
+    # ------------------------------------------------------------------------------------
 
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
@@ -290,7 +293,8 @@ class ProgramRun:
         assert label is not None
         return label
 
-    # --- inside -------------------------------------------------------------------------------------------------------------
+    # --- inside
+    # -------------------------------------------------------------------------------------------------------------
 
     def _number(self, index: float) -> int:
         number = whole(index)

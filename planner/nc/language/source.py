@@ -1,7 +1,8 @@
 """The lines of a program: which are plain words, and which belong to the language.
 
-The lexer has split every line into words as far as it goes. A row with what it could not read, or with an O word or a code that calls a
-subprogram, is looked at again here as text; all others stay as they are, in runs of rows (`tree.PlainRows`).
+The lexer has split every line into words as far as it goes. A row with what it could not read, or with an O
+word or a code that calls a subprogram, is looked at again here as text; all others stay as they are, in runs
+of rows (`tree.PlainRows`).
 """
 
 from __future__ import annotations

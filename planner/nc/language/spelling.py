@@ -4,8 +4,8 @@
     parameter  = # value | # < name >                function = NAME [ expression ] | ATAN [ expression ] / [ expression ]
     assignment = parameter = value                   (Fanuc: parameter = expression)
 
-Blanks mean nothing, also inside numbers and names; case means nothing. Operators of one rank are taken from left to right; a sign
-belongs to what follows it, so that -2**2 is 4.
+Blanks mean nothing, also inside numbers and names; case means nothing. Operators of one rank are taken from
+left to right; a sign belongs to what follows it, so that -2**2 is 4.
 """
 
 from __future__ import annotations
@@ -132,7 +132,8 @@ class LineReader(ExpressionReader):
         self.at = match.end()
         return name
 
-    # --- values -------------------------------------------------------------------------------------------------------------
+    # --- values
+    # -------------------------------------------------------------------------------------------------------------
 
     def number(self) -> float | None:
         """The number that comes next, without a sign, or None."""
@@ -211,10 +212,12 @@ class LineReader(ExpressionReader):
     def skip(self, operator: str) -> None:
         self.at += len(operator)
 
-    # --- words --------------------------------------------------------------------------------------------------------------
+    # --- words
+    # --------------------------------------------------------------------------------------------------------------
 
     def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
-        """All words and assignments up to the end of the line; lengths written without a point are multiplied by `scale`."""
+        """All words and assignments up to the end of the line; lengths written without a point are multiplied
+        by `scale`."""
         words: list[tree.Word] = []
         assignments: list[tuple[tree.Parameter, tree.Expression]] = []
         while not self.ended:

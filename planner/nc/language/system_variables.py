@@ -1,7 +1,9 @@
-"""Parameters that hold the state of the control: positions, offsets, modes, tool, spindle. LinuxCNC's and Fanuc's numbers and names.
+"""Parameters that hold the state of the control: positions, offsets, modes, tool, spindle. LinuxCNC's and
+Fanuc's numbers and names.
 
-Lengths are in the program's unit where LinuxCNC has them so (5420 and the named ones), else in mm, the unit of a machine here: offsets,
-G28 and G30 positions and tool lengths are kept by a LinuxCNC control in the machine's unit.
+Lengths are in the program's unit where LinuxCNC has them so (5420 and the named ones), else in mm, the unit
+of a machine here: offsets, G28 and G30 positions and tool lengths are kept by a LinuxCNC control in the
+machine's unit.
 """
 
 from __future__ import annotations
@@ -48,7 +50,8 @@ class SystemVariables:
             f"parameter #{number} belongs to the control and is only read here; write G10, G92, G28.1 or a tool change instead"
         )
 
-    # --- the state, as numbers ----------------------------------------------------------------------------------------------
+    # --- the state, as numbers
+    # ----------------------------------------------------------------------------------------------
 
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
@@ -125,7 +128,8 @@ class SystemVariables:
         return tuple(tuple(row) for row in rows)
 
 
-# --- LinuxCNC -------------------------------------------------------------------------------------------------------------------
+# --- LinuxCNC
+# -------------------------------------------------------------------------------------------------------------------
 
 
 def _motion_mode(motion: int) -> float:
@@ -207,7 +211,8 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     return 0.0
 
 
-# Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can name: x, y, z.
+# Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can
+# name: x, y, z.
 FIRST_POSITION = 2001
 
 
@@ -245,7 +250,8 @@ class LinuxcncVariables(SystemVariables):
         return _linuxcnc_number(self, parameter)
 
 
-# --- Fanuc ----------------------------------------------------------------------------------------------------------------------
+# --- Fanuc
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 class FanucVariables(SystemVariables):
@@ -258,7 +264,8 @@ class FanucVariables(SystemVariables):
     )
 
     def get(self, parameter: int | str, depth: int) -> float:
-        """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the control knows."""
+        """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the
+        control knows."""
         assert isinstance(parameter, int)
         state, number = self.interpreter.state, parameter
         if 4201 <= number <= 4330:
@@ -293,7 +300,8 @@ class FanucVariables(SystemVariables):
         )
 
     def put(self, number: int, value: float | None) -> None:
-        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that is changed by codes."""
+        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that
+        is changed by codes."""
         if number == 3000:
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:

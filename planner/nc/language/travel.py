@@ -1,4 +1,5 @@
-"""Commands that ask and set the way from a program's rows to the interpreter (`rows_through`): frame, compensation, corners."""
+"""Commands that ask and set the way from a program's rows to the interpreter (`rows_through`): frame,
+compensation, corners."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ class Travel(RowsThrough):
         return self.place.copy() if self.active else self.interpreter.state.programmed()
 
     def radius(self) -> float:
-        """Radius of the loaded tool [mm], 0 where neither the program nor the machine file gives one. Raises ValueError."""
+        """Radius of the loaded tool [mm], 0 where neither the program nor the machine file gives one. Raises
+        ValueError."""
         tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
         found = (0.0 if tool is None else tool.diameter / 2.0) + self.oversize
         if found < 0.0:
@@ -31,7 +33,8 @@ class Travel(RowsThrough):
         return found
 
     def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
-        """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
+        """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises
+        ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
@@ -40,7 +43,8 @@ class Travel(RowsThrough):
         self.place = self.unmapped(self._mapped)
 
     def compensate(self, side: int, assume: Callable[[str], None]) -> None:
-        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what is assumed.
+        """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what
+        is assumed.
 
         Raises ValueError.
         """
@@ -77,7 +81,8 @@ class Travel(RowsThrough):
         return radius
 
     def approach(self, approach: Approach, assume: Callable[[str], None]) -> None:
-        """APPR: the contour begins at a point; the way to it is known with its first move. Raises ValueError."""
+        """APPR: the contour begins at a point; the way to it is known with its first move. Raises
+        ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")

@@ -1,4 +1,5 @@
-"""Rows of words on their way to the interpreter, the moves that they say, in mm, and the frame that maps these and their arcs."""
+"""Rows of words on their way to the interpreter, the moves that they say, in mm, and the frame that maps
+these and their arcs."""
 
 from __future__ import annotations
 
@@ -118,7 +119,8 @@ def other_words(row: TravelRow, *, arc: bool) -> list[tuple[int, float, int]]:
 
 @dataclass
 class FrameParts:
-    """Heidenhain's: datum shift (3,) [mm], mirror (3,) of 1 and -1, rotation [degrees], scale (3,), centre of the scale (3,) [mm]."""
+    """Heidenhain's: datum shift (3,) [mm], mirror (3,) of 1 and -1, rotation [degrees], scale (3,), centre of
+    the scale (3,) [mm]."""
 
     datum: FloatArray = field(default_factory=lambda: np.zeros(3))
     mirror: FloatArray = field(default_factory=lambda: np.ones(3))

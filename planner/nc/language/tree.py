@@ -1,7 +1,9 @@
-"""A program that computes, as a tree: expressions, statements, procedures. No language's spelling is known here.
+"""A program that computes, as a tree: expressions, statements, procedures. No language's spelling is known
+here.
 
-A statement appends rows of words, changes parameters, or decides what is executed next. Rows that need no computing stay as the lexer
-split them and are named by their numbers (`PlainRows`): a program of 100,000 lines with ten expressions is not parsed twice.
+A statement appends rows of words, changes parameters, or decides what is executed next. Rows that need no
+computing stay as the lexer split them and are named by their numbers (`PlainRows`): a program of 100,000
+lines with ten expressions is not parsed twice.
 """
 
 from __future__ import annotations
@@ -12,14 +14,16 @@ from typing import NamedTuple, Protocol
 
 
 class SourcePlace(NamedTuple):
-    """Where a statement stands: its file (0 for the main program), its 1-based line, and the byte offset of its first letter."""
+    """Where a statement stands: its file (0 for the main program), its 1-based line, and the byte offset of
+    its first letter."""
 
     file: int
     line: int
     at: int
 
 
-# --- expressions ------------------------------------------------------------------------------------------------------------
+# --- expressions
+# ------------------------------------------------------------------------------------------------------------
 
 
 class Value:
@@ -94,7 +98,8 @@ def op(name: str, *operands: Value) -> Operation:
     return Operation(name, operands)  # type: ignore[arg-type]
 
 
-# --- statements -------------------------------------------------------------------------------------------------------------
+# --- statements
+# -------------------------------------------------------------------------------------------------------------
 
 
 class PlainRows(NamedTuple):
@@ -155,7 +160,8 @@ class If(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """`while` asks before each turn, `do` after it, `repeat` counts; `name` is what Break and Continue say."""
+    """`while` asks before each turn, `do` after it, `repeat` counts; `name` is what Break and Continue
+    say."""
 
     place: SourcePlace
     kind: str
@@ -230,7 +236,8 @@ class Modes(NamedTuple):
 
 
 class MadeRows(NamedTuple):
-    """Rows that Python makes of values while the program runs: a cycle, a change of frame (`makers.MAKERS`)."""
+    """Rows that Python makes of values while the program runs: a cycle, a change of frame
+    (`makers.MAKERS`)."""
 
     place: SourcePlace
     maker: str
@@ -245,7 +252,8 @@ def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRow
 
 @dataclass
 class OpenStatement:
-    """A branch or loop whose end has not come: its body so far, and of a branch the conditions and bodies before it.
+    """A branch or loop whose end has not come: its body so far, and of a branch the conditions and bodies
+    before it.
 
     count : of a loop that counts: its variable and last value
     """
@@ -331,7 +339,8 @@ class Parser(Protocol):
     faults: list[ProgramFault]
 
     def parse(self) -> list[Procedure]:
-        """All procedures of the file, the main program under the empty name; lines that cannot be read are in `faults`."""
+        """All procedures of the file, the main program under the empty name; lines that cannot be read are in
+        `faults`."""
 
 
 class ProgramFault(Exception):

@@ -1,4 +1,5 @@
-"""Jobs of the tool's tip: planned through the kinematics, delivered as setpoints of the joints, judged there and at the tip."""
+"""Jobs of the tool's tip: planned through the kinematics, delivered as setpoints of the joints, judged there
+and at the tip."""
 
 from __future__ import annotations
 
@@ -41,15 +42,17 @@ class Judged:
 
 
 def chain_of(program: Program, machine: Machine) -> Chain | None:
-    """The kinematics that a program is planned through: those of the machine with the program's tool, if its tool centre point is on;
-    None where x, y and z are joints, and for a machine that is planned for at the tip already (`at_tip`)."""
+    """The kinematics that a program is planned through: those of the machine with the program's tool, if its
+    tool centre point is on; None where x, y and z are joints, and for a machine that is planned for at the
+    tip already (`at_tip`)."""
     if program.tool_point is None or any(isinstance(limit, LinearJoint) for limit in machine.own):
         return None
     return kinematics_of(machine, program.tool_point.length)
 
 
 def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:
-    """The function that makes setpoints of the joints of any samples of the plan's trajectory; None where that is one of the axes."""
+    """The function that makes setpoints of the joints of any samples of the plan's trajectory; None where
+    that is one of the axes."""
     chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
     return None if chain is None else lambda samples: joint_setpoints(samples, chain)
 
@@ -61,8 +64,8 @@ def of_axes(plan: Plan, samples: Trajectory) -> Trajectory:
 
 
 def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
-    """(n, 3) unit vectors along the tool, from its tip to the spindle as seen from the workpiece, at samples of the plan's trajectory;
-    None where that is one of the axes."""
+    """(n, 3) unit vectors along the tool, from its tip to the spindle as seen from the workpiece, at samples
+    of the plan's trajectory; None where that is one of the axes."""
     chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
     if chain is None:
         return None
@@ -71,7 +74,8 @@ def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
 
 
 def judged(setpoints: Trajectory, job: Judged) -> Verdict:
-    """The verdict on setpoints of the axes: in the joints and at the tip for a program with the tool centre point on.
+    """The verdict on setpoints of the axes: in the joints and at the tip for a program with the tool centre
+    point on.
 
     Raises InputError as `verify` does.
     """
@@ -83,7 +87,8 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
 
 
 def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
-    """A plan of the tip with its setpoints of the joints, judged by them too: the verdict fails where one of both does."""
+    """A plan of the tip with its setpoints of the joints, judged by them too: the verdict fails where one of
+    both does."""
     if plan.trajectory is None or plan.verdict is None:
         return dataclasses.replace(plan, machine=machine)
     began = time.perf_counter()
@@ -106,8 +111,8 @@ def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
 
 
 def _both(tip: Verdict, joints: Verdict) -> Verdict:
-    """The verdict on the motion of the tip, between its samples too, with the limits of the joints in place of those of its
-    coordinates, and with what the judgement of the setpoints found."""
+    """The verdict on the motion of the tip, between its samples too, with the limits of the joints in place
+    of those of its coordinates, and with what the judgement of the setpoints found."""
     limits = dict(joints.limits)
     faults = {fault.sentence: fault for fault in (*tip.faults, *joints.faults)}
     for name, check in tip.limits.items():

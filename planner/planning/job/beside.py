@@ -1,16 +1,19 @@
 """Auxiliary time: tool changes, the spindle, M codes. Times of the machine file, counted in the program.
 
-A plan is the motion of the axes; its cycle time holds the dwells of the program (G4) and nothing that the axes do not do. How long a
-tool change or a spindle takes only the machine file can say (`[times]`). With its times
+A plan is the motion of the axes; its cycle time holds the dwells of the program (G4) and nothing that the
+axes do not do. How long a tool change or a spindle takes only the machine file can say (`[times]`). With its
+times
 
     total = cycle time + sum over what is counted of (how often x how long),
 
-and what is counted and has no time is named, not guessed. The spindle is followed through the program: it starts at an M3 or M4 that
-finds it standing or turning the other way, which is a stop as well, and stops at an M5 that finds it turning. A tool change (M6) stops
-it within its own time, so that an M3 after it is a start. M62, M63 and M67 happen with the motion and take no time. What waits for a
-person or a temperature has no time unless `m_codes` names it. Of plotter files the pen takes its times in the motion (`[plotter]`).
+and what is counted and has no time is named, not guessed. The spindle is followed through the program: it
+starts at an M3 or M4 that finds it standing or turning the other way, which is a stop as well, and stops at
+an M5 that finds it turning. A tool change (M6) stops it within its own time, so that an M3 after it is a
+start. M62, M63 and M67 happen with the motion and take no time. What waits for a person or a temperature has
+no time unless `m_codes` names it. Of plotter files the pen takes its times in the motion (`[plotter]`).
 
-Not counted at all: the spindle turning faster or slower (S words), T words without M6, M2 and M30, and what the control itself takes.
+Not counted at all: the spindle turning faster or slower (S words), T words without M6, M2 and M30, and what
+                    the control itself takes.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ from planner.planning.job.plan import Plan
 from planner.verifier import OF_CHORDS, Kind
 
 IN_STEP = (OPTIMAL, KINEMATIC)  # methods for threads
-# A plan that is faster by less is taken for the same motion without the grid's error: what limits it and what limits cost is what the
-# other says of itself [-].
+# A plan that is faster by less is taken for the same motion without the grid's error: what limits it and what
+# limits cost is what the other says of itself [-].
 SAME_MOTION = 2e-3
 
 
@@ -28,7 +28,8 @@ def shown_time(plan: Plan) -> float:
 
 
 def inside(made: Plan) -> bool:
-    """True if the motion's samples and chords keep the tolerance, at corners (eq. 18) wherever the samples fall."""
+    """True if the motion's samples and chords keep the tolerance, at corners (eq. 18) wherever the samples
+    fall."""
     verdict = made.verdict
     return verdict is None or not (
         verdict.vertex.broken or verdict.contour.broken or verdict.corners.overdrawn.any()
@@ -45,8 +46,9 @@ def faster(plan: Plan, other: Plan) -> Plan:
 
 
 def counted_time(plan: Plan | None) -> float:
-    """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against it: then the job is
-    planned again with less tolerance (less_tolerance.py). Chords that leave the contour leave the exact path of G61 as well."""
+    """Cycle time [s], inf unless the verdict is passed, or nothing but chords between samples stands against
+    it: then the job is planned again with less tolerance (less_tolerance.py). Chords that leave the contour
+    leave the exact path of G61 as well."""
     if plan is None or plan.trajectory is None or plan.verdict is None:
         return float("inf")
     kinds = plan.verdict.kinds
@@ -74,7 +76,8 @@ def better(best: Plan | None, rival: Plan, why: str, job: Job) -> Plan:
 
 
 def not_in_step(plan: Plan, *, shaped: bool) -> str | None:
-    """Why a plan with a thread out of step with the spindle is not delivered, it would be no thread; None where all are in step."""
+    """Why a plan with a thread out of step with the spindle is not delivered, it would be no thread; None
+    where all are in step."""
     bad = [thread for thread in (plan.verdict.threads if plan.verdict else ()) if thread.broken]
     if not bad:
         return None

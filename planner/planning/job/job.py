@@ -37,11 +37,12 @@ from planner.sensitivity.records import GridHistory
 from planner.verifier import OF_CHORDS, verify
 
 NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
-# A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this share of its time [-].
+# A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this
+# share of its time [-].
 CHEAP = 1e-4
-# A motion that turns in less time than the filters are long is nearer to its path than the closed form says. Twice its acceleration is
-# as fast as 3 and 4 times for less processor time, and faster than once (40 jobs with filters, the first ones of the campaign behind
-# seed 70000).
+# A motion that turns in less time than the filters are long is nearer to its path than the closed form says.
+# Twice its acceleration is as fast as 3 and 4 times for less processor time, and faster than once (40 jobs
+# with filters, the first ones of the campaign behind seed 70000).
 BOLDER = 2.0
 
 
@@ -51,11 +52,12 @@ class Job:
 
     program   : the blocks as they were read
     machine   : limits, interpolation period, filters
-    toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones (`with_share`,
-                delivery/periods.py)
+    toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones
+                (`with_share`, delivery/periods.py)
     stages    : the clock
     judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
-    most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be delivered
+    most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need
+                not be delivered
     """
 
     program: Program
@@ -75,7 +77,8 @@ class Job:
 
         share  : of the tolerances, 0 < share <= 1 [-]
         seen   : of the lengths of the filters, as far as closed forms use them [-]
-        curved : whether the normal acceleration is limited to `BOLDER` times that by which filters take the rest
+        curved : whether the normal acceleration is limited to `BOLDER` times that by which filters take the
+                 rest
 
         Only for machines with filters.
         """
@@ -129,13 +132,15 @@ class Job:
         return stop_time(toolpath, machine, join_lines=True)
 
     def behind_filters(self, motion: TimedT) -> TimedT:
-        """The motion, slowed down where it would leave the tolerance behind the filters of the machine (delivery/filters.py)."""
+        """The motion, slowed down where it would leave the tolerance behind the filters of the machine
+        (delivery/filters.py)."""
         with self.stage("filters"):
             machine, toolpath = self.real
             return kept(motion, toolpath, machine)
 
     def deliver_in_time(self, motion: TimedT, *, as_it_is: bool = False) -> Delivered | None:
-        """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer than `most`."""
+        """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer
+        than `most`."""
         slower = self.behind_filters(motion) if motion.end <= self.most else motion
         if slower.end > self.most:
             return None
@@ -147,11 +152,13 @@ class Job:
         """Sample a motion at the interpolation period and have it judged, between the samples too.
 
         not_limited : quantities that are reported and not judged, "jerk" for example
-        as_it_is    : whatever the verdict finds; else the motion is run slower where that mends it (delivery/mending.py). If only the
-                      chords between samples are in the way, and that costs more than `CHEAP`, a motion planned with less tolerance may
-                      be faster: then the motion is delivered as it is, with the slower one.
+        as_it_is    : whatever the verdict finds; else the motion is run slower where that mends it
+                      (delivery/mending.py). If only the chords between samples are in the way, and that costs
+                      more than `CHEAP`, a motion planned with less tolerance may be faster: then the motion
+                      is delivered as it is, with the slower one.
 
-        Standstills are added where the chords between samples would cut off a full stop (delivery/periods.py).
+        Standstills are added where the chords between samples would cut off a full stop
+        (delivery/periods.py).
         """
         made, stands = self._delivered(motion, not_limited, 0)
         if as_it_is or made.verdict.passed:
@@ -267,7 +274,8 @@ class Job:
         )
 
     def _ringing(self, made: Delivered | None, method: str) -> Iterator[str]:
-        """That vibration modes are excited, if they are; method fir makes its filters as long as leaves them at rest."""
+        """That vibration modes are excited, if they are; method fir makes its filters as long as leaves them
+        at rest."""
         shaped = made is None or isinstance(made.motion, ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
             can = (
@@ -279,7 +287,8 @@ class Job:
 
 
 def _at_blocks(trajectory: Trajectory, toolpath: Toolpath, first: Array, segment: Array) -> Trajectory:
-    """The trajectory with each sample at the block whose path it is at: from the samples `first` (n,) on at `segment` (n,)."""
+    """The trajectory with each sample at the block whose path it is at: from the samples `first` (n,) on at
+    `segment` (n,)."""
     if isinstance(trajectory, TrajectoryOnDemand):
         return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
     segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))

@@ -1,4 +1,5 @@
-"""A job planned again with less of the tolerance where the chords between its samples leave it (delivery/periods.py)."""
+"""A job planned again with less of the tolerance where the chords between its samples leave it
+(delivery/periods.py)."""
 
 from __future__ import annotations
 
@@ -14,15 +15,16 @@ from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.verifier import Verdict
 
-# At most so often: first less at corners, where a round for these changed nothing on the arcs beside them too and twice as much, then
-# inside blocks. Every time the samples fall elsewhere, but what one phase may do to a corner is known after the first.
+# At most so often: first less at corners, where a round for these changed nothing on the arcs beside them too
+# and twice as much, then inside blocks. Every time the samples fall elsewhere, but what one phase may do to a
+# corner is known after the first.
 PERIOD_ROUNDS = 8
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 
 
 def with_less_tolerance(job: Job, made: Plan, planned: Callable[[Job], Plan]) -> Plan:
-    """The plan made again with less and less tolerance until chords between samples keep it, as long as it takes no longer than
-    `job.most`."""
+    """The plan made again with less and less tolerance until chords between samples keep it, as long as it
+    takes no longer than `job.most`."""
     path, (machine, programmed) = job.toolpath, job.real
     before, times = np.nan, 1.0
     for again in range(1, PERIOD_ROUNDS + 1):
@@ -52,8 +54,9 @@ def with_less_tolerance(job: Job, made: Plan, planned: Callable[[Job], Plan]) ->
 
 
 def _worst(verdict: Verdict) -> tuple[int, float] | None:
-    """Where chords are most off in the judge's eyes: the NC line, and how far off as a share of the tolerance; None where they keep
-    it. Eq. (18) bounds them by the curvature at the vertex, which can be more than any phase of the samples shows."""
+    """Where chords are most off in the judge's eyes: the NC line, and how far off as a share of the
+    tolerance; None where they keep it. Eq. (18) bounds them by the curvature at the vertex, which can be more
+    than any phase of the samples shows."""
     for check in (verdict.contour, verdict.vertex):
         if check.broken:
             return check.line, check.ratio

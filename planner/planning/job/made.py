@@ -1,4 +1,5 @@
-"""The records between the stages of a plan: a motion that was delivered, and what is known of a plan that may not be taken."""
+"""The records between the stages of a plan: a motion that was delivered, and what is known of a plan that may
+not be taken."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ class Delivered(NamedTuple):
     trajectory : its samples
     verdict    : on them and on the motion
     motion     : with the standstills that the samples need
-    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that costs time; else None
+    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that
+                 costs time; else None
     filtered   : whether the filters behind the setpoints made the motion slower than its limits did
     notes      : what the samples do not tell
     """
@@ -35,7 +37,8 @@ class Making(NamedTuple):
     """A plan in the making, which may not be the one that is taken.
 
     motion, slower, filtered : as in `Delivered`
-    priced                   : the solution of which the prices are those of the plan; None where they are there, or not to be had
+    priced                   : the solution of which the prices are those of the plan; None where they are
+                               there, or not to be had
     given_up                 : what the method has noted
     """
 

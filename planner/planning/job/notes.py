@@ -1,6 +1,8 @@
-"""The notes of a plan, on what it assumed and what it gave up: short sentences, each with its first line and a count.
+"""The notes of a plan, on what it assumed and what it gave up: short sentences, each with its first line and
+a count.
 
-The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the method.
+The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the
+method.
 """
 
 from __future__ import annotations
@@ -14,14 +16,14 @@ from planner.machine import ROTARY_AXES, Machine
 from planner.nc.program import Kind, Program
 from planner.planning.job.plausible import short_block_notes, unit_notes
 
-# A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is rounded by more has
-# little left of its shape.
+# A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is
+# rounded by more has little left of its shape.
 TOLERANCE_OF_PART = 0.02
 
 
 def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
-    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a tolerance that is large beside
-    the part."""
+    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a
+    tolerance that is large beside the part."""
     return [
         *program.notes,
         *unit_notes(machine),

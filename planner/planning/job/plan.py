@@ -24,17 +24,20 @@ class Plan(Shown):
     """A planned job: its records, and how it shows itself in Python and notebooks (shown.py).
 
     method, solver      : names of what was used
-    corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where no corner is rounded
+    corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where
+                          no corner is rounded
     program, machine    : what was planned, and for which machine
     toolpath            : the exact programmed path with its tolerances
     status, sentence    : how the solution ended
-    trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless solved
-    joints              : of a program with the tool centre point on: the same motion as setpoints of the joints; `trajectory` is that
-                          of the tip
+    trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless
+                          solved
+    joints              : of a program with the tool centre point on: the same motion as setpoints of the
+                          joints; `trajectory` is that of the tip
     rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
-    making              : of a plan on its way what only planning needs; None in a finished one, and unless solved
+    making              : of a plan on its way what only planning needs; None in a finished one, and unless
+                          solved
     stop_time           : cycle time if every block ran from rest to rest [s], dwells included
     grid_points         : number of grid points of the problem that was solved
     notes               : what was assumed and what was given up, each with its first line and a count
@@ -77,20 +80,22 @@ class Plan(Shown):
 
     @property
     def setpoints(self) -> Trajectory | None:
-        """The setpoints of the axes: the joints' motion where the tool centre point is on, else the trajectory."""
+        """The setpoints of the axes: the joints' motion where the tool centre point is on, else the
+        trajectory."""
         return self.trajectory if self.joints is None else self.joints
 
     @property
     def geometry(self) -> str | None:
-        """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself; None where no corner is
-        rounded."""
+        """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself;
+        None where no corner is rounded."""
         if self.corner is None:
             return None
         return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
 
     @property
     def beside(self) -> tuple[Beside, ...]:
-        """The events while the axes stand still, tool changes for example, and how long they take; no part of the cycle time."""
+        """The events while the axes stand still, tool changes for example, and how long they take; no part of
+        the cycle time."""
         return beside_motion(self.program, self.machine)
 
     def delivering(self, made: Delivered, **changes: Any) -> Plan:
@@ -100,7 +105,8 @@ class Plan(Shown):
         return replace(self, **motion | changes)
 
     def slower_in_places(self) -> Plan:
-        """The plan with its motion run slower where the verdict found something, if that mends it; else as it is."""
+        """The plan with its motion run slower where the verdict found something, if that mends it; else as it
+        is."""
         slower = self.making.slower if self.making is not None else None
         return self if slower is None else self.delivering(slower)
 

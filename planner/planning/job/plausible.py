@@ -1,6 +1,8 @@
-"""Numbers that are allowed and hardly meant: other units than mm and s, and a tolerance longer than the blocks.
+"""Numbers that are allowed and hardly meant: other units than mm and s, and a tolerance longer than the
+blocks.
 
-A machine file in m, mm/min or ms is valid, and its plan passes every check: it keeps the limits that were written. So a note asks.
+A machine file in m, mm/min or ms is valid, and its plan passes every check: it keeps the limits that were
+written. So a note asks.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from planner.machine import LINEAR_AXES, Machine
 
 # Velocities [mm/s] outside of which a number is rather in m/s (6 m/h) or in mm/min (900 m/min).
 VELOCITY_MIN, VELOCITY_MAX = 1.67, 15_000.0
-# Times to build up the acceleration, acceleration / jerk [s]; those of the built-in machines are 0.01 to 0.04.
+# Times to build up the acceleration, acceleration / jerk [s]; those of the built-in machines are 0.01 to
+# 0.04.
 RAMP_MIN, RAMP_MAX = 2.5e-4, 0.5
 PERIOD_MIN, PERIOD_MAX = 1e-5, 0.05  # interpolation periods [s]: one of 1 is rather 1 ms
 
@@ -40,7 +43,8 @@ def unit_notes(machine: Machine) -> list[str]:
 
 
 def short_block_notes(toolpath: Toolpath) -> list[str]:
-    """A sentence if most of the blocks that cut are shorter than the tolerance: what they draw may be rounded away."""
+    """A sentence if most of the blocks that cut are shorter than the tolerance: what they draw may be rounded
+    away."""
     cutting = ~toolpath.rapid
     if not cutting.any():
         return []

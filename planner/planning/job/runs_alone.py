@@ -14,14 +14,16 @@ from planner.planning.job.job import Job
 from planner.planning.job.made import Delivered
 from planner.planning.job.plan import Plan
 
-# So many runs are planned by themselves at most, and so often once more those that the verdict finds something on.
+# So many runs are planned by themselves at most, and so often once more those that the verdict finds
+# something on.
 ALONE_MOST, VERDICTS = 100, 3
 
 
 class Alone(NamedTuple):
     """A motion that passes.
 
-    begin : (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples [s]
+    begin : (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples
+            [s]
     plans : of the runs that are planned by themselves, by their number
     notes : what these gave up
     """
@@ -39,8 +41,9 @@ def with_runs_alone(
     most: float,
     not_limited: tuple[str, ...] = (),
 ) -> Alone | None:
-    """The motion with those runs planned by themselves that have no parts, and then those on which the verdict finds something; None
-    where these are more than `most` or all, where one of them does not pass, and where the whole does not.
+    """The motion with those runs planned by themselves that have no parts, and then those on which the
+    verdict finds something; None where these are more than `most` or all, where one of them does not pass,
+    and where the whole does not.
 
     parts   : of the motion, run by run between the job's full stops
     planned : plans a job of one run

@@ -1,7 +1,7 @@
 """The views and files of a plan: tables, pictures, files and pages, for Python and notebooks.
 
-They are made by later stages (report/, report/interactive/), which know plans, and a plan knows none of them: `planner` says in
-`VIEWS` what makes each, and it is imported when a plan is asked for it.
+They are made by later stages (report/, report/interactive/), which know plans, and a plan knows none of them:
+`planner` says in `VIEWS` what makes each, and it is imported when a plan is asked for it.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     import pandas
     from plotly.graph_objects import Figure
 
-# "module:name" of what makes each view of a plan; filled where the package is put together (planner/__init__.py).
+# "module:name" of what makes each view of a plan; filled where the package is put together
+# (planner/__init__.py).
 VIEWS: dict[str, str] = {}
 
 
 class Figures(Protocol):
-    """The figures of a plan; what they take and raise is said where they are made (report/interactive/page.py)."""
+    """The figures of a plan; what they take and raise is said where they are made
+    (report/interactive/page.py)."""
 
     def __call__(self) -> Figure:
         """The path, coloured by feed."""
@@ -46,10 +48,12 @@ class Page(Protocol):
 
 
 class Shown:
-    """The part of `Plan` that shows and writes it. Each raises NotSolvedError for a plan without a trajectory."""
+    """The part of `Plan` that shows and writes it. Each raises NotSolvedError for a plan without a
+    trajectory."""
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The setpoints as a table of pandas, with the columns of a trajectory file; `attrs["units"]` has their units.
+        """The setpoints as a table of pandas, with the columns of a trajectory file; `attrs["units"]` has
+        their units.
 
         Raises InputError if pandas is not installed.
         """
@@ -88,7 +92,8 @@ class Shown:
         return files
 
     def report(self) -> Page:
-        """The page that opens in a browser: shown in a notebook, and written by `plan.report().save("report.html")`."""
+        """The page that opens in a browser: shown in a notebook, and written by
+        `plan.report().save("report.html")`."""
         page: Page = _view("report")(self)
         return page
 

@@ -41,7 +41,8 @@ class Step:
 
     @property
     def gain(self) -> float | None:
-        """Share of the cycle time that was gained [-]; 0 where the step was not kept, inf where nothing was found before."""
+        """Share of the cycle time that was gained [-]; 0 where the step was not kept, inf where nothing was
+        found before."""
         if self.kept is None or self.found is None or self.before is None:
             return None
         if not self.kept:
@@ -124,8 +125,8 @@ class Trace:
             self._line(self._text(len(self.steps) - 1))
 
     def table(self) -> str:
-        """All steps, one a line: when it ended, how long since the line before, what it was, the cycle time that it found, what share
-        of the best one before that gains, whether it was kept, and facts."""
+        """All steps, one a line: when it ended, how long since the line before, what it was, the cycle time
+        that it found, what share of the best one before that gains, whether it was kept, and facts."""
         return "\n".join([HEADER, *(self._text(k) for k in range(len(self.steps)))])
 
     def as_json(self) -> list[dict[str, Any]]:

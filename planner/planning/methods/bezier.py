@@ -1,12 +1,17 @@
-"""Method `bezier`: paper 002. Rational Bezier pairs, the error allocation of eq. (18)-(20), S-curves between corners at constant speed.
+"""Method `bezier`: paper 002. Rational Bezier pairs, the error allocation of eq. (18)-(20), S-curves between
+corners at constant speed.
 
-1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the fraction of the tolerance
+1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the
+fraction of the tolerance
    that eq. (20) gives it (three sources: rounding, chord error, filters that follow).
-2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes' limits, jerk included, allow
+2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes'
+limits, jerk included, allow
    from its one end to the other (lookahead/constant_speed_corners.py).
-3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop at its vertex where that
+3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop
+at its vertex where that
    is faster (lookahead/look_ahead.py); on arcs the limits are constant.
-4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually nothing.
+4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually
+nothing.
 """
 
 from __future__ import annotations
@@ -36,7 +41,8 @@ from planner.planning.page import CLOSED_FORM_WAYS, Method
 from planner.sensitivity.closed_form import corner_apexes, corners_at
 from planner.sensitivity.records import CornerTable
 
-# The fraction of every leg that its corners leave free, to change the speed on it [-]: with none all corners are as slow as the first.
+# The fraction of every leg that its corners leave free, to change the speed on it [-]: with none all corners
+# are as slow as the first.
 FREE_FRACTION = 0.3
 # Interpolation period [s] for which the corners are rounded without allocation: its chord error is nothing.
 NO_PERIOD = 1e-9
@@ -47,8 +53,9 @@ class BezierMethod(Method):
     """Bezier pairs with error allocation.
 
     corner   : shape numbers of the pair
-    allocate : share the tolerance between rounding and chord error, eq. (18)-(20); without, each has all of it for itself, as in
-               paper 002's figure 7, and the verdict may report that the tolerance is exceeded
+    allocate : share the tolerance between rounding and chord error, eq. (18)-(20); without, each has all of
+               it for itself, as in paper 002's figure 7, and the verdict may report that the tolerance is
+               exceeded
     """
 
     corner: BezierCorner = field(default_factory=BezierCorner)

@@ -1,14 +1,18 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
-1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance. It becomes
+1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance.
+                              It becomes
    chords so fine that they are the path (baselines/fir/chord_guide.py).
-2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of every run between full
+2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of
+every run between full
    stops (baselines/fir/chord_speeds.py).
-3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured, and where something is
+3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured,
+and where something is
    exceeded the command gets slower or the filters longer, until nothing is. The fastest of the V stays.
 
-`plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant curvature within what
-the filters cover; where it varies, the verdict shows what they exceed (docs/papers.md, paper 001: G3).
+`plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant
+curvature within what the filters cover; where it varies, the verdict shows what they exceed (docs/papers.md,
+paper 001: G3).
 """
 
 from __future__ import annotations
@@ -36,8 +40,8 @@ from planner.planning.page import Method
 
 # Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow.
 ROUNDING_FRACTION = 0.1
-# Interpolation error of the grid that the chords start from, as of feedrate/sampling/samples.py: they are refined by the
-# angle they turn.
+# Interpolation error of the grid that the chords start from, as of feedrate/sampling/samples.py: they are
+# refined by the angle they turn.
 RESOLUTION = 0.05
 # Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
@@ -92,8 +96,8 @@ class FirSplineMethod(Method):
         )
 
     def _with_stops(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
-        """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by itself: at a full stop
-        the filters may change."""
+        """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by
+        itself: at a full stop the filters may change."""
         ends = np.flatnonzero(toolpath.joint == Joint.STOP)
         best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
         for angle in STOP_ANGLES:
@@ -113,7 +117,8 @@ class FirSplineMethod(Method):
         return dataclasses.replace(toolpath, joint=best)
 
     def _plain(self, guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-        """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19) with the largest v_p of each run, and v_sc (par. 29)."""
+        """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19) with the largest v_p of each run, and v_sc (par.
+        29)."""
         acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
         T1, T2 = guide.largest(guide.feed) / acceleration, acceleration / jerk
         T1, T2 = (np.maximum(T1, T2), np.minimum(T1, T2)) if guide.own is None else guide.given_filters()
@@ -134,7 +139,8 @@ def guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | No
 
 
 def _motion(speeds: ChordSpeeds, toolpath: Toolpath) -> AxisMotion:
-    """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the guide."""
+    """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the
+    guide."""
     guide, motion = speeds.guide, superpose(speeds.command())
     chord = np.searchsorted(guide.s, reached(motion), side="right") - 1
     run = np.repeat(np.arange(guide.runs), np.diff(motion.first))

@@ -1,12 +1,18 @@
-"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their speeds.
+"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their
+speeds.
 
-1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where that is faster; curves are
+1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where
+that is faster; curves are
    always cut.
-2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry acceleration, entry
-   deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the vertex itself at that step.
-3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full stop, so that the whole
+2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry
+acceleration, entry
+   deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the
+   vertex itself at that step.
+3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full
+stop, so that the whole
    is fastest (baselines/lookahead/look_ahead.py).
-4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the motion itself,
+4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the
+motion itself,
    nothing is sampled.
 
 A run between full stops that is not faster than stopping at every block is made as method `stop` makes it.
@@ -43,8 +49,8 @@ from planner.planning.job.plan import Plan
 from planner.planning.page import CLOSED_FORM_WAYS, Method
 from planner.sensitivity.records import CornerTable
 
-# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough for corners that fill
-# their chords: those leave the vertex by 2/3 to 1 of the sagitta.
+# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough
+# for corners that fill their chords: those leave the vertex by 2/3 to 1 of the sagitta.
 CHORD_FRACTION = 0.5
 
 
@@ -52,8 +58,9 @@ CHORD_FRACTION = 0.5
 class KinematicMethod(Method):
     """Kinematic corners with look-ahead.
 
-    start_stop : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a corner may be passed at the
-                 vertex where no axis steps by more. Such a step breaks the limits of acceleration and jerk, and the verdict says so
+    start_stop : step of velocity that the drives make from standstill, the same for every axis [mm/s]: a
+                 corner may be passed at the vertex where no axis steps by more. Such a step breaks the limits
+                 of acceleration and jerk, and the verdict says so
     """
 
     start_stop: float = 0.0
@@ -87,7 +94,8 @@ class KinematicMethod(Method):
         )
 
     def _chain(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Chain:
-        """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the path."""
+        """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the
+        path."""
         curved = toolpath.arc >= 0
         whole = curved & (exact | _faster_whole(toolpath, machine))
         while True:
@@ -151,7 +159,8 @@ def _curve_notes(toolpath: Toolpath, exact: Array) -> list[str]:
 
 
 def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
-    """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners between these."""
+    """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners
+    between these."""
     arc = np.flatnonzero(toolpath.arc >= 0)
     whole = np.zeros(len(toolpath), bool)
     count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
@@ -165,7 +174,8 @@ def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
 
 
 def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> Array:
-    """(M,) True for the segments between two full stops that take longer than if every block ran from rest to rest."""
+    """(M,) True for the segments between two full stops that take longer than if every block ran from rest to
+    rest."""
     lines, at = chain.lines, chain.path.first
     stop = np.flatnonzero(lines.joint[at] == Joint.STOP)
     lasting = np.diff(chain.time[stop])

@@ -1,5 +1,5 @@
-"""`planner.methods`: the names of the methods. Printed, it says what each is; `planner.methods["kinematic"]` is one to be planned
-with."""
+"""`planner.methods`: the names of the methods. Printed, it says what each is; `planner.methods["kinematic"]`
+is one to be planned with."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 
 class MethodNames:
-    """The names of the methods, in the order of the documentation; each with a sentence, and the method by its name."""
+    """The names of the methods, in the order of the documentation; each with a sentence, and the method by
+    its name."""
 
     def __iter__(self) -> Iterator[str]:
         return iter(METHODS)

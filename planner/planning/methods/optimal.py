@@ -1,4 +1,5 @@
-"""Method `optimal`: smoothed path, all limits with jerk, path and feed together where the joint search can (attempts.py).
+"""Method `optimal`: smoothed path, all limits with jerk, path and feed together where the joint search can
+(attempts.py).
 
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 """
@@ -19,8 +20,9 @@ from planner.planning.optimal.order import ThirdOrder
 from planner.planning.optimal.shaped import shaped_plan
 from planner.planning.page import Method, best_of
 
-# The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature, takes 0.1 to 0.9 % longer
-# (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are within 0.3 % of each other).
+# The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature,
+# takes 0.1 to 0.9 % longer (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are
+# within 0.3 % of each other).
 SIGMA2 = 0.94
 
 
@@ -28,10 +30,13 @@ SIGMA2 = 0.94
 class OptimalMethod(Method):
     """The fastest motion under all limits, that of the jerk included: path and feed together, or on splines.
 
-    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
-    solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a solver
-    effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which path and feed are searched together
-             (planning/optimal/effort.py); that is with corner "auto", the own solver, no filters, no shaping, and `rounds` None
+    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
+             settings of your own
+    solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a
+             solver
+    effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which path and feed
+             are searched together (planning/optimal/effort.py); that is with corner "auto", the own solver,
+             no filters, no shaping, and `rounds` None
     rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """

@@ -42,14 +42,17 @@ DEFAULT_MACHINE = "mill"
 class MethodSettings(TypedDict, total=False):
     """Settings of methods "optimal" and "second-order"; None, or left out, for the method's own.
 
-    geometry : how the path is smoothed: "spline" (one spline from stop to stop), "corners" (each corner by itself) or "auto" (splines,
-               or corners where they take less time); None for "auto", or for "corners" where `corner` is given
-    corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own (corners/own.py); None for "bezier"
-    solver   : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for "second-order"; None for
-               the first of them
-    effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped; None for "normal"
-    rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or more; None for those of
-               the effort, fewer where they gain nothing
+    geometry : how the path is smoothed: "spline" (one spline from stop to stop), "corners" (each corner by
+               itself) or "auto" (splines, or corners where they take less time); None for "auto", or for
+               "corners" where `corner` is given
+    corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own
+               (corners/own.py); None for "bezier"
+    solver   : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for
+               "second-order"; None for the first of them
+    effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped;
+               None for "normal"
+    rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or
+               more; None for those of the effort, fewer where they gain nothing
     shaped   : deliver setpoints that leave the machine's vibration modes at rest
     """
 
@@ -79,18 +82,19 @@ def plan(
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
     settings  : geometry, corner, solver, effort, rounds, shaped: `MethodSettings`
-    limits    : of your own, one or several, beside the machine's (docs/extending.md): "optimal" and "second-order"
-                keep them, the verdict judges every method by them
+    limits    : of your own, one or several, beside the machine's (docs/extending.md): "optimal" and
+                "second-order" keep them, the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
     reading   : what is refused, left out and assumed in a program file
     progress  : called with the stage's name and the fraction done (0 to 1)
     log       : called with every step of the planning; a `Trace` keeps them as a table and as JSON
 
-    Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status; `Plan.require` turns it into a
-    NotSolvedError.
+    Returns the plan, judged by the verifier. A problem that could not be solved is the plan's status;
+    `Plan.require` turns it into a NotSolvedError.
 
-    Raises InputError for a program or machine that cannot be read, naming file, line and column, for a machine with a value that no
-    machine file may have, for an unknown name, and for a setting that the method does not use.
+    Raises InputError for a program or machine that cannot be read, naming file, line and column, for a
+    machine with a value that no machine file may have, for an unknown name, and for a setting that the method
+    does not use.
     """
     if not isinstance(method, str | Method):
         raise InputError(f"method = {method}: give a name, {', '.join(METHODS)}, or a method")
@@ -124,7 +128,8 @@ def plan(
 def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
     """The method of that name with these settings.
 
-    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a negative number of rounds.
+    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a
+    negative number of rounds.
     """
     given = _given(settings)
     entry = METHODS[method_name(name)]
@@ -143,15 +148,16 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
 
 
 def check_settings(method: str | Method = "optimal", **settings: Unpack[MethodSettings]) -> MethodSettings:
-    """The settings that are set. Raises InputError for an unknown name and for a setting that the method does not use."""
+    """The settings that are set. Raises InputError for an unknown name and for a setting that the method does
+    not use."""
     given = _given(settings)
     _check_used(method_name(method) if isinstance(method, str) else method, given)
     return given
 
 
 def _given(settings: MethodSettings) -> MethodSettings:
-    """The settings that are set. Raises TypeError for others than those of `MethodSettings`, and InputError for values that are none of
-    theirs, in as far as names do not say it."""
+    """The settings that are set. Raises TypeError for others than those of `MethodSettings`, and InputError
+    for values that are none of theirs, in as far as names do not say it."""
     unknown = settings.keys() - MethodSettings.__annotations__.keys()
     if unknown:
         wrong, allowed = min(unknown), (*MethodSettings.__annotations__, "tolerance", "limits", "reading")
@@ -193,7 +199,8 @@ def _check_used(method: str | Method, given: MethodSettings) -> None:
 def _smoothing(
     geometry: str | None, corner: str | CornerShape | None
 ) -> tuple[str, str | CornerShape | None]:
-    """The geometry and the corner shape that are meant. Raises InputError for names that do not go together."""
+    """The geometry and the corner shape that are meant. Raises InputError for names that do not go
+    together."""
     if corner is None or isinstance(corner, str):
         return smoothing(geometry, corner)
     return smoothing(geometry, BEZIER)[0], corner  # a shape of one's own goes where the usual one goes

@@ -1,8 +1,8 @@
 """Method `second-order`: all limits but jerk, time-optimal on a smoothed path, by reachability analysis.
 
-The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as not limited. The
-algorithm is that of method `optimal` on a path (planning/optimal/path_motion.py), with another solver; splines are reshaped by the
-multipliers of this motion (feedrate/costates.py).
+The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as
+not limited. The algorithm is that of method `optimal` on a path (planning/optimal/path_motion.py), with
+another solver; splines are reshaped by the multipliers of this motion (feedrate/costates.py).
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ from planner.planning.page import Method, best_of
 class SecondOrderMethod(Method):
     """The fastest motion under all limits but jerk, on splines or rounded corners.
 
-    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with settings of your own
-    solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a solver
+    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
+             settings of your own
+    solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a
+             solver
     effort : "quick", "normal" or "best": grids and rounds of reshaping (planning/optimal/effort.py)
     rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)

@@ -1,4 +1,5 @@
-"""Method `stop`: every block from rest to rest, jerk-limited, in closed form. The baseline the papers compare with."""
+"""Method `stop`: every block from rest to rest, jerk-limited, in closed form. The baseline the papers compare
+with."""
 
 from __future__ import annotations
 

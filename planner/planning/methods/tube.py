@@ -1,9 +1,12 @@
-"""Method `tube`: geometry and feed found together, anywhere inside the tolerance, from the motion of another method.
+"""Method `tube`: geometry and feed found together, anywhere inside the tolerance, from the motion of another
+method.
 
-All other methods round the path first and then find the feed. Here the motion of the axes itself is what is sought (joint/rows.py,
-joint/nlp.py), so nothing is given away between the two. What is found is the best motion near the one from which the search starts,
-with no certificate that there is no better one elsewhere. Where no search ends faster than the start, its motion stays, run by run and
-window by window (joint/parts.py): the plan is never slower. `optimal` searches in the same way; this method has the reference solvers.
+All other methods round the path first and then find the feed. Here the motion of the axes itself is what is
+sought (joint/rows.py, joint/nlp.py), so nothing is given away between the two. What is found is the best
+motion near the one from which the search starts, with no certificate that there is no better one elsewhere.
+Where no search ends faster than the start, its motion stays, run by run and window by window
+(joint/parts.py): the plan is never slower. `optimal` searches in the same way; this method has the reference
+solvers.
 """
 
 from __future__ import annotations
@@ -91,8 +94,9 @@ class TubeMethod(Method):
 def _delivered(
     job: Job, first: Plan, start: Start, found: list[FoundRun]
 ) -> tuple[Delivered, list[int], str]:
-    """The motions found, and the start's where there are none; on which runs it stays, and why on those where one was found: a
-    motion that does not pass its verdict, or becomes slower by its standstills between samples, is not delivered."""
+    """The motions found, and the start's where there are none; on which runs it stays, and why on those where
+    one was found: a motion that does not pass its verdict, or becomes slower by its standstills between
+    samples, is not delivered."""
     assert first.making is not None
     assert first.trajectory is not None
     assert first.verdict is not None

@@ -1,15 +1,20 @@
-"""Corners taken slowly enough for the filters behind the setpoints, before delivery/filters.py slows down whole runs.
+"""Corners taken slowly enough for the filters behind the setpoints, before delivery/filters.py slows down
+whole runs.
 
-A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the corner itself, the less
-the way in and out counts. Therefore only the feed close to a corner that the filtered motion misses is limited; the motion brakes and
-speeds up as steeply as the axes allow. The error of a corner rises with the square of its feed by a power that depends on all that
-happens within Td. So each corner looks for the root of its own error, by secants in logarithms, between the square that was too slow
-and the one that was too fast the last time; the problem is solved again with all of them, until no corner is missed and none has room
-left. Where the contour is left away from corners, the feed is limited wherever the filters hold the motion at that moment.
+A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the
+corner itself, the less the way in and out counts. Therefore only the feed close to a corner that the filtered
+motion misses is limited; the motion brakes and speeds up as steeply as the axes allow. The error of a corner
+rises with the square of its feed by a power that depends on all that happens within Td. So each corner looks
+for the root of its own error, by secants in logarithms, between the square that was too slow and the one that
+was too fast the last time; the problem is solved again with all of them, until no corner is missed and none
+has room left. Where the contour is left away from corners, the feed is limited wherever the filters hold the
+motion at that moment.
 
-The rounds keep the limits at grid points only. What they end with keeps them between these too, and the tolerance (`kept`).
+The rounds keep the limits at grid points only. What they end with keeps them between these too, and the
+tolerance (`kept`).
 
-Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand (constraints/assemble.py).
+Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand
+(constraints/assemble.py).
 """
 
 from __future__ import annotations
@@ -29,10 +34,12 @@ from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again
 from planner.planning.optimal.tighten import within_limits
 
-# At most. In 23 calls of five hard jobs, picked for it, motions took 0.94 of the time on the mean that they take with 10.
+# At most. In 23 calls of five hard jobs, picked for it, motions took 0.94 of the time on the mean that they
+# take with 10.
 ROUNDS = 16
-# The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like waiting at the vertex. Where
-# the least feed is not enough there, because grid points are far apart, a point more on each side.
+# The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like
+# waiting at the vertex. Where the least feed is not enough there, because grid points are far apart, a point
+# more on each side.
 REACH = 0.3
 # Vertices that turn by more are corners [rad], others are places of the contour.
 SHARP = float(np.deg2rad(20.0))
@@ -43,15 +50,16 @@ AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where
 WORTH = 0.05
 HELD = 1e-3  # a square of a feed that is below its bound by less than this share is held by it [-]
 CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-], or the motion would stand where it cannot go on
-# A motion that still leaves the tolerance takes less time than what comes of it, or more by this factor at most [-].
+# A motion that still leaves the tolerance takes less time than what comes of it, or more by this factor at
+# most [-].
 BACK = 1.1
 BOUND = FILTER_ERROR.name
 
 
 def within_filters(planned: OnPath, motion: Motion, order: Order, job: Job) -> tuple[OnPath, Motion, bool]:
-    """The fastest motion found that keeps the tolerance behind the machine's filters, the solution that it comes from, and whether the
-    filters made it slower. A motion that takes longer than `job.most` is not asked for: the search ends there, without what it looks
-    for.
+    """The fastest motion found that keeps the tolerance behind the machine's filters, the solution that it
+    comes from, and whether the filters made it slower. A motion that takes longer than `job.most` is not
+    asked for: the search ends there, without what it looks for.
 
     motion : that of `planned`, which keeps all limits
     """
@@ -111,7 +119,8 @@ class CornerFeeds:
         self.power, self.before = np.ones(count), np.full((2, count), np.nan)
 
     def of_places(self, places: Violations) -> Array:
-        """(n,) the corner that is passed next to each place in time, within half of the delay; -1 where none is."""
+        """(n,) the corner that is passed next to each place in time, within half of the delay; -1 where none
+        is."""
         corner = np.flatnonzero(self.sharp)
         corner = np.concatenate([[-1], corner[np.argsort(places.near_time[corner], kind="stable")], [-1]])
         time = np.concatenate([[-np.inf], places.near_time[corner[1:-1]], [np.inf]])
@@ -167,8 +176,9 @@ class CornerFeeds:
 
 
 class _Contour:
-    """The squares of the feeds (P,) that grid points allow where the filtered motion leaves the contour away from corners: less while
-    it does, and more while the whole piece of the path has room, up to halfway to what was too fast, in logarithms."""
+    """The squares of the feeds (P,) that grid points allow where the filtered motion leaves the contour away
+    from corners: less while it does, and more while the whole piece of the path has room, up to halfway to
+    what was too fast, in logarithms."""
 
     def __init__(self, corners: CornerFeeds, behind: Behind, of_path: Errors):
         points = len(corners.least)
@@ -204,7 +214,8 @@ class _Contour:
 
 
 def _zones(problem: FeedrateProblem, motion: Motion, time: FloatArray, reach: float) -> list[tuple[int, int]]:
-    """Grid points [a, b) within `reach` [mm] of where the motion is at the times (n,), the nearest one at least."""
+    """Grid points [a, b) within `reach` [mm] of where the motion is at the times (n,), the nearest one at
+    least."""
     law = motion.law
     at = np.clip(np.searchsorted(law.t, time, side="right") - 1, 0, len(law.t) - 1)
     tau = np.clip(time - law.t[at], 0.0, np.append(np.diff(law.t), 0.0)[at])

@@ -1,11 +1,12 @@
 """Single corners instead of splines, on the runs between full stops where they are faster.
 
-A closed form (corner_times.py) and, on shorter paths, the motion without jerk limits on a coarse grid give a lower bound on the time
-of single corners. If the bound is above the time of the
-splines, there is nothing to compare. Otherwise the corners are planned, by themselves: on the grid of the rounds, those that are still
-close to the splines on the final one, and those that win with the whole path. That takes at least the points of their own grid, of
-which corners of a few um need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up
-to `COMPARED_POINTS`, and the notes say which runs were left out.
+A closed form (corner_times.py) and, on shorter paths, the motion without jerk limits on a coarse grid give a
+lower bound on the time of single corners. If the bound is above the time of the splines, there is nothing to
+compare. Otherwise the corners are planned, by themselves: on the grid of the rounds, those that are still
+close to the splines on the final one, and those that win with the whole path. That takes at least the points
+of their own grid, of which corners of a few um need 200 each if jerks are low; runs are therefore compared in
+the order of their possible gain per point, up to `COMPARED_POINTS`, and the notes say which runs were left
+out.
 """
 
 from __future__ import annotations
@@ -28,13 +29,15 @@ from planner.planning.optimal.order import Order, second_order
 from planner.smoothing.spline_path import with_spline
 
 COMPARED_POINTS = SIZES.corners_compared
-# On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on chords of 0.1 mm): this
-# share of it is less than what corners take (tested). The errors of a grid go with the square of its intervals: it has a tenth of the
-# usual one's points (22.7 and 213 for each corner on chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
+# On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on
+# chords of 0.1 mm): this share of it is less than what corners take (tested). The errors of a grid go with
+# the square of its intervals: it has a tenth of the usual one's points (22.7 and 213 for each corner on
+# chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
-# Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried there [-]: times on the
-# coarse grid are up to 8e-3 longer (splines of zig-zag, relief and bracket, on both machines).
+# Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried
+# there [-]: times on the coarse grid are up to 8e-3 longer (splines of zig-zag, relief and bracket, on both
+# machines).
 CLOSE = 1.01
 FASTER = (
     1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
@@ -44,9 +47,10 @@ FASTER = (
 def corner_bounds(
     path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
 ) -> CornerBounds:
-    """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk limits on a coarse grid, the
-    larger of both. Of a motion without a solution there nothing is known: no time at all, so that the corners are planned to see.
-    Corners that no grid follows have no motion: their runs take forever.
+    """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk
+    limits on a coarse grid, the larger of both. Of a motion without a solution there nothing is known: no
+    time at all, so that the corners are planned to see. Corners that no grid follows have no motion: their
+    runs take forever.
     """
     bounds = corner_times(path, machine, jerk_limited=jerk_limited)
     if bounds.points.sum() > most:
@@ -73,8 +77,8 @@ def with_corners(
     order: Order,
     grids: Grids,
 ) -> tuple[OnPath, Array]:
-    """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which that was too much to find
-    out.
+    """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which
+    that was too much to find out.
 
     rounded : the path with the corners that the splines of `best` replace
     corners : bounds on the motion on them

@@ -1,22 +1,24 @@
 """The least time of a motion on single corners, in closed form: no grid, a few operations for each corner.
 
-A corner between two straight legs begins and ends with their directions e1 and e2, without curvature. Let theta be the angle between
-them, s = sin(theta/2), n = (e2 - e1)/(2 s), and T the time from its beginning to its end, with the speeds v0 and v1 there. Across the
-corner, along n, the velocity goes from -v0 s to v1 s, and the acceleration is -u0 s at the beginning and u1 s at the end, where u0 and
-u1 are accelerations along straight legs: |u| <= U = min_k a_k/|e_k|. With A_n = sum_k a_k |n_k| and J_n = sum_k j_k |n_k|, the largest
+A corner between two straight legs begins and ends with their directions e1 and e2, without curvature. Let
+theta be the angle between them, s = sin(theta/2), n = (e2 - e1)/(2 s), and T the time from its beginning to
+its end, with the speeds v0 and v1 there. Across the corner, along n, the velocity goes from -v0 s to v1 s,
+and the acceleration is -u0 s at the beginning and u1 s at the end, where u0 and u1 are accelerations along
+straight legs: |u| <= U = min_k a_k/|e_k|. With A_n = sum_k a_k |n_k| and J_n = sum_k j_k |n_k|, the largest
 acceleration and jerk along n,
 
     (v0 + v1) s <= integral min(U s + J_n t, U s + J_n (T - t), A_n) dt <= min(U s T + J_n T^2/4, A_n T).
 
-The speed changes by |a| at most, the norm of all accelerations, so it is v0 + |a| t and v1 + |a| (T - t) at most: the corner's length
-is l <= (v0 + v1) T/2 + |a| T^2/4, and both together
+The speed changes by |a| at most, the norm of all accelerations, so it is v0 + |a| t and v1 + |a| (T - t) at
+most: the corner's length is l <= (v0 + v1) T/2 + |a| T^2/4, and both together
 
     l <= J_n T^3/(8 s) + (2 U + |a|) T^2/4,        l <= (A_n/(2 s) + |a|/4) T^2.
 
-l is at least the distance of the corner's ends. Therefore T is at least the root of the first, that of the second, and l over the
-largest speed, whatever the shape of the corner; straight parts take their length over the largest speed, and no piece between two full
-stops of length L less than 2 sqrt(L/|a|). With chords of 0.1 to 0.3 mm, 100 mm/s and 2e5 mm/s3 that tells that splines are faster;
-with long legs and few corners it says little.
+l is at least the distance of the corner's ends. Therefore T is at least the root of the first, that of the
+second, and l over the largest speed, whatever the shape of the corner; straight parts take their length over
+the largest speed, and no piece between two full stops of length L less than 2 sqrt(L/|a|). With chords of 0.1
+to 0.3 mm, 100 mm/s and 2e5 mm/s3 that tells that splines are faster; with long legs and few corners it says
+little.
 """
 
 from __future__ import annotations
@@ -30,15 +32,16 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 
-# Points on a grid of the usual resolution, about: of a corner (98 on chords of 0.3 mm, 213 on chords of 20 um, at a/j = 40 ms), and of
-# the rest of a leg.
+# Points on a grid of the usual resolution, about: of a corner (98 on chords of 0.3 mm, 213 on chords of 20
+# um, at a/j = 40 ms), and of the rest of a leg.
 CORNER_POINTS, LEG_POINTS = 100.0, 10.0
 NEWTON_STEPS = 30  # from above, for the root of a cubic that is convex and ascending: to the last digits
 ROUNDING = 1e-9  # taken off a root [-]
 
 
 class CornerBounds(NamedTuple):
-    """Of a motion on corners between full stops: time (G,) that it takes at least [s], points (G,) of its grid, about."""
+    """Of a motion on corners between full stops: time (G,) that it takes at least [s], points (G,) of its
+    grid, about."""
 
     time: FloatArray
     points: FloatArray

@@ -1,8 +1,9 @@
 """How much work a plan is worth: grids and rounds of reshaping for `--effort quick`, `normal` and `best`.
 
-Splines are reshaped on a coarse grid, on which motions take up to 1e-2 longer than on a fine one; which of two shapes is faster it
-tells better than that. The last shape is solved again on the final grid, that of the plan. The error of a grid goes with the
-square of its intervals, and so do its points with the root of its resolution: 16 times finer are about 4 times as many points.
+Splines are reshaped on a coarse grid, on which motions take up to 1e-2 longer than on a fine one; which of
+two shapes is faster it tells better than that. The last shape is solved again on the final grid, that of the
+plan. The error of a grid goes with the square of its intervals, and so do its points with the root of its
+resolution: 16 times finer are about 4 times as many points.
 """
 
 from __future__ import annotations
@@ -18,13 +19,15 @@ from planner.corners.smooth import CornerShape
 from planner.joint.guess import Cut
 from planner.planning.optimal.order import Order
 
-# Interpolation error of the axis accelerations on the coarsest grid [share of the limit] (feedrate/sampling/samples.py). Rounds of
-# reshaping on a quarter of it end 2e-3 faster on the bracket and take 1.6 times as long.
+# Interpolation error of the axis accelerations on the coarsest grid [share of the limit]
+# (feedrate/sampling/samples.py). Rounds of reshaping on a quarter of it end 2e-3 faster on the bracket and
+# take 1.6 times as long.
 COARSE = 3.2e-2
 
 
-# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral, 2,000 chords and a relief
-# of 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to 1.34 times the time.
+# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral,
+# 2,000 chords and a relief of 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to
+# 1.34 times the time.
 FIRST_CUT, SECOND_CUT = Cut(per_unit=1.0, of_leg=1.0), Cut(per_unit=4.0, of_leg=1.0)
 FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
 # For the best of efforts: on those jobs 1.2e-5 to 2e-5 more.
@@ -46,10 +49,12 @@ class Search:
     steps_max : of constant jerk that it may have
     cut       : how finely the first motion is cut into steps
     gap       : complementarity at the end, share of the time [-]
-    finer     : how finely what is found is cut once more, and the gap of the search from there, one after the other
+    finer     : how finely what is found is cut once more, and the gap of the search from there, one after the
+                other
     again     : search from reshaped splines where that has not ended
-    small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a step is at least
-                an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the time for 2e-3 less motion
+    small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched
+                where a step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um
+                took three times the time for 2e-3 less motion
     """
 
     steps_max: float
@@ -64,7 +69,8 @@ class Search:
         return self if steps <= self.small else dataclasses.replace(self, finer=(), again=False)
 
 
-# Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two processors. Steps of a small one.
+# Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two
+# processors. Steps of a small one.
 STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
 THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 
@@ -91,10 +97,10 @@ class Effort:
         return next(size for size in self.sizes if points <= size.points)
 
 
-# Rounds: on the bracket the first two gain 2.5e-2 of the time, the next four 5e-3, and the next four 5e-4. Final grids: motions on
-# 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than
-# on 2e-4 (zig-zag on mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the
-# coarse grid leave small jobs 1e-3 slower.
+# Rounds: on the bracket the first two gain 2.5e-2 of the time, the next four 5e-3, and the next four 5e-4.
+# Final grids: motions on 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than on 2e-4 (zig-zag on
+# mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the coarse grid leave small
+# jobs 1e-3 slower.
 _TINY, _FEW, _MANY = SIZES.small_grids
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {

@@ -1,9 +1,10 @@
 """The geometries a motion can run on, by name: rounded corners, each by itself, or splines in their place.
 
-A run of corners may have a place where no spline fits: the curve leaves the tolerance there, has no certificate, or has a cusp because
-the path turns back within the tolerance. Instead of giving up the spline for the whole run, the motion gets a full stop there, which
-divides the run in two. The stops change the runs around them, which may then have no spline elsewhere. The second time such a place is
-fenced off by two full stops, and only the corners between them stay single.
+A run of corners may have a place where no spline fits: the curve leaves the tolerance there, has no
+certificate, or has a cusp because the path turns back within the tolerance. Instead of giving up the spline
+for the whole run, the motion gets a full stop there, which divides the run in two. The stops change the runs
+around them, which may then have no spline elsewhere. The second time such a place is fenced off by two full
+stops, and only the corners between them stay single.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ from planner.machine import Machine
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
 
-# Rounds of placing full stops; in the last one a run without a spline is fenced by two. Of 1,746 paths (random ones, and real programs
-# on two machines) 29 needed a round, one of these a second, and none a third.
+# Rounds of placing full stops; in the last one a run without a spline is fenced by two. Of 1,746 paths
+# (random ones, and real programs on two machines) 29 needed a round, one of these a second, and none a third.
 STOP_ROUNDS = 2
 
 
 def corner_shape(
     corner: str | CornerShape, machine: Machine, toolpath: Toolpath, bezier: CornerShape | None = None
 ) -> CornerShape:
-    """The corner shape of that name with the machine's settings; `bezier`: the one of "bezier" and beside splines, None for the
-    usual one. Raises InputError for an unknown name."""
+    """The corner shape of that name with the machine's settings; `bezier`: the one of "bezier" and beside
+    splines, None for the usual one. Raises InputError for an unknown name."""
     if corner in (AUTO, SPLINE, "bezier"):
         return bezier or BezierCorner()
     if corner == "fir":

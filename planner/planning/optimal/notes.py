@@ -12,7 +12,8 @@ from planner.smoothing.spline_path import SplineShape
 
 
 def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
-    """The notes of a motion on a smooth path: what its splines did, corners that are not rounded, full stops of the solver.
+    """The notes of a motion on a smooth path: what its splines did, corners that are not rounded, full stops
+    of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion
@@ -57,7 +58,8 @@ def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
 
 
 def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> tuple[str, ...]:
-    """That single corners were not compared on some runs between full stops (planning/optimal/compare_corners.py).
+    """That single corners were not compared on some runs between full stops
+    (planning/optimal/compare_corners.py).
 
     left   : (L,) these runs
     points : (G,) of the grid that each run would have
@@ -78,7 +80,8 @@ def _line(path: SmoothPath, joint: int) -> int:
 
 
 def _standstills(best: OnPath) -> Array:
-    """Joints of the toolpath behind the segments on which the profile rests between two full stops of the path."""
+    """Joints of the toolpath behind the segments on which the profile rests between two full stops of the
+    path."""
     inner = best.problem.interval.copy()
     inner[best.samples.piece[:-1]] = False
     return best.samples.segment[inner & (best.solution.feed_sq == 0.0)] + 1

@@ -1,8 +1,9 @@
-"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a grid of its own.
+"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a
+grid of its own.
 
-The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says where straight legs need
-points (feedrate/grid.py). Without jerk limits the points where the profile switches on straight legs are added and the problem is
-solved once more, so that every switch falls on a point.
+The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says
+where straight legs need points (feedrate/grid.py). Without jerk limits the points where the profile switches
+on straight legs are added and the problem is solved once more, so that every switch falls on a point.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ class Order(Protocol):
         known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
-        """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py), which may be given;
-        pieces between full stops that a known motion has too are taken over from it."""
+        """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py),
+        which may be given; pieces between full stops that a known motion has too are taken over from it."""
         ...
 
 
@@ -57,8 +58,9 @@ class Order(Protocol):
 class ThirdOrder:
     """All limits with jerk; multipliers come with the solution.
 
-    Limits are kept at the grid points. What the motion exceeds between them is measured afterwards, and made good where it is
-    (tighten.py): to leave a margin for it everywhere costs 3e-4 of the time on the usual grid and 4e-3 on the coarse one.
+    Limits are kept at the grid points. What the motion exceeds between them is measured afterwards, and made
+    good where it is (tighten.py): to leave a margin for it everywhere costs 3e-4 of the time on the usual
+    grid and 4e-3 on the coarse one.
     """
 
     solver: ThirdOrderSolver
@@ -73,7 +75,8 @@ class ThirdOrder:
         known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
-        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as of `Order`."""
+        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as
+        of `Order`."""
         samples = _sampled(self, path, job, resolution, samples)
         with job.stage("solve") as progress:
             samples = refine_for_jerk(samples, job.machine)
@@ -105,7 +108,8 @@ class SecondOrder:
         known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
-        """The time-optimal motion without jerk limits, on a grid with points where the profile switches; arguments as of `Order`."""
+        """The time-optimal motion without jerk limits, on a grid with points where the profile switches;
+        arguments as of `Order`."""
         samples = _sampled(self, path, job, resolution, samples)
         with job.stage("solve"):
             if self.to_tighten:
@@ -120,7 +124,8 @@ class SecondOrder:
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
-    """The motion of another problem on the same grid: where some of its limits are a little tighter, solved again around them only."""
+    """The motion of another problem on the same grid: where some of its limits are a little tighter, solved
+    again around them only."""
     if isinstance(solver, JerkLimited) and _tighter_only(planned.problem, problem):
         found = solver.again(planned.problem, planned.solution, problem)
         if found is not None:
@@ -136,7 +141,8 @@ def _tighter_only(problem: FeedrateProblem, other: FeedrateProblem) -> bool:
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
-    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is the solution's status."""
+    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is
+    the solution's status."""
     problem = feedrate_problem(samples, machine, measured=True)
     solution = solver.solve(problem)
     if solution.solved:

@@ -43,7 +43,8 @@ PRICED_BESIDE = SIZES.priced_beside
 
 
 def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
-    """The time-optimal motion on a smooth path, tightened where it exceeds a limit between grid points; None where there is none."""
+    """The time-optimal motion on a smooth path, tightened where it exceeds a limit between grid points; None
+    where there is none."""
     try:
         found = time_optimal(job, settings)
     except NotSolvedError:  # no grid follows the path
@@ -55,8 +56,8 @@ def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
 
 
 def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None) -> Plan:
-    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points, delivered; without a trajectory
-    if it takes longer than `job.most`.
+    """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points,
+    delivered; without a trajectory if it takes longer than `job.most`.
 
     known : its motion, if there is one already (`kept_on_path`)
     """
@@ -70,7 +71,8 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
         found = [found.pop().held_by_filters()]
     if not found[0].solution.solved:
         return plan_of_solution(job, found[0], None, settings)
-    # from here on the motion is held by no name, so that tightening lets go of it: a third of a kilobyte a point
+    # from here on the motion is held by no name, so that tightening lets go of it: a third of a kilobyte a
+    # point
     with job.stage("solve"):
         best, motion = known or within_limits(
             found.pop(), settings.order, job.toolpath, job.machine, job.tell
@@ -103,8 +105,8 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
         cornered = order.solve(given, job, grids_for(given, job, settings)[0].final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
-    # Solve and reshape in turns, on a coarse grid; then once on the final one. The coarse motion is let go of before: 0.5 kB a point.
-    # Where not one round is worth its work the final grid is the first one.
+    # Solve and reshape in turns, on a coarse grid; then once on the final one. The coarse motion is let go of
+    # before: 0.5 kB a point. Where not one round is worth its work the final grid is the first one.
     best, grids, resolution = _first(with_spline(rounded, splines), splines, job, settings)
     if best.solution.solved and resolution != grids.final:
         best = reshaped(rounded, best, job, settings, resolution)
@@ -130,8 +132,9 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
 
 
 def first_motion(job: Job, settings: Settings) -> OnPath | None:
-    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points only; None where a run
-    gets no spline, where there is no solution, and where the splines have more spans than the steps that are searched."""
+    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points
+    only; None where a run gets no spline, where there is no solution, and where the splines have more spans
+    than the steps that are searched."""
     rounded = _rounded(job, settings)
     with job.stage("geometry"):
         shape = spline_shape(rounded, job.machine)

@@ -1,18 +1,20 @@
 """A round of reshaping: splines and the motion along them are improved together, within the tolerance.
 
-Along the time-optimal motion of the present path all limits are linearised in the control points and in the time that every part of it
-takes; smoothing/combined.py solves that convex problem inside the corridor, with a pull towards the present shape. The feedrate problem
-is then solved on the new path. Runs that got faster keep their new shape, and are pulled less or more in the next round by how much of
-the promised gain came true; the others keep their old shape and are pulled more (rounds.py). Where nothing can be gained to first
-order, shape and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
+Along the time-optimal motion of the present path all limits are linearised in the control points and in the
+time that every part of it takes; smoothing/combined.py solves that convex problem inside the corridor, with a
+pull towards the present shape. The feedrate problem is then solved on the new path. Runs that got faster keep
+their new shape, and are pulled less or more in the next round by how much of the promised gain came true; the
+others keep their old shape and are pulled more (rounds.py). Where nothing can be gained to first order, shape
+and feed satisfy the optimality conditions of the combined problem, minimum time inside the tolerance.
 
-What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the parameter of the spline is
-kept as a function of time, a small change of the control points changes the optimal time by
+What a wider corridor is worth is asked of another problem, with the multipliers lambda of the motion. If the
+parameter of the spline is kept as a function of time, a small change of the control points changes the
+optimal time by
 
     dT = sum over grid points and axes of  |lambda| d(|jerk| / limit)  +  the same of accelerations, velocities and feed,
 
-which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the control points. The
-multipliers of the corridor in
+which is the gradient of sum |lambda|/2 (jerk/limit)^2 + ... at the present shape, a convex quadratic in the
+control points. The multipliers of the corridor in
 
     minimise  sum |lambda|/2 (jerk/limit)^2 + ...  +  force/2 integral ((jerk - jerk_now)/limit)^2 dt
 
@@ -88,8 +90,8 @@ def chosen(planned: OnPath, new: SplineShape, better: Array) -> SplineShape:
 
 
 def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape, FloatArray]:
-    """The shape after one round with the pull (Q,) of each run, inf for those that stay as they are, and what it gains to first order
-    (Q,) [s]. A run without a certificate keeps its shape.
+    """The shape after one round with the pull (Q,) of each run, inf for those that stay as they are, and what
+    it gains to first order (Q,) [s]. A run without a certificate keeps its shape.
 
     gap : of the convex problem, share of the time [-]
     """
@@ -121,8 +123,8 @@ def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape,
 
 
 def _bounds(planned: OnPath, on: Array) -> FloatArray:
-    """(I, 2) bounds of the feed [mm/s] and of the acceleration across the path [mm/s2] in the intervals `on`: programmed feed, and what
-    the bounds of the feed that go with the curvature allow."""
+    """(I, 2) bounds of the feed [mm/s] and of the acceleration across the path [mm/s2] in the intervals `on`:
+    programmed feed, and what the bounds of the feed that go with the curvature allow."""
     problem, samples = planned.problem, planned.samples
     of_path = np.array([name == FEED.name or name.startswith(VELOCITY.name) for name in problem.bound_names])
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
@@ -132,7 +134,8 @@ def _bounds(planned: OnPath, on: Array) -> FloatArray:
 
 
 def corridor_prices(planned: OnPath) -> FloatArray:
-    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the corridor in a round from the present shape."""
+    """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the corridor in a round from the present
+    shape."""
     shape, (H, Q) = _shape(planned), price_bands(planned)
     goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
     relaxed = relax(shape.corridor, shape.splines, shape.runs, shape.used, shape.left, goal)
@@ -140,8 +143,9 @@ def corridor_prices(planned: OnPath) -> FloatArray:
 
 
 def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
-    """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives at the present shape
-    (module text) [s/mm2], and Q, of the integral of the squared jerks over their limits."""
+    """Bands (A, n, 6) over the control points of all runs: H, whose form 1/2 c'Hc has the time's derivatives
+    at the present shape (module text) [s/mm2], and Q, of the integral of the squared jerks over their
+    limits."""
     problem, splines = planned.problem, _shape(planned).splines
     axes = problem.machine_axes
     limits = np.stack([problem.acceleration[:axes], _jerk_scale(planned)[:axes]])
@@ -157,8 +161,8 @@ def price_bands(planned: OnPath) -> tuple[FloatArray, FloatArray]:
 def _motion(
     planned: OnPath, places: Callable[[FloatArray, FloatArray], FloatArray], part: slice = slice(None)
 ) -> tuple[SplineMotion, Array]:
-    """The motion on the splines, which pays nothing, at `places` of each interval, and the intervals of the grid (I,) that are on
-    them; of the intervals `part` only."""
+    """The motion on the splines, which pays nothing, at `places` of each interval, and the intervals of the
+    grid (I,) that are on them; of the intervals `part` only."""
     samples, problem, solution = planned.samples, planned.problem, planned.solution
     splines = _shape(planned).splines
     span = samples.element - len(samples.table.legs)
@@ -181,9 +185,10 @@ def _motion(
 
 
 def _inside(start: FloatArray, end: FloatArray) -> FloatArray:
-    """(I, 2, ..) values at the two places of Gauss's rule inside each interval, from those at its ends (I, ..): the multipliers of the
-    ends stand for what the limits cost along the interval, and a shape that is only paid for at grid points bends between them (after
-    16 rounds on the bracket 8e-4 of the time, on a zig-zag 2e-3)."""
+    """(I, 2, ..) values at the two places of Gauss's rule inside each interval, from those at its ends (I,
+    ..): the multipliers of the ends stand for what the limits cost along the interval, and a shape that is
+    only paid for at grid points bends between them (after 16 rounds on the bracket 8e-4 of the time, on a
+    zig-zag 2e-3)."""
     return np.stack([start + GAUSS * (end - start), end + GAUSS * (start - end)], axis=1)
 
 
@@ -198,8 +203,8 @@ def _shape(planned: OnPath) -> SplineShape:
 
 
 def _jerk_scale(planned: OnPath) -> FloatArray:
-    """(A,) jerks that the pull counts in: their limits, or, where the motion keeps none, what takes an axis to its acceleration in the
-    time in which that moves it by the tolerance [mm/s3]."""
+    """(A,) jerks that the pull counts in: their limits, or, where the motion keeps none, what takes an axis
+    to its acceleration in the time in which that moves it by the tolerance [mm/s3]."""
     problem = planned.problem
     if planned.solution.jerk_limited:
         return problem.jerk
@@ -208,7 +213,8 @@ def _jerk_scale(planned: OnPath) -> FloatArray:
 
 
 def _prices(problem: FeedrateProblem, solution: FeedrateSolution, on: Array) -> FloatArray:
-    """(I, 2, A, 3) weights of squared velocity, acceleration and jerk at both ends of the intervals `on` (module text) [s]."""
+    """(I, 2, A, 3) weights of squared velocity, acceleration and jerk at both ends of the intervals `on`
+    (module text) [s]."""
     assert solution.multipliers is not None
     axes = problem.machine_axes
     rows = np.abs(solution.multipliers.rows[on, :axes])

@@ -53,15 +53,15 @@ def plan_of_solution(
 
 
 def priced(best: OnPath, machine: Machine) -> bool:
-    """Whether the limits of a motion have prices: not where it has no jerk limits or its solver does not tell, nor behind filters, of
-    which the problem knows only a part."""
+    """Whether the limits of a motion have prices: not where it has no jerk limits or its solver does not
+    tell, nor behind filters, of which the problem knows only a part."""
     solution = best.solution
     return solution.jerk_limited and solution.multipliers is not None and machine.fir is None
 
 
 def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """The prices of its limits. With limits that are no axis' the tolerance of splines has no price: the machine alone pulls at their
-    shapes."""
+    """The prices of its limits. With limits that are no axis' the tolerance of splines has no price: the
+    machine alone pulls at their shapes."""
     by_site = None
     along = Limits.of(machine, best.path.toolpath.axes).along
     # what the corridor of the splines costs

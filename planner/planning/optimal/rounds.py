@@ -1,4 +1,5 @@
-"""Rounds of reshaping: splines and feed improved in turns, every run as far as its last round came true (reshape.py has one round)."""
+"""Rounds of reshaping: splines and feed improved in turns, every run as far as its last round came true
+(reshape.py has one round)."""
 
 from __future__ import annotations
 
@@ -13,19 +14,22 @@ from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.reshape import chosen, reshape, run_times, times_on_chords
 from planner.smoothing.spline_path import SplineShape, with_spline
 
-# A run is not reshaped again after so many rounds in a row that gained less than the first share of its time, where they promised less
-# than the second [-], or with a pull above the last: there no step is short enough for what it promises to come true.
+# A run is not reshaped again after so many rounds in a row that gained less than the first share of its time,
+# where they promised less than the second [-], or with a pull above the last: there no step is short enough
+# for what it promises to come true.
 QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
-# A run that a round made slower is not pulled more, but done, where the chord error bounds the feed for more than this share of its
-# time [-]: a step does not know that the farther the curve is from the path, the less is left to chords. Fifty such random jobs take
-# the same time, and 10 % less computing.
+# A run that a round made slower is not pulled more, but done, where the chord error bounds the feed for more
+# than this share of its time [-]: a step does not know that the farther the curve is from the path, the less
+# is left to chords. Fifty such random jobs take the same time, and 10 % less computing.
 ON_CHORDS = 0.1
-# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4 slower, with 0 to 1e-2 at the
-# same time within 1e-4.
+# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4
+# slower, with 0 to 1e-2 at the same time within 1e-4.
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
-# Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of it [-].
+# Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of
+# it [-].
 GOOD, POOR, LESS, MORE = 0.5, 0.1, 0.3, 4.0
-# Gap of the first convex problem, that of the others as a share of what the round before promised, and the least [-].
+# Gap of the first convex problem, that of the others as a share of what the round before promised, and the
+# least [-].
 FIRST_GAP, GAP_SHARE, LAST_GAP = 1e-3, 0.1, 1e-5
 
 
@@ -68,7 +72,8 @@ def reshaped(rounded: SmoothPath, best: OnPath, job: Job, settings: Settings, re
             tell_of(job, f"reshape {n}, mixed", mixed, best, faster=int(faster.sum()), of=int((~done).sum()))
             if mixed.faster_than(best):
                 best = mixed
-        # a promise of nothing or less is none: the convex problem was not solved to the end, and the run is pulled more
+        # a promise of nothing or less is none: the convex problem was not solved to the end, and the run is
+        # pulled more
         sound = promised > 0.0
         little = (gained < QUIET_GAIN * time) & (promised < QUIET_PROMISE * time)
         quiet = np.where(sound & little, quiet + 1.0, 0.0)

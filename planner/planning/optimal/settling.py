@@ -1,4 +1,5 @@
-"""A planned motion p made gentler, or with longer rests, until what is delivered of it behind a shaper keeps limits and tolerance.
+"""A planned motion p made gentler, or with longer rests, until what is delivered of it behind a shaper keeps
+limits and tolerance.
 
 The delivered motion D and what p may do that D must not are in shaped.py.
 """
@@ -26,7 +27,8 @@ from planner.planning.optimal.order import Order, solve_again
 from planner.planning.optimal.tighten import fastest_inside, tightened
 
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
-# D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much more.
+# D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much
+# more.
 EXCESS, SPARE = 2e-7, 1e-5
 # What the path and the shaper may use of the tolerance, and what errors are brought to [-].
 ROOM, AIM = 1.0 - SPARE_ERROR, 1.0 - 2.0 * SPARE_ERROR
@@ -68,7 +70,8 @@ class Settling:
     def settled(
         self, planned: OnPath, useless: Callable[[float], bool]
     ) -> tuple[OnPath, Motion, ShapedMotion] | None:
-        """The fastest D found on the path of `planned`, with the p that it is made of; None if none is of use.
+        """The fastest D found on the path of `planned`, with the p that it is made of; None if none is of
+        use.
 
         useless : whether a D that takes so long [s] is no faster than what is there
         """
@@ -92,8 +95,8 @@ class Settling:
     def _kept(
         self, planned: OnPath, late: Callable[[float], bool]
     ) -> tuple[tuple[OnPath, Motion, ShapedMotion] | None, FloatArray]:
-        """`planned`, its p with rests, slowed down until D keeps everything, and D; None if it never does, or not before it is late;
-        and what p as planned exceeds (P,)."""
+        """`planned`, its p with rests, slowed down until D keeps everything, and D; None if it never does, or
+        not before it is late; and what p as planned exceeds (P,)."""
         plain = planned.motion()
         runs = runs_of(plain)
         first = np.ones(len(planned.problem))
@@ -157,7 +160,8 @@ class Settling:
         return Over(factor, limit, error, stops_between(early, late, len(begin)))
 
     def _put(self, factor: FloatArray, motion: Motion, time: FloatArray, worst: FloatArray) -> None:
-        """Put down to the pieces of p's law, in `factor` (L,), by what D is too fast at times (n,) [s]: (n,) [-]."""
+        """Put down to the pieces of p's law, in `factor` (L,), by what D is too fast at times (n,) [s]: (n,)
+        [-]."""
         over = worst > 1.0 + EXCESS
         for delay in self.shaper.delay:
             np.maximum.at(factor, self._piece(motion, time[over] - delay), worst[over])
@@ -166,8 +170,8 @@ class Settling:
         return np.clip(np.searchsorted(motion.law.t, times, side="right") - 1, 0, len(motion.law.t) - 1)
 
     def _rests(self, motion: Motion, planned: OnPath) -> FloatArray:
-        """(G,) rest behind each run [s]: at full stops of the job the shaper's length, elsewhere the shortest with which D comes near
-        enough to the corner, behind the last run none."""
+        """(G,) rest behind each run [s]: at full stops of the job the shaper's length, elsewhere the shortest
+        with which D comes near enough to the corner, behind the last run none."""
         samples, toolpath = planned.samples, self.job.toolpath
         runs = runs_of(motion)
         rest = np.zeros(len(runs))
@@ -196,13 +200,15 @@ def slower_by_errors(
 ) -> FloatArray:
     """(G,) how much slower than planned runs have to be for their errors to come to `AIM` [-].
 
-    now, before : how much slower they were (G,) [-], and the error over tolerance with that (G,), 0 where it is none
+    now, before : how much slower they were (G,) [-], and the error over tolerance with that (G,), 0 where it
+                  is none
     share       : of the tolerance, that the path may use [-]
     least       : (G,) how much slower they are at least when that was in vain [-]
 
-    The error is e = path + dynamic/slower^2. Two rounds tell both; before that the path is taken to use what it may. A run that takes
-    less time than the shaper is long is as far off however fast it is: D is then between its ends. Where the second round was no
-    better, or not even a standing run would be near enough, a run is made `MOST_SLOWER` times as slow.
+    The error is e = path + dynamic/slower^2. Two rounds tell both; before that the path is taken to use what
+    it may. A run that takes less time than the shaper is long is as far off however fast it is: D is then
+    between its ends. Where the second round was no better, or not even a standing run would be near enough, a
+    run is made `MOST_SLOWER` times as slow.
     """
     (s, e), (s0, e0) = now, before
     known = (e0 > 0.0) & (s > s0)

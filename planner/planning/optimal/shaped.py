@@ -1,23 +1,26 @@
 """Setpoints that leave the machine's vibration modes at rest: planned for a shaper, and delivered behind it.
 
-The delivered motion D is the mean of delayed copies of a planned motion p (planner/motion/shaping.py). D has to keep the limits and the
-tolerance; p does not. It follows that:
+The delivered motion D is the mean of delayed copies of a planned motion p (planner/motion/shaping.py). D has
+to keep the limits and the tolerance; p does not. It follows that:
 
-* The copies of one mode are half a period apart. Where p accelerates for less than that, D has half of its acceleration and jerk, so p
-  may be planned with up to twice the limits.
-* D cuts corners on which p moves. A sharp corner costs least time if p stops there for a moment, shorter than the shaper, so that D
-  passes it within the tolerance (paper 000's overlap of two moves). Therefore p stops at every corner that turns by more than an angle,
-  with the shortest rest that is enough. At full stops of the program p rests for the whole length of the shaper, so that D stands
-  still.
-* D cuts curves off by up to half of the normal acceleration of p times the variance of the shaper's delays (planner/motion/shaping.py),
-  about as much as moving averages do (docs/papers.md D). So the normal acceleration of p is limited, and p is slow in curves only.
-  Where D turns in less time than the shaper is long it is nearer than that: there a faster p is better.
-* Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the times of all copies, and
-  is solved again. What remains then is removed by slowing down runs of p (settling.py).
+* The copies of one mode are half a period apart. Where p accelerates for less than that, D has half of its
+  acceleration and jerk, so p may be planned with up to twice the limits.
+* D cuts corners on which p moves. A sharp corner costs least time if p stops there for a moment, shorter than
+  the shaper, so that D passes it within the tolerance (paper 000's overlap of two moves). Therefore p stops
+  at every corner that turns by more than an angle, with the shortest rest that is enough. At full stops of
+  the program p rests for the whole length of the shaper, so that D stands still.
+* D cuts curves off by up to half of the normal acceleration of p times the variance of the shaper's delays
+  (planner/motion/shaping.py), about as much as moving averages do (docs/papers.md D). So the normal
+  acceleration of p is limited, and p is slow in curves only. Where D turns in less time than the shaper is
+  long it is nearer than that: there a faster p is better.
+* Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the
+  times of all copies, and is solved again. What remains then is removed by slowing down runs of p
+  (settling.py).
 
-Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners and rests of the whole
-length, which along straight blocks keeps every limit and the tolerance. Its least time is known beforehand; it is planned when another
-one takes longer than that, and no candidate is pursued that takes longer than what is there.
+Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners
+and rests of the whole length, which along straight blocks keeps every limit and the tolerance. Its least time
+is known beforehand; it is planned when another one takes longer than that, and no candidate is pursued that
+takes longer than what is there.
 """
 
 from __future__ import annotations
@@ -50,9 +53,10 @@ SHARP = float(np.deg2rad(20.0))
 
 
 class Candidate(NamedTuple):
-    """How p is planned: with stops at corners that turn by more than `sharp` [rad], `more` times the accelerations and jerks [-], and a
-    `share` of the tolerance for its path [-]; the rest is for the shaper. With `curved` p takes curves at no more than `BOLDER` times
-    the acceleration with which the shaper cuts them off by that."""
+    """How p is planned: with stops at corners that turn by more than `sharp` [rad], `more` times the
+    accelerations and jerks [-], and a `share` of the tolerance for its path [-]; the rest is for the shaper.
+    With `curved` p takes curves at no more than `BOLDER` times the acceleration with which the shaper cuts
+    them off by that."""
 
     sharp: float
     more: float
@@ -60,8 +64,9 @@ class Candidate(NamedTuple):
     curved: bool
 
 
-# The first is the gentlest: what it finds ends most of the others early. Against six, two of them not `curved`, without `BOLDER`, 38
-# random jobs take 0.984 of the time in the mean (0.878 to 1.015) and 0.86 of the processor time.
+# The first is the gentlest: what it finds ends most of the others early. Against six, two of them not
+# `curved`, without `BOLDER`, 38 random jobs take 0.984 of the time in the mean (0.878 to 1.015) and 0.86 of
+# the processor time.
 CANDIDATES = (
     Candidate(SHARP, 1.0, 0.02, True),
     Candidate(SHARP, 1.75, 0.05, True),
@@ -83,8 +88,9 @@ class Shaped:
 
 
 def shaped(job: Job, settings: Settings, candidates: tuple[Candidate, ...] = CANDIDATES) -> Shaped | None:
-    """The fastest shaped motion of the candidates, which are time-optimal with larger limits, a smaller tolerance and more stops, or
-    the one with stops at all corners where that is faster; None if none of them takes less than `job.most`."""
+    """The fastest shaped motion of the candidates, which are time-optimal with larger limits, a smaller
+    tolerance and more stops, or the one with stops at all corners where that is faster; None if none of them
+    takes less than `job.most`."""
     search = _Search(job, settings)
     seen: set[tuple[int, float, float, bool]] = set()
     for one in candidates:
@@ -96,7 +102,8 @@ def shaped(job: Job, settings: Settings, candidates: tuple[Candidate, ...] = CAN
 
 
 class _Search:
-    """The fastest of the candidates so far, and the one with stops at all corners, made when it is asked for."""
+    """The fastest of the candidates so far, and the one with stops at all corners, made when it is asked
+    for."""
 
     def __init__(self, job: Job, settings: Settings):
         self.job, self.settings, self.shaper = job, settings, shaper_of(job.machine.modes)
@@ -110,7 +117,8 @@ class _Search:
         return time >= min(self.best.delivered.end if self.best else np.inf, self.job.most)
 
     def fastest(self) -> Shaped | None:
-        """The best of the candidates, or the motion with stops at all corners if it is faster; that is not made where it cannot be."""
+        """The best of the candidates, or the motion with stops at all corners if it is faster; that is not
+        made where it cannot be."""
         if self.useless(self._least):
             return self.best
         return self.tried(self._stopping, STOPPING) or self.best
@@ -166,7 +174,8 @@ def _faster(machine: Machine, by: float) -> Machine:
 
 
 def shaped_plan(job: Job, settings: Settings) -> Plan:
-    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes; else as `shaped`."""
+    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes; else
+    as `shaped`."""
     if not job.machine.modes:
         raise InputError(
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
@@ -177,7 +186,8 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
     plan = _plan_of(job, settings, shaped(job, settings))
     if plan.verdict is None or counted_time(plan) < np.inf:
         return plan
-    # what is slower is not gentler everywhere behind a shaper, whose copies then meet elsewhere; with the limits as they are D is
+    # what is slower is not gentler everywhere behind a shaper, whose copies then meet elsewhere; with the
+    # limits as they are D is
     gentle = _plan_of(job, settings, shaped(job, settings, CANDIDATES[:1]))
     kept = counted_time(gentle) < np.inf
     job.tell(

@@ -1,10 +1,13 @@
-"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less speed.
+"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less
+speed.
 
-A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than 0.5 %. Slowing down by
-lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says by which lam the motion has to be slower there.
+A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than
+0.5 %. Slowing down by lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says
+by which lam the motion has to be slower there.
 
-`tightened` scales the limits around every excess (`limit_scale` of the problem) and solves again: the new motion is slower in these
-places only. Each run between full stops is then slowed down uniformly by the excess that remains, which always ends.
+`tightened` scales the limits around every excess (`limit_scale` of the problem) and solves again: the new
+motion is slower in these places only. Each run between full stops is then slowed down uniformly by the excess
+that remains, which always ends.
 """
 
 from __future__ import annotations
@@ -34,23 +37,25 @@ PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than this [-], and not for long.
 TIGHTENED_EXCESS = 1e-5
 TIGHTENING_ROUNDS = 2
-# Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more than the first of `WORTH` [-]
-# at first, where nearly all has to be solved again anyway, and then of more than the second, while there is one: of a relief of
-# 100,000 blocks 0.35 is solved again in the second round, with the first everywhere 0.82. Few places are left to the later rounds.
+# Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more
+# than the first of `WORTH` [-] at first, where nearly all has to be solved again anyway, and then of more
+# than the second, while there is one: of a relief of 100,000 blocks 0.35 is solved again in the second round,
+# with the first everywhere 0.82. Few places are left to the later rounds.
 TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
 SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps, by 5e-9 a round on SheepTile
 # What is slowed down is slowed down by this much more [-]; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
-# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict: the verifier looks at places
-# of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks); a second verdict takes as long as the first.
+# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict:
+# the verifier looks at places of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks);
+# a second verdict takes as long as the first.
 SEEN_BEFORE = 1.0 + 2e-5
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
-    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen near its ends, in its
-    middle, where it is fastest and, if it lies on one grid interval, at the peaks of parabolas through these; <= 1 where it keeps
-    them."""
+    """(L,) by what factor the motion has to be slower to keep its limits on each piece of its time law, seen
+    near its ends, in its middle, where it is fastest and, if it lies on one grid interval, at the peaks of
+    parabolas through these; <= 1 where it keeps them."""
     every = Limits.of(machine, toolpath.axes)
     limits = every.of_axes
     programmed = np.full(int(toolpath.block[-1]) + 1, np.inf)
@@ -90,7 +95,8 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
 
 
 def _on_one_interval(motion: Motion) -> Array:
-    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not jump."""
+    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not
+    jump."""
     s, grid = motion.law.s, motion.samples.s
     interval = np.searchsorted(grid, s, side="right") - 1
     beyond = np.append(s[1:], s[-1])
@@ -99,9 +105,9 @@ def _on_one_interval(motion: Motion) -> Array:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _worst(feed, motions, limits, smooth, out):
-    """The factor of each of n pieces, into out (n,), from what is seen of it at the shares `WATCHED`: feed (3 n,) over the programmed
-    one, and velocities, accelerations and jerks (3 n, A) with their limits (3, A); on smooth pieces (n,) of the parabolas through
-    them too."""
+    """The factor of each of n pieces, into out (n,), from what is seen of it at the shares `WATCHED`: feed (3
+    n,) over the programmed one, and velocities, accelerations and jerks (3 n, A) with their limits (3, A); on
+    smooth pieces (n,) of the parabolas through them too."""
     apart = WATCHED[2] - WATCHED[0]
     for n in range(len(out)):
         worst = max(feed[3 * n], feed[3 * n + 1], feed[3 * n + 2])
@@ -127,8 +133,8 @@ def _worst(feed, motions, limits, smooth, out):
 
 
 def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
-    """(n,) the largest of the ratios of n pieces (n, 3) at `WATCHED`, and on smooth pieces (n,) the peak of the parabola through them,
-    counted as in `_worst`."""
+    """(n,) the largest of the ratios of n pieces (n, 3) at `WATCHED`, and on smooth pieces (n,) the peak of
+    the parabola through them, counted as in `_worst`."""
     y0, y1, y2 = ratio.T
     slope = (y2 - y0) / (WATCHED[2] - WATCHED[0])
     bend = (y2 - 2.0 * y1 + y0) / (2.0 * (WATCHED[1] - WATCHED[0]) ** 2)
@@ -140,7 +146,8 @@ def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:
-    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its middle."""
+    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its
+    middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)
     tau = -law.acc_s[braking] / law.jerk_s[braking]
@@ -149,7 +156,8 @@ def fastest_inside(law: TimeLaw) -> FloatArray:
 
 
 def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
-    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of each point."""
+    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of
+    each point."""
     lam = np.maximum(factor, 1.0)
     lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
     return dataclasses.replace(problem, limit_scale=problem.limit_scale * lam)
@@ -158,9 +166,9 @@ def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
 def within_limits(
     planned: OnPath, order: Order, toolpath: Toolpath, machine: Machine, tell: Tell = tell_nobody
 ) -> tuple[OnPath, Motion]:
-    """The fastest motion found that keeps all limits between grid points too, with the problem and solution that it comes from;
-    `planned` has a solution. Without jerk limits the motion is taken as it is: accelerations step at grid points, between which they
-    are close to straight lines."""
+    """The fastest motion found that keeps all limits between grid points too, with the problem and solution
+    that it comes from; `planned` has a solution. Without jerk limits the motion is taken as it is:
+    accelerations step at grid points, between which they are close to straight lines."""
     motion = planned.motion()
     if not order.jerk_limited:
         return planned, motion
@@ -195,7 +203,8 @@ def within_limits(
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
-    """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion itself where none needs it.
+    """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion
+    itself where none needs it.
 
     factor : the excess, if it is known
     """

@@ -1,4 +1,5 @@
-"""`compare --report`: several methods on one page, their table, motions and profiles side by side, in one file that opens off-line."""
+"""`compare --report`: several methods on one page, their table, motions and profiles side by side, in one
+file that opens off-line."""
 
 from __future__ import annotations
 

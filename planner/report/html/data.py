@@ -1,7 +1,7 @@
 """The data of a report: samples of the motion, the NC lines with their times, limits.
 
-An hour of motion has millions of samples. A report has `SAMPLES_MAX` of them at most, at equal steps and with the highest feed of each
-step beside its first sample, so that no peak of the feed is lost; `step` says so.
+An hour of motion has millions of samples. A report has `SAMPLES_MAX` of them at most, at equal steps and with
+the highest feed of each step beside its first sample, so that no peak of the feed is lost; `step` says so.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ SAMPLES_MAX = SIZES.page_samples
 PROGRAMMED_MAX = SIZES.page_programmed
 ARC_POINTS = 48  # of every arc and curve that are shown
 NO_LIMIT = "none"
-# Around a joint its price is shown within so many tolerances, a rounded corner reaches back some ten of them, and at least within this
-# share of the path's extent, some ten pixels of the picture.
+# Around a joint its price is shown within so many tolerances, a rounded corner reaches back some ten of them,
+# and at least within this share of the path's extent, some ten pixels of the picture.
 NEAR, NEAR_SHARE = 20, 0.012
 
 
@@ -45,7 +45,8 @@ class Samples:
     feed      : (N,) as F words mean it [mm/s, deg/s where rotary axes move alone]
     programmed : (N,) F of the block; inf for rapids
     deviation : (N,) distance from the programmed path near the block of the sample [mm]
-    price     : (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is not known
+    price     : (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None
+                where it is not known
     """
 
     step: int
@@ -67,9 +68,11 @@ class Lines:
     programmed : (L,) time at the programmed feed without any acceleration [s]; NaN for rapids
     highest    : (L,) highest feed of the samples shown, or what is known of lines without one [mm/s]
     limit      : (L,) index in `Samples.limits` of the limit that holds the motion there for the longest time
-    deviation  : (L,) largest distance of the samples shown from the programmed path [mm]; NaN where no sample is shown
+    deviation  : (L,) largest distance of the samples shown from the programmed path [mm]; NaN where no sample
+                 is shown
     more_feed  : (L,) time that a tenth more of this line's feed would save [s]; None where it is not known
-    more       : (L,) time that a tenth more of all limits on this line would save [s]; None where it is not known
+    more       : (L,) time that a tenth more of all limits on this line would save [s]; None where it is not
+                 known
     """
 
     line: Array
@@ -104,8 +107,8 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
 
 
 def _price(plan: Plan, position: FloatArray, segment: Array) -> FloatArray | None:
-    """(n,) what tolerance at the nearer joint of its segment (n,) saves each sample's place (n, A) [s/mm]; 0 far from joints
-    (`NEAR`), None where it is not known."""
+    """(n,) what tolerance at the nearer joint of its segment (n,) saves each sample's place (n, A) [s/mm]; 0
+    far from joints (`NEAR`), None where it is not known."""
     places = plan.prices.places if plan.prices is not None else None
     if places is None or places.tolerance is None:
         return None
@@ -136,7 +139,8 @@ def _thinned(trajectory: Trajectory, step: int) -> Trajectory:
 
 
 def _limits(plan: Plan, shown: Trajectory) -> tuple[tuple[str, ...], Array]:
-    """Names of the limits, and which holds each sample: that of the solution, or where there is none the one closest to its limit."""
+    """Names of the limits, and which holds each sample: that of the solution, or where there is none the one
+    closest to its limit."""
     if plan.grid is not None and len(plan.grid.t):
         at = np.clip(np.searchsorted(plan.grid.t, shown.t, side="right") - 1, 0, None)
         return used_limits(plan.grid.active_names, plan.grid.active[at])
@@ -191,7 +195,8 @@ def lines_of(plan: Plan, samples: Samples) -> Lines:
 
 
 def _longest(at: Array, samples: Samples, rows: int) -> Array:
-    """(rows,) the limit that holds each row's samples for the longest time; `NO_LIMIT` where there is none."""
+    """(rows,) the limit that holds each row's samples for the longest time; `NO_LIMIT` where there is
+    none."""
     kinds = len(samples.limits)
     lasting = np.diff(samples.shown.t, append=samples.shown.t[-1:])
     time = np.bincount(at * kinds + samples.limit, lasting, rows * kinds).reshape(rows, kinds)
@@ -200,8 +205,8 @@ def _longest(at: Array, samples: Samples, rows: int) -> Array:
 
 
 def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArray:
-    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every so many where they are
-    more than `most`."""
+    """(n, 3) points of the programmed path [mm]: its vertices, and `ARC_POINTS` on every arc and curve; every
+    so many where they are more than `most`."""
     linear = [k for k, axis in enumerate(toolpath.axes) if axis in LINEAR_AXES]
     if not len(toolpath):
         return np.zeros((0, 3))

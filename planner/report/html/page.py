@@ -1,9 +1,12 @@
-"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a network.
+"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a
+network.
 
-Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own DecompressionStream. Texts
-of the program and of names are data as well, and the page shows them as text, so that nothing in a program is ever run.
+Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own
+DecompressionStream. Texts of the program and of names are data as well, and the page shows them as text, so
+that nothing in a program is ever run.
 
-The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's script, some five
+The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's
+                                      script, some five
 megabytes, is run and the columns are unpacked.
 """
 
@@ -62,7 +65,8 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
     )
 
 
-# Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start apart.
+# Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start
+# apart.
 TYPES = {"t": "f8", "line": "i4", "frame": "i4", "limit": "u1", "line_line": "i4", "line_limit": "u1"}
 
 
@@ -124,8 +128,8 @@ POINTS = 3000  # of the motion: several for each pixel of its width
 
 
 def path_picture(plan: Plan, size: float) -> str:
-    """The motion seen along its thinnest direction, coloured by feed, as SVG, with the tool's direction if it is one of the tip. The
-    plan must have a trajectory.
+    """The motion seen along its thinnest direction, coloured by feed, as SVG, with the tool's direction if it
+    is one of the tip. The plan must have a trajectory.
 
     size : of the longer side [px]
     """

@@ -24,7 +24,8 @@ LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
 def page_of(
     name: str, kind: str, source: str, about: dict[str, Any], columns: Mapping[str, Array], **places: str
 ) -> str:
-    """A page for a browser: the body NAME.html in the frame of all pages, with shared.js, view.js and NAME.js.
+    """A page for a browser: the body NAME.html in the frame of all pages, with shared.js, view.js and
+    NAME.js.
 
     kind    : what the page is, behind the file's name in its title
     source  : the program's file
@@ -50,8 +51,9 @@ def page_of(
 
 
 def policy(*scripts: str) -> str:
-    """The policy of a page for browsers: run these scripts, known by their SHA-256, and nothing else; show pictures that it has in it or
-    draws itself; load nothing. Styles are free: plotly writes them into the page, and they run nothing."""
+    """The policy of a page for browsers: run these scripts, known by their SHA-256, and nothing else; show
+    pictures that it has in it or draws itself; load nothing. Styles are free: plotly writes them into the
+    page, and they run nothing."""
     known = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
         for script in scripts
@@ -88,7 +90,8 @@ def packed(column: Array) -> str:
 
 
 def plotly_script() -> str:
-    """plotly's script, to be run by the page that it stands in. Raises InputError if plotly is not installed."""
+    """plotly's script, to be run by the page that it stands in. Raises InputError if plotly is not
+    installed."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as fault:

@@ -27,10 +27,12 @@ from planner.report.word_feed import WordFeed
 
 
 def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
-    """The plan that a directory holds, judged anew; its summary; and the text of its program, None for points.
+    """The plan that a directory holds, judged anew; its summary; and the text of its program, None for
+    points.
 
-    The program is read from where it was planned, or from the directory if it was given as a text or as points. The plan lacks
-    what files do not hold: the profile at the grid points and the prices (those are in the summary).
+    The program is read from where it was planned, or from the directory if it was given as a text or as
+    points. The plan lacks what files do not hold: the profile at the grid points and the prices (those are in
+    the summary).
 
     Raises InputError if a file is missing or damaged, or if the trajectory is not that of the program.
     """

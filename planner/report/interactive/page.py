@@ -1,4 +1,5 @@
-"""The report of a plan (report/html) as an object: a notebook shows it, `save` writes it, `open` shows it in the browser.
+"""The report of a plan (report/html) as an object: a notebook shows it, `save` writes it, `open` shows it in
+the browser.
 
 Figures of a plan to turn and to zoom (plotly), for notebooks: `plan.plot`.
 

@@ -27,12 +27,14 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
     """A program that goes straight from each point to the next.
 
     points    : (n, 2) or (n, 3) x, y and z, n > 1 [mm]; z is 0 where there is none
-    feed      : [mm/s], one for all moves or (n-1,) one for each; None for rapid moves, which only the machine's limits hold
+    feed      : [mm/s], one for all moves or (n-1,) one for each; None for rapid moves, which only the
+                machine's limits hold
     tolerance : contour error budget [mm]; None for that of the machine
 
     `Program.line` counts the moves from 1.
 
-    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and a tolerance below 1e-5.
+    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and
+    a tolerance below 1e-5.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -99,13 +101,15 @@ def tip_path(
     """A program for a machine with a table [kinematics], planned on `at_tip(machine)`.
 
     tips        : (n, 3) x, y, z of the tip, n > 1 [mm]
-    directions  : (n, 3) along the tool, from its tip to the spindle, seen from the workpiece; of any length above 0
+    directions  : (n, 3) along the tool, from its tip to the spindle, seen from the workpiece; of any length
+                  above 0
     angles      : (n, 2) in their place: of the tilting axis and c [rad]
     feed        : of tip and angles in one norm, angles at the machine's radius [mm/s]; None for rapid moves
     tolerance   : of tip and angles in that norm [mm]; None for that of the machine
     tool_length : [mm], added to z as G43 does; None for that of the machine file
 
-    Raises InputError for arrays of other shapes, a machine without kinematics, and as `rotary_along` does at the pole.
+    Raises InputError for arrays of other shapes, a machine without kinematics, and as `rotary_along` does at
+    the pole.
     """
     chain = kinematics_of(machine, tool_length)
     at = np.asarray(tips, dtype=np.float64)
@@ -151,19 +155,21 @@ def verify(
     tolerance: float | None = None,
     not_limited: tuple[str, ...] = (),
 ) -> Verdict:
-    """Judge a motion, wherever it comes from, against a program and a machine: `Verdict.faults` says what is wrong with it.
+    """Judge a motion, wherever it comes from, against a program and a machine: `Verdict.faults` says what is
+    wrong with it.
 
     t           : (T,) times of the samples [s]
-    q           : (T, A) positions of the axes then [mm, rotary axes degrees]; velocities and so on are taken from their differences.
-                  Of a program with the tool centre point on they are those of the joints
+    q           : (T, A) positions of the axes then [mm, rotary axes degrees]; velocities and so on are taken
+                  from their differences. Of a program with the tool centre point on they are those of the
+                  joints
     program     : a file, or a program read before
     machine     : a machine file, the name of a built-in machine, or a machine; None means "mill"
     axes        : letters of the columns of q; "" for the first A of x, y, z
     tolerance   : contour error budget [mm]; None for that of the program or the machine
     not_limited : quantities that are reported and not judged, such as "jerk"
 
-    Raises InputError for arrays that do not go together, for other axes than the program's, and for a program or a machine that cannot
-    be read.
+    Raises InputError for arrays that do not go together, for other axes than the program's, and for a program
+    or a machine that cannot be read.
 
     >>> import numpy as np, planner
     >>> there = planner.path([[0, 0], [10, 0]], feed=20.0)

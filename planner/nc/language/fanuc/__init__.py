@@ -1,1 +1,2 @@
-"""Macros of Fanuc and Haas: `text` their expressions, `control` loops, `calls` calls and returns, `parser` all of it as statements."""
+"""Macros of Fanuc and Haas: `text` their expressions, `control` loops, `calls` calls and returns, `parser`
+all of it as statements."""

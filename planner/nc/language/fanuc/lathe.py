@@ -4,8 +4,10 @@
     G71 G72 G73     roughing (nc/turning.py) of the profile P to Q; then the blocks of the profile are passed over
     G76             thread of many passes (nc/lathe_cuts.py)
 
-Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q R), and one, G71 P Q U W I
-K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least increments (0.001 mm, 0.0001 inch) where they have no point.
+Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q
+                                     R), and one, G71 P Q U W I
+K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least increments (0.001 mm, 0.0001 inch)
+where they have no point.
 
 A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles.py) and G70 runs to cut it.
 """
@@ -81,7 +83,8 @@ class LatheParser(LatheWords):
             procedures[0].body.insert(after, row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
-    # --- profiles -----------------------------------------------------------------------------------------------------------
+    # --- profiles
+    # -----------------------------------------------------------------------------------------------------------
 
     def _line(self, line: SourceLine) -> None:
         match = _NUMBER.match(line.text.replace(" ", ""))
@@ -101,7 +104,8 @@ class LatheParser(LatheWords):
         if ended:
             self.body.append(Label(line.place, _AFTER + number))
 
-    # --- cycles -------------------------------------------------------------------------------------------------------------
+    # --- cycles
+    # -------------------------------------------------------------------------------------------------------------
 
     def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
@@ -198,7 +202,8 @@ class LatheParser(LatheWords):
         self.body.append(Message(line.place, (text,)))
 
     def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
-        """A word of a cycle in the program's unit: in least increments where it is a number without a point."""
+        """A word of a cycle in the program's unit: in least increments where it is a number without a
+        point."""
         letter = word.letter
         in_increments = _INCREMENTS.get(cycle, "D")
         if (
@@ -226,7 +231,8 @@ _ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], 
 
 
 def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
-    """P, Q and R of the first block of G76: mmrraa is how often the full depth is cut, ten chamfers in leads, and the tool's angle."""
+    """P, Q and R of the first block of G76: mmrraa is how often the full depth is cut, ten chamfers in leads,
+    and the tool's angle."""
     digits = first.get("P", Number(10_000.0))
     if not isinstance(digits, Number) or digits.value != int(digits.value) or not 0 <= digits.value < 1e6:
         raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")

@@ -1,6 +1,8 @@
-"""Cycles of lathes while a program runs: the profile is read by executing its blocks aside, and the passes become rows of words.
+"""Cycles of lathes while a program runs: the profile is read by executing its blocks aside, and the passes
+become rows of words.
 
-Rows are those of a lathe under LinuxCNC: G7 (diameters), G18, G33 for threads; so what a cycle was expanded to can be read by others.
+Rows are those of a lathe under LinuxCNC: G7 (diameters), G18, G33 for threads; so what a cycle was expanded
+                                          to can be read by others.
 """
 
 from __future__ import annotations
@@ -78,7 +80,8 @@ class LatheCycles:
         self._start = self.run.interpreter.state.programmed().copy()
         return []
 
-    # --- the profile --------------------------------------------------------------------------------------------------------
+    # --- the profile
+    # --------------------------------------------------------------------------------------------------------
 
     def _begin(self, making: Making, given: Given) -> Iterable[Row]:
         """The blocks that follow are read aside."""
@@ -95,8 +98,8 @@ class LatheCycles:
         return []
 
     def leave(self) -> SourcePlace | None:
-        """Go back to what was set aside for a profile that was not read to its end; returns where its cycle stands, None for no such
-        profile."""
+        """Go back to what was set aside for a profile that was not read to its end; returns where its cycle
+        stands, None for no such profile."""
         if self._aside is None:
             return None
         state, table, self.run.tee = self._aside
@@ -105,7 +108,8 @@ class LatheCycles:
         return self._place
 
     def _contour(self) -> Contour:
-        """The blocks that were executed aside as a profile; the state is again what it was before them. Raises ValueError."""
+        """The blocks that were executed aside as a profile; the state is again what it was before them.
+        Raises ValueError."""
         interpreter = self.run.interpreter
         program, offset = interpreter.table.finish("", Notes()), interpreter.state.offset.copy()
         self.leave()
@@ -117,7 +121,8 @@ class LatheCycles:
     def _point(position: np.ndarray) -> complex:
         return complex(position[2], position[0])
 
-    # --- cycles -------------------------------------------------------------------------------------------------------------
+    # --- cycles
+    # -------------------------------------------------------------------------------------------------------------
 
     def _removal(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
         contour, unit = self._contour(), self._unit
@@ -202,7 +207,8 @@ class LatheCycles:
         x = part * given["X"] * unit if "X" in given else start.imag
         return complex(given["Z"] * unit if "Z" in given else start.real, x)
 
-    # --- rows ---------------------------------------------------------------------------------------------------------------
+    # --- rows
+    # ---------------------------------------------------------------------------------------------------------------
 
     @property
     def _unit(self) -> float:
@@ -251,7 +257,8 @@ class LatheCycles:
 
 
 def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour:
-    """Blocks as a profile in programmed coordinates. Raises ValueError for what is no line or arc in the plane."""
+    """Blocks as a profile in programmed coordinates. Raises ValueError for what is no line or arc in the
+    plane."""
     legs, arcs = [], iter(zip(program.arc_center, program.arc_normal, program.arc_sweep, strict=True))
     for kind, end in zip(program.kind.tolist(), program.end, strict=True):
         for kinds, what in _WRONG.items():

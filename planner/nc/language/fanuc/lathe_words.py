@@ -1,10 +1,11 @@
 """Cycles of Fanuc's and Haas' lathes without a profile, as statements (their moves: nc/lathe_cuts.py).
 
 G90 G92 G94     turning, thread, facing in one cut: X Z (U W) and a taper R (Haas: I; K of G94). They hold until another motion:
-                each further line with X, Z, U or W is a cut, with the words that it does not give as they were
+                each further line with X, Z, U or W is a cut, with the words that it does not give as they
+                were
 G74 G75         pecking along z and x: G74 R(retract) and G74 X Z P(shift) Q(peck) R(relief) F, and in one block
-                G74 X Z I(shift) K(peck) D(relief) F; in G75 the P or I is the peck and the Q or K the shift. P and Q are in least
-                increments (0.001 mm, 0.0001 inch) where they have no point
+                G74 X Z I(shift) K(peck) D(relief) F; in G75 the P or I is the peck and the Q or K the shift.
+                P and Q are in least increments (0.001 mm, 0.0001 inch) where they have no point
 
 Words of Fanuc's and Haas' lathes (G code system A) as those of LinuxCNC's lathes.
 
@@ -181,7 +182,8 @@ class LatheWords(FanucParser):
         return [word("G", at, 96.0), *(word(c, at, speed) for c, speed in speeds if speed is not None)]
 
     def _single(self, words: Words, codes: set[str], line: SourceLine) -> bool:
-        """Read a line with such a cycle, or one that repeats the cut in force. False if it is none. Raises ProgramFault."""
+        """Read a line with such a cycle, or one that repeats the cut in force. False if it is none. Raises
+        ProgramFault."""
         letters = {word.letter for word in words}
         pecks = next((code for code in PECKS if code in codes), "")
         if pecks:

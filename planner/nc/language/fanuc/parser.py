@@ -8,8 +8,9 @@
     M99, M99 P200          return, to N200 of the caller
     IF [c] GOTO 10, IF [c] THEN #1=2, WHILE [c] DO 1 ... END 1, GOTO 10, GOTO #1
 
-#1 to #33 are a call's own. A parameter without a value (#0, or one never assigned) counts as 0 in sums, differs from 0 for EQ and NE,
-and a word with such a value is left out. The right side of an assignment needs no brackets. AND binds as * does, OR and XOR as + does.
+#1 to #33 are a call's own. A parameter without a value (#0, or one never assigned) counts as 0 in sums,
+differs from 0 for EQ and NE, and a word with such a value is left out. The right side of an assignment needs
+no brackets. AND binds as * does, OR and XOR as + does.
 """
 
 from __future__ import annotations
@@ -92,10 +93,12 @@ class FanucParser(FanucControl):
         elif all(known.name != name for known in self.procedures):
             self.procedures.append(tree.Procedure(name, procedure.body[at].place, procedure.body[at:]))
 
-    # --- lines ----------------------------------------------------------------------------------------------------------------
+    # --- lines
+    # ----------------------------------------------------------------------------------------------------------------
 
     def _plain(self, rows: tree.PlainRows) -> None:
-        """Rows without a statement: labels that are used stand between them, and G66 calls after those that move."""
+        """Rows without a statement: labels that are used stand between them, and G66 calls after those that
+        move."""
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
             return
@@ -161,7 +164,8 @@ class FanucParser(FanucControl):
             if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
                 self.body.append(tree.Message(line.place, (text,)))
 
-    # --- IF, WHILE, GOTO ------------------------------------------------------------------------------------------------------
+    # --- IF, WHILE, GOTO
+    # ------------------------------------------------------------------------------------------------------
 
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         if keyword == "GOTO":
@@ -196,7 +200,8 @@ class FanucParser(FanucControl):
             raise reader.refused("IF [condition] is followed by GOTO or THEN", at)
         self.body.append(tree.If(line.place, ((condition, body),), []))
 
-    # --- words and calls ------------------------------------------------------------------------------------------------------
+    # --- words and calls
+    # ------------------------------------------------------------------------------------------------------
 
     def _words(
         self,

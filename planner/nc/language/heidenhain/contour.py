@@ -1,9 +1,11 @@
-"""Radius compensation, approach to and departure from a contour, and the frame: what `planner.nc.language.travel` does.
+"""Radius compensation, approach to and departure from a contour, and the frame: what
+`planner.nc.language.travel` does.
 
 RL RR R0                                    compensation, in any move
 APPR LT LN CT LCT  X Y Z LEN R CCA RL F     approach, also without compensation (R0)
 DEP LT LN CT LCT  X Y Z LEN R CCA F         departure
-CYCL DEF 7 datum shift, 8 mirror image, 10 rotation, 11 scale, 26 scale of single axes; TRANS DATUM AXIS, TRANS DATUM RESET
+CYCL DEF 7 datum shift, 8 mirror image, 10 rotation, 11 scale, 26 scale of single axes; TRANS DATUM AXIS,
+TRANS DATUM RESET
 """
 
 from __future__ import annotations

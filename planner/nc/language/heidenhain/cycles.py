@@ -5,7 +5,8 @@
     1 pecking                of older controls, for which the tool stands at the clearance above the surface
     202 boring               Q208 feed out, Q214 direction in which the tool leaves the wall by 0.2 mm
     203, 205 pecking         Q202 infeed, less by Q212 each time but at least Q205; Q256 retract to break the chip, Q208 feed out;
-                             203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks, Q258 and Q259 how far
+                             203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks,
+                                  Q258 and Q259 how far
                              above the ground rapid speed ends
     206, 207, 209 tapping    at Q206; with the lead Q239; breaking the chip each Q257, back by Q256 leads (0: out of the hole)
     208 bore milling         Q335 diameter, Q334 infeed per turn
@@ -13,8 +14,8 @@
     252 circular pocket      Q223 diameter
     253 slot                 Q218 length, Q219 width, Q374 turned by, Q367 where the tool stands in it
     254 slot on a circle     Q219 width, Q375 diameter, Q216 Q217 centre, Q376 start, Q248 opening, Q377 slots every Q378
-        Q215 0 all, 1 roughing, 2 finishing; Q368 Q369 allowances; Q202 infeed, Q338 for finishing; Q207 Q206 Q385 feeds; Q351 1 climb,
-        -1 conventional; Q370 times the tool's radius between two paths
+        Q215 0 all, 1 roughing, 2 finishing; Q368 Q369 allowances; Q202 infeed, Q338 for finishing; Q207 Q206
+        Q385 feeds; Q351 1 climb, -1 conventional; Q370 times the tool's radius between two paths
 
 In all of them Q200 clearance, Q201 depth, Q203 surface, Q204 second clearance, Q211 dwell at the bottom.
 """

@@ -1,6 +1,7 @@
 """Statements that move nothing: the program's units, tool calls, definitions of cycles, M codes.
 
-Source: HEIDENHAIN TNC 640 (34059x), conversational programming, M functions of path behaviour and of rotary axes.
+Source: HEIDENHAIN TNC 640 (34059x), conversational programming, M functions of path behaviour and of rotary
+        axes.
 """
 
 from __future__ import annotations
@@ -57,10 +58,10 @@ def _not_read(cycle: int) -> str:
 
 REMEDY = "let the CAM system write the moves out as L, C and CC"
 AT_END = (2, 30)  # M codes that end the program
-# They move nothing and last nothing: constant speed at corners in lag operation (90), lag and servo gain (105 106), messages about
-# replacement tools (107 108), the end of what is refused below (102 111 113 117 127 129 137 145), look-ahead of radius compensation
-# (120; gouges are refused), the touch probe's monitoring (141), modal information (142), what happens at an NC stop (148 149), messages
-# of limit switches (150).
+# They move nothing and last nothing: constant speed at corners in lag operation (90), lag and servo gain (105
+# 106), messages about replacement tools (107 108), the end of what is refused below (102 111 113 117 127 129
+# 137 145), look-ahead of radius compensation (120; gouges are refused), the touch probe's monitoring (141),
+# modal information (142), what happens at an NC stop (148 149), messages of limit switches (150).
 NOTHING = frozenset(
     (90, 102, 105, 106, 107, 108, 111, 113, 117, 120, 127, 129, 137, 141, 142, 145, 148, 149, 150)
 )
@@ -97,7 +98,8 @@ REFUSED = {
 
 
 def is_of_the_builder(code: int) -> bool:
-    """True if an M code, which is none of this control's, would be taken for one of RS274NGC or of a printer."""
+    """True if an M code, which is none of this control's, would be taken for one of RS274NGC or of a
+    printer."""
     found = setting("M", 10 * code, "", "")
     of_printers = code > OWN_LAST and found is not None and found.what is not UNKNOWN_M
     return of_printers or (OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP)
@@ -177,7 +179,8 @@ class Definitions(Flow):
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
     def _tool_data(self, block: Block) -> Rows:
-        """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool to have ready."""
+        """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool
+        to have ready."""
         column, match = block.column, block.take(_TOOL_DEF)
         if match is None:
             raise block.wrong("TOOL DEF takes the number of a tool, its length L and its radius R")
@@ -229,7 +232,8 @@ class Definitions(Flow):
         raise block.wrong(_not_read(cycle))
 
     def _pecking(self, block: Block, part: int) -> Rows:
-        """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below the tool."""
+        """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below
+        the tool."""
         if part == 0:
             return [tree.assign(block.place, (own("cycle"), tree.ONE))]
         column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
@@ -243,8 +247,8 @@ class Definitions(Flow):
         return [tree.made(block.place, "cycle in force")]
 
     def _codes(self, block: Block, given: Items, *, straight: bool = False) -> tuple[Rows, Rows, bool]:
-        """Statements of the M codes of a block before and after its move, and whether it goes in machine coordinates, as `straight`
-        moves may."""
+        """Statements of the M codes of a block before and after its move, and whether it goes in machine
+        coordinates, as `straight` moves may."""
         before: Rows = []
         after: Rows = []
         machine = False
@@ -277,7 +281,8 @@ class Definitions(Flow):
 
     def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:
         column, given = block.column, items(block)
-        # M128 F: the largest feed of what the axes do to follow the tool, which the limits of the joints are for
+        # M128 F: the largest feed of what the axes do to follow the tool, which the limits of the joints are
+        # for
         feed = given.feed is not None and not any(code in TOOL_POINT_ON for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
             raise block.fault("only M codes are read here; write the move and its feed with L", column)

@@ -1,18 +1,21 @@
-"""Path functions as rows of words: L, C, CR, CT, LP, CP. Roundings RND and chamfers CHF are made where the rows pass (`corner_moves`).
+"""Path functions as rows of words: L, C, CR, CT, LP, CP. Roundings RND and chamfers CHF are made where the
+rows pass (`corner_moves`).
 
-The position (_x, _y, _z), the pole (_cx, _cy, _cz) and the normal of its plane (_plane), the last polar coordinates (_pr, _pa) and
-the direction of the last move in x and y (_dx, _dy) are variables of the running program, since coordinates may be computed and
-incremental. Rows carry absolute coordinates.
+The position (_x, _y, _z), the pole (_cx, _cy, _cz) and the normal of its plane (_plane), the last polar
+coordinates (_pr, _pa) and the direction of the last move in x and y (_dx, _dy) are variables of the running
+program, since coordinates may be computed and incremental. Rows carry absolute coordinates.
 
-A pole lies in X/Y, Y/Z or Z/X, as its block names the axes, and PA counts from +X, +Y or +Z to the other axis. Arcs about it, C and CP,
-lie in its plane, DR+ from the first axis to the second one, as G3 has it in G17, G19 and G18. (TNC 640, conversational programming,
-polar coordinates: pole and angle reference axis.) A program that has poles in other planes than X/Y asks for the plane while it runs.
+A pole lies in X/Y, Y/Z or Z/X, as its block names the axes, and PA counts from +X, +Y or +Z to the other
+axis. Arcs about it, C and CP, lie in its plane, DR+ from the first axis to the second one, as G3 has it in
+G17, G19 and G18. (TNC 640, conversational programming, polar coordinates: pole and angle reference axis.) A
+program that has poles in other planes than X/Y asks for the plane while it runs.
 
 CT's centre lies on the normal n of the direction at the start, at
 
     radius = |v|^2 / (2 n v),      v from start to end; positive to the left, where the arc turns counter-clockwise.
 
-Behind CR, whose centre is not computed here, the direction is that of the moves that were executed (`makers.tangent_arc`).
+Behind CR, whose centre is not computed here, the direction is that of the moves that were executed
+(`makers.tangent_arc`).
 """
 
 from __future__ import annotations
@@ -59,7 +62,8 @@ _PLANE_CODES = {0: 19.0, 1: 18.0}
 class Moves:
     """Rows of path functions.
 
-    feed_scale : what F is multiplied with: 1, or 0.1 in inch programs, where F is in tenths of an inch per minute
+    feed_scale : what F is multiplied with: 1, or 0.1 in inch programs, where F is in tenths of an inch per
+                 minute
     tilted     : there may be poles in other planes than X/Y
     """
 
@@ -69,7 +73,8 @@ class Moves:
         self.automatic: Expression | None = None  # F of the tool call
 
     def feed_words(self, block: Block, given: Items) -> Words:
-        """The F word of a block, if it has one. Raises ProgramFault for F AUTO without a feed in the tool call."""
+        """The F word of a block, if it has one. Raises ProgramFault for F AUTO without a feed in the tool
+        call."""
         feed = given.feed
         if given.automatic:
             feed = self.automatic
@@ -94,8 +99,8 @@ class Moves:
         return [row(block.place, *codes, *feed, *ends.items(), assigned=tuple(assigned))]
 
     def by_plane(self, block: Block, rows: Callable[[int], Rows | None]) -> Rows:
-        """The rows of a block by the normal of the pole's plane; None where it makes no sense in that plane. Raises ProgramFault where
-        that is known."""
+        """The rows of a block by the normal of the pole's plane; None where it makes no sense in that plane.
+        Raises ProgramFault where that is known."""
         found = rows(_WORKING)
         if not self.tilted:
             if found is None:
@@ -191,7 +196,8 @@ class Moves:
         return [assign(block.place, *change)] if change else []
 
     def polar_ends(self, block: Block, given: Items, normal: int = _WORKING) -> Ends | None:
-        """The coordinates from the polar ones, and that along the normal; None where the block has a coordinate in the plane."""
+        """The coordinates from the polar ones, and that along the normal; None where the block has a
+        coordinate in the plane."""
         radius, angle = POLAR
         if set(given.axes) & {"X", "Y", "Z"} - {_AXES[normal]}:
             return None
@@ -213,7 +219,8 @@ class Moves:
         return [*self.polar(block, given), *self.by_plane(block, rows)]
 
     def polar_tangent(self, block: Block, given: Items) -> Rows:
-        """CTP: the arc to polar coordinates that goes on in the direction of the last move, in the working plane."""
+        """CTP: the arc to polar coordinates that goes on in the direction of the last move, in the working
+        plane."""
 
         def rows(normal: int) -> Rows | None:
             ends = None if normal != _WORKING else self.polar_ends(block, given)

@@ -4,12 +4,14 @@
     RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
     CYCL DEF 1 200 to 209, 220 221 240, 251 to 254 (`cycles`)    CYCL CALL [POS], M99    STOP, M codes
 
-LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL LBL n REP m goes back to
-LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in machine coordinates.
+LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL
+LBL n REP m goes back to LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in
+machine coordinates.
 
 On a machine with kinematics M128 and M129 switch the tool centre point, and L takes A, B and C.
 
-Refused with their block: PLANE, M128 without kinematics, LN, free contours (FK), APPR and DEP with polar coordinates, other cycles, M89
+Refused with their block: PLANE, M128 without kinematics, LN, free contours (FK), APPR and DEP with polar
+                          coordinates, other cycles, M89
 and other M codes that change moves, polar coordinates without a pole, texts and QS parameters.
 """
 
@@ -99,7 +101,8 @@ class HeidenhainParser(Definitions):
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
-    # --- labels -----------------------------------------------------------------------------------------------------------------
+    # --- labels
+    # -----------------------------------------------------------------------------------------------------------------
 
     def _find_labels(self) -> None:
         for k, block in enumerate(self.blocks):
@@ -122,10 +125,12 @@ class HeidenhainParser(Definitions):
                 return k
         return len(self.blocks)
 
-    # --- blocks -----------------------------------------------------------------------------------------------------------------
+    # --- blocks
+    # -----------------------------------------------------------------------------------------------------------------
 
     def _body(self, first: int, last: int, called: bool = False) -> Rows:
-        """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known already."""
+        """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known
+        already."""
         body: Rows = []
         faults = len(self.faults)
         self.skip = False
@@ -170,7 +175,8 @@ class HeidenhainParser(Definitions):
         called = tree.Call(block.place, name, None, block.rest.strip())
         return [called, units, looked_up(block)]
 
-    # --- moves ------------------------------------------------------------------------------------------------------------------
+    # --- moves
+    # ------------------------------------------------------------------------------------------------------------------
 
     def _ends(self, block: Block, given: Items) -> dict[str, tree.Expression]:
         if given.polar:
@@ -247,7 +253,8 @@ class HeidenhainParser(Definitions):
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
         return [tree.assign(block.place, *named, (PLANE, tree.Number(float(normal))))]
 
-    # --- cycles -----------------------------------------------------------------------------------------------------------------
+    # --- cycles
+    # -----------------------------------------------------------------------------------------------------------------
 
     def _cycle_call(self, block: Block) -> Rows:
         if not block.take(r"\s*POS\b"):

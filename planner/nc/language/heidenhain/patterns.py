@@ -1,7 +1,7 @@
 """The cycle in force called at a place, and patterns of places.
 
-Patterns of places at which the cycle that was defined last is cut; they act where they are defined. Q200, Q203, Q204 replace those of
-the cycle; Q301 0: between the places at Q200, 1: at Q204 above the surface.
+Patterns of places at which the cycle that was defined last is cut; they act where they are defined. Q200,
+Q203, Q204 replace those of the cycle; Q301 0: between the places at Q200, 1: at Q204 above the surface.
 
     220 on a circle    Q216 Q217 centre, Q244 diameter, Q245 first angle, Q246 last angle, Q247 step (0: from the angles), Q241 how many
     221 on lines       Q225 Q226 first place, Q237 Q238 apart, Q242 columns, Q243 lines, Q224 turned by; every second line backwards

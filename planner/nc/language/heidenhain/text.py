@@ -1,10 +1,11 @@
 """Lines of a conversational program: blocks, values, formulas, and the words behind a path function.
 
-A block begins with its number and a function word; `~` at its end, or the parameters of a cycle, continue it on the next line. What
-follows `;` is a comment, and a line that begins with `*` is a heading.
+A block begins with its number and a function word; `~` at its end, or the parameters of a cycle, continue it
+on the next line. What follows `;` is a comment, and a line that begins with `*` is a heading.
 
     value   = [+|-] number | [+|-] Q number
-    formula = values with + - * / ^ and brackets; SIN COS TAN ASIN ACOS ATAN SQRT SQ ABS INT FRAC NEG LN LOG EXP; PI
+    formula = values with + - * / ^ and brackets; SIN COS TAN ASIN ACOS ATAN SQRT SQ ABS INT FRAC NEG LN LOG
+    EXP; PI
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ def parameter(number: int) -> tree.Numbered:
 
 @dataclass
 class Block:
-    """A block of the program, read from left to right: its place, and its text without number and comment, parts of continued lines
-    joined by blanks.
+    """A block of the program, read from left to right: its place, and its text without number and comment,
+    parts of continued lines joined by blanks.
 
     at       : byte offset of the first character of each part, and where the part begins in `text`
     function : the word that it begins with
@@ -235,8 +236,8 @@ class Items:
 
 
 def items(block: Block, turning: bool = False) -> Items:
-    """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises ProgramFault for what a path
-    function does not take here."""
+    """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises
+    ProgramFault for what a path function does not take here."""
     found, end = Items(), len(block.text.rstrip())
     while block.column < end:
         item = block.take(_ITEM)
@@ -280,12 +281,14 @@ def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
 
 
 def looked_up(block: Block) -> tree.Line:
-    """The position is asked of the interpreter: after an offset has changed, or a move in machine coordinates."""
+    """The position is asked of the interpreter: after an offset has changed, or a move in machine
+    coordinates."""
     where = [tree.Numbered(tree.Number(float(FIRST_POSITION + k))) for k in range(3)]
     return tree.assign(block.place, *zip((X, Y, Z), where, strict=True))
 
 
 def refuse_arc_axes(block: Block, given: Items) -> None:
-    """Arcs of CR and CT lie in the working plane, and so do those of C where all poles do. Raises ProgramFault."""
+    """Arcs of CR and CT lie in the working plane, and so do those of C where all poles do. Raises
+    ProgramFault."""
     if "Z" in given.axes:
         raise block.fault("an arc with Z; a helix is written as CP with IPA")

@@ -1,1 +1,2 @@
-"""LinuxCNC's language (O words): `text` its expressions, `control` its loops and branches, `parser` all of it as statements."""
+"""LinuxCNC's language (O words): `text` its expressions, `control` its loops and branches, `parser` all of it
+as statements."""

@@ -5,11 +5,12 @@
     o104 repeat [n] ... endrepeat         o104 break, continue
     O100 ... M99 and M98 P100 L3: subprograms as other controls write them
 
-A label is a number, a <name>, or an expression where it calls. A call runs the subprogram of that name in the program, else that of the
-file name.ngc in the program's folder. Parameters 1 to 30 are a call's own: its arguments, then zeros; so are named parameters that do
-not begin with an underscore. M98 shares its caller's.
+A label is a number, a <name>, or an expression where it calls. A call runs the subprogram of that name in the
+program, else that of the file name.ngc in the program's folder. Parameters 1 to 30 are a call's own: its
+arguments, then zeros; so are named parameters that do not begin with an underscore. M98 shares its caller's.
 
-What LinuxCNC refuses and this reader takes: a subprogram that stands after its call, break and continue in repeat loops.
+What LinuxCNC refuses and this reader takes: a subprogram that stands after its call, break and continue in
+                                             repeat loops.
 """
 
 from __future__ import annotations
@@ -209,7 +210,8 @@ class LinuxcncParser:
                 expanded = kind.strip().upper() != "MSG"
                 self.body.append(tree.Message(line.place, _pieces(text) if expanded else (text,)))
 
-    # --- codes that are control flow ------------------------------------------------------------------------------------------
+    # --- codes that are control flow
+    # ------------------------------------------------------------------------------------------
 
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
         """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
@@ -238,7 +240,8 @@ class LinuxcncParser:
                 self.plain_sub = ""
         return True
 
-    # --- O words ----------------------------------------------------------------------------------------------------------------
+    # --- O words
+    # ----------------------------------------------------------------------------------------------------------------
 
     def _o_word(self, reader: LineReader, line: SourceLine) -> None:
         reader.at += 1

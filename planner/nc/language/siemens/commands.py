@@ -1,4 +1,5 @@
-"""Commands of a Sinumerik program: cycles, frames, declarations and messages; their tables; calls of subprograms.
+"""Commands of a Sinumerik program: cycles, frames, declarations and messages; their tables; calls of
+subprograms.
 
 Subprograms are files of their own in the program's folder:
 
@@ -8,7 +9,8 @@ Subprograms are files of their own in the program's folder:
     PROC NAME(REAL A, INT B)    the first line of a subprogram: its variables, which get the values of the call
     M17, RET, M30   its end
 
-Variables of DEF are a call's own; R parameters are shared. Commands of the reader hand values over in shared names.
+Variables of DEF are a call's own; R parameters are shared. Commands of the reader hand values over in shared
+names.
 """
 
 from __future__ import annotations
@@ -39,8 +41,9 @@ CODES: dict[int, tuple[float, ...]] = {
     710: (21.0,),
     **dict.fromkeys((450, 451, 601, 602, 603, 621, 95 * 100), ()),
 }
-# Commands that move nothing and change nothing of what is planned: feedforward, compressors (their tolerance is the program's), how
-# orientations change where that is as planned, the defaults of approaches, frames and collision checks.
+# Commands that move nothing and change nothing of what is planned: feedforward, compressors (their tolerance
+# is the program's), how orientations change where that is as planned, the defaults of approaches, frames and
+# collision checks.
 IDLE = frozenset((
     "FNORM", "FFWON", "FFWOF", "SOFT", "COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF", "UPATH", "SPATH",
     "FIFOCTRL", "ORIMKS", "ORIAXES", "ORIMACHAX", "TOFRAMEOF", "PAROTOF",
@@ -217,8 +220,8 @@ class Commands(SiemensControl):
         raise reader.fault(f"{reader.peek(-1)} is not read; {REMEDY}", reader.tokens[reader.next - 1].at)
 
     def _tool_point(self, reader: LineTokens) -> None:
-        """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for another one, and for TRAORI on
-        a machine without kinematics."""
+        """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for
+        another one, and for TRAORI on a machine without kinematics."""
         name = reader.peek(-1)
         at = reader.tokens[reader.next - 1].at
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
@@ -332,5 +335,6 @@ class Commands(SiemensControl):
 
 
 def siemens_files(name: str) -> frozenset[str]:
-    """Names that the file of a subprogram may have, in small letters: NAME.SPF, NAME.MPF, and as controls save them, NAME_SPF."""
+    """Names that the file of a subprogram may have, in small letters: NAME.SPF, NAME.MPF, and as controls
+    save them, NAME_SPF."""
     return frozenset(name + ending for ending in (".spf", ".mpf", "_spf", "_mpf", ""))

@@ -4,19 +4,20 @@
 
     CYCLE81, CYCLE82    in and, after a dwell, rapid out
     CYCLE83             by infeeds: the first to FDEP (or FDPR below the reference plane), each of the others less by DAM, but not less
-                        than DAM; between them a dwell below (DTB), and out to RFP + SDIS with a dwell there (DTS; VARI 1), or back by
-                        1 mm to break the chip (VARI 0)
+                        than DAM; between them a dwell below (DTB), and out to RFP + SDIS with a dwell there
+                        (DTS; VARI 1), or back by 1 mm to break the chip (VARI 0)
     CYCLE84, CYCLE840   tapping: SDAC, MPIT (size) or PIT (lead), SST and SST1 speed in and out;  SDR, SDAC, ENC, MPIT, PIT
     CYCLE85             FFR in, RFF out                 CYCLE86   stopped spindle, away by RPA RPO RPAP, rapid out
     CYCLE87, CYCLE88    spindle stop and M0 on the ground (CYCLE88: after a dwell), rapid out
     CYCLE89             in and out at the same feed
     POCKET3             LENG WID CRAD at PA PO, turned by STA    POCKET4    PRAD at PA PO
-        MID most per pass, FAL and FALD allowances at the walls and the bottom, FFP1 and FFD feeds in the plane and of plunging,
-        CDIR 0 climb, 1 conventional, 2 G2, 3 G3, VARI 1 roughing, 2 finishing, and 0, 10, 20: plunge at rapid speed, straight, on a
-        helix (RAD1, DP1), MIDA most between two paths (0: 0.8 tool diameters)
+        MID most per pass, FAL and FALD allowances at the walls and the bottom, FFP1 and FFD feeds in the
+        plane and of plunging, CDIR 0 climb, 1 conventional, 2 G2, 3 G3, VARI 1 roughing, 2 finishing, and 0,
+        10, 20: plunge at rapid speed, straight, on a helix (RAD1, DP1), MIDA most between two paths (0: 0.8
+        tool diameters)
 
-Arguments of later controls behind these (units, modes) change the meaning of the others; they are refused where they are not 0 or left
-out.
+Arguments of later controls behind these (units, modes) change the meaning of the others; they are refused
+where they are not 0 or left out.
 
 Patterns of holes, each drilled by the cycle of MCALL:
 
@@ -121,7 +122,8 @@ def pattern_rows(
 
 
 def check(name: str, given: Container[str]) -> None:
-    """Raises ValueError for arguments that are missing: those of CYCLE81 to CYCLE83 are looked at in the text."""
+    """Raises ValueError for arguments that are missing: those of CYCLE81 to CYCLE83 are looked at in the
+    text."""
     if name in _DRILLING:
         _required(name, given, "RTP", "RFP", "SDIS")
         for pair in (("DP", "DPR"), ("FDEP", "FDPR"))[: 1 + (name == "CYCLE83")]:

@@ -5,12 +5,14 @@
     language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
                REPEATB label P=n
     commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 to 89, 840,
-               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move nothing (`commands.IDLE`);
-               TRAORI and TRAFOOF on a machine with kinematics
+               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move
+               nothing (`commands.IDLE`); TRAORI and TRAFOOF on a machine with kinematics
 
-Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line, for AC and IC.
+Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line,
+for AC and IC.
 
-Refused with their line: tilted frames (ROT X, CYCLE800 with angles), TRAORI without kinematics, KONT, G451, RNDM, G331, polar
+Refused with their line: tilted frames (ROT X, CYCLE800 with angles), TRAORI without kinematics, KONT, G451,
+                         RNDM, G331, polar
 coordinates (AP, RP), SLOT1, LONGHOLE and other cycles.
 """
 
@@ -116,7 +118,8 @@ class SiemensParser(BlockWords):
         if len(modes):
             self.absolute = bool(modes[-1] == 90)
 
-    # --- lines ------------------------------------------------------------------------------------------------------------------
+    # --- lines
+    # ------------------------------------------------------------------------------------------------------------------
 
     def _line(self, line: SourceLine) -> None:
         text = _without_comment(line.text)

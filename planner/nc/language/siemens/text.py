@@ -5,8 +5,8 @@
     value       = number | R n | R[expression] | variable | function ( expression )
     function    = SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND LN EXP MIN MAX
 
-Variables are declared by DEF and are 0 at first; R parameters are R0 to R999. $AA_IW[X], $AA_IM[X] and $P_EP[X] are positions of an
-axis.
+Variables are declared by DEF and are 0 at first; R parameters are R0 to R999. $AA_IW[X], $AA_IM[X] and
+$P_EP[X] are positions of an axis.
 """
 
 from __future__ import annotations
@@ -265,7 +265,8 @@ class SiemensControl:
         )
 
     def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
-        """The label of a repeat, a counter of its own, and how often. Raises ProgramFault for a label that is not known."""
+        """The label of a repeat, a counter of its own, and how often. Raises ProgramFault for a label that is
+        not known."""
         label = reader.peek()
         reader.next += 1
         if label not in known:

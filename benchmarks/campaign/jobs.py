@@ -128,10 +128,12 @@ class Job:
 def fingerprint() -> str:
     """A word for what seeds draw: another one where the first of them draw other jobs.
 
-    Numbers count with `DIGITS` digits: powers and sines differ in their last bit between processors.
+    Numbers count with `DIGITS` digits: powers and sines differ in their last bit between processors. Keys of a machine that are not
+    set do not count, or a new one would be another draw.
     """
     drawn = [
-        (made.text, repr(made.machine), made.way, made.tolerance) for made in map(job, range(FIRST_SEEDS))
+        (made.text, made.machine.model_dump(exclude_defaults=True), made.way, made.tolerance)
+        for made in map(job, range(FIRST_SEEDS))
     ]
     rounded = re.sub(r"\d+\.\d+(e[-+]?\d+)?", lambda number: f"{float(number[0]):.{DIGITS}g}", repr(drawn))
     return hashlib.sha256(rounded.encode()).hexdigest()[:12]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from benchmarks.fuzz import __main__ as fuzz
-from benchmarks.fuzz import new_input, outcome, run
 from benchmarks.fuzz import tally as fuzz_tally
+from benchmarks.fuzz.__main__ import new_input, outcome, run
 from benchmarks.fuzz.corpus import Corpus, Input, write_input
 from benchmarks.fuzz.coverage import Tracer, count_lines
 from benchmarks.fuzz.kinds import KINDS

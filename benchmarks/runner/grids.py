@@ -26,6 +26,7 @@ from planner.machine import Machine
 from planner.nc.program import Program
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
+from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.geometry import splined_with_stops
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import ThirdOrder
@@ -71,7 +72,8 @@ class OnGrid(Method):
         if self.kept:
             planned, motion = within_limits(planned, order, job.toolpath, machine)
         made = job.deliver(motion, as_it_is=not self.kept)
-        return plan_of_solution(job, planned, made, method="optimal", corner="spline")
+        settings = Settings(method="optimal", corner="spline", order=order)
+        return plan_of_solution(job, planned, made, settings)
 
 
 def name_of(kept: bool, finer: float) -> str:

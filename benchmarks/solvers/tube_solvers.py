@@ -56,7 +56,7 @@ class Precise:
         for _ in range(AGAIN if found.steps is not None else 0):
             assert found.steps is not None
             guess = again(run, guess, found)
-            other = replace(PRECISE, near=True).solve(run, guess)
+            other = PRECISE.solve(run, guess)
             if other.steps is None:
                 break
             gained = 1.0 - other.steps.h.sum() / found.steps.h.sum()

@@ -149,8 +149,11 @@ class TubeRun:
         return -np.where(change != 0.0, change, _word_change(self.word))
 
     def word_share(self, leg: Array, velocity: FloatArray) -> FloatArray:
-        """(n,) share of the feed in the axes that F goes by that velocities (n, A) on the legs `leg` (n,)
-        use; 0 where those are all [-]."""
+        """(n,) share of the feed that motions use, counted in the axes that F goes by; 0 where those are
+        all [-].
+
+        leg, velocity : (n,), (n, A) [mm/s]
+        """
         if not self.word.shape[1]:
             return np.zeros(len(leg))
         return np.asarray(np.linalg.norm(velocity * self.counts, axis=1) / self.word[leg, 0])

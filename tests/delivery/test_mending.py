@@ -78,7 +78,7 @@ def test_a_limit_exceeded_at_one_of_a_thousand_runs_costs_that_run(share):
     plain = job.deliver(broken, as_it_is=True)[1]
     for name in ("feed", "velocity.x", "jerk.y", "normal_acceleration"):
         assert plain.limits[name].ratio >= 1.0 + 0.9 * share
-    trajectory, verdict, again, _ = job.deliver(broken)
+    trajectory, verdict, again = job.deliver(broken)[:3]
     assert verdict.passed, verdict.faults
     assert abs(trajectory.cycle_time / made.cycle_time - 1.0) < WORTH
     # all else is as it was

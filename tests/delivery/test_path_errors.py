@@ -112,7 +112,7 @@ def test_a_mean_of_the_motion_is_as_far_off_as_the_judge_finds(name: str, length
     ratios: list[np.ndarray] = []
     look = follow([(t, mean)], widened(pieces, wider), each=lambda _t, ratio, _place: ratios.append(ratio))
     joint = np.flatnonzero(pieces.joint["real"])
-    near = look.seen.match.passed["near"][joint] / toolpath.tolerance
+    near = look.match.passed["near"][joint] / toolpath.tolerance
     measure = PathErrors(toolpath)
     found = measure.of([(t, mean)])
     assert found.worst.max() == pytest.approx(wider * np.concatenate(ratios).max(), abs=1e-3)

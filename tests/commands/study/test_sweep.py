@@ -295,6 +295,6 @@ def test_an_address_without_a_scheduler(job: Path, tmp_path: Path, monkeypatch: 
     pytest.importorskip(
         "distributed", reason="distributed is not installed: pip install feedrate-planner[cluster]"
     )
-    monkeypatch.setattr("planner.commands.study.workers.WAIT", 0.5)
+    monkeypatch.setattr("planner.commands.study.sweep.WAIT", 0.5)
     done = run(job, "-o", tmp_path / "out", "--vary", "feed=1,2", "--cluster", "tcp://127.0.0.1:9")
     assert (done.exit_code, "no scheduler answers there" in done.stderr) == (2, True)

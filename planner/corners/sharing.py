@@ -1,12 +1,11 @@
 """How two corners share the leg between them: d_i + d_{i+1} <= L, fairly and symmetrically.
 
 Half the leg to each is wasteful: a corner that needs little leaves nothing to its neighbour. The corner speed
-                                  at a given normal
-acceleration is v^2 ~ d * g with g = cos^2(theta/2) / sin(theta/2) (eq. (17)), so a leg that is too short is
-cut where both of its corners would be equally fast: d_i g_i = d_{i+1} g_{i+1}, the sharp corner getting more.
-What a corner then cannot use, because its tolerance or its other leg stops it, goes to the neighbour in a few
-rounds. Every round treats both ends alike, so reversing the path reverses the result; every round keeps all
-legs feasible, so stopping early is safe.
+at a given normal acceleration is v^2 ~ d * g with g = cos^2(theta/2) / sin(theta/2) (eq. (17)), so a leg that
+is too short is cut where both of its corners would be equally fast: d_i g_i = d_{i+1} g_{i+1}, the sharp
+corner getting more. What a corner then cannot use, because its tolerance or its other leg stops it, goes to
+the neighbour in a few rounds. Every round treats both ends alike, so reversing the path reverses the result;
+every round keeps all legs feasible, so stopping early is safe.
 
 Paper 002's five-point example: corner 1 keeps its full d = 0.292 mm on a leg of 0.5 mm, where L/2 would cap
 it at 0.25.

@@ -11,16 +11,16 @@ acceleration along the path shifts the chord along itself. It is not right at fu
 are passed within a few periods: there the motion brakes along one leg and speeds up along another.
 
 1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2
-               at most. If that is more
+at most. If that is more
    than the tolerance, `standing` lets the motion stand until the next sample, or for a shorter time that is
    enough: less than dt per stop.
 2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is
-            more than the tolerance,
+more than the tolerance,
    `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs
    beside it only where this was not enough. Where the chords alone would use nearly all of the tolerance, the
    corner becomes a full stop.
 3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error
-           after all. If the verdict
+after all. If the verdict
    finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the
    tolerance of the block; where that is not enough, it takes what the worst phase of the samples shows at the
    vertices inside.

@@ -5,10 +5,9 @@
     subject to  the kinematics (recursion.py) and g <= 0 for every row (rows.py), with slacks s and multipliers z
 
 from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. Kinematics
-                                      and rows are linearised
-anew in every iteration. The curvature of the rows counts, that of the kinematics does not: h times velocity,
-acceleration and jerk is indefinite, and with it a step would not go down. Instead a change of h costs `prox`
-in every iteration, so that steps stay where the linear model holds.
+and rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
+not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
+change of h costs `prox` in every iteration, so that steps stay where the linear model holds.
 
 Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
 optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox

@@ -24,8 +24,7 @@ s_k (run.py): P(s_k) on lines, and with the tangents at s0 and s3 on arcs. With 
     |sum B_k c_k - P(sum B_k s_k)| <= max |c_k - q_k| + what the leg is off its cubic
 
 and the place sum B_k s_k never goes back: motion and path are within the budget in the sense of Frechet,
-                                           which is what the tolerance
-asks for: in order, every vertex reached, both sides.
+which is what the tolerance asks for: in order, every vertex reached, both sides.
 
 Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and
 ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and a weak one of every

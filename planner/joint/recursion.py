@@ -10,8 +10,7 @@ d = (dx, du), and V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the 
     K = -(W_uu + B'PB)^-1 (W_ux + B'PA),      P_i = W_xx + A'PA + K'(W_ux + B'PA),      lambda = P dx + p.
 
 The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what
-                                             is missing with every
-step (a method of multipliers).
+is missing with every step (a method of multipliers).
 
 W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is positive.
 """

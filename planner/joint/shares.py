@@ -1,9 +1,8 @@
 """How much of each limit, and of the tolerance, the steps of a run use: what they are at.
 
 Limits are looked at in the middle of a step: what is at its limit there is so for most of the step, where a
-                                              mere switch from one limit
-to another is at both for an instant. Of the tolerance it is the nearest control point of the cubic, at a
-vertex the vertex.
+mere switch from one limit to another is at both for an instant. Of the tolerance it is the nearest control
+point of the cubic, at a vertex the vertex.
 """
 
 from __future__ import annotations

@@ -9,10 +9,9 @@ sides are cubics with the ordinates
     v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
 
 and a row of each, for both signs, holds it: exact at the nodes, and less by the cosine of half the turn
-                                             between
-them. (Rows at places instead are made use of between them, by a motion that weaves inside the tolerance.) The
-last ordinate is the first one of the next step. From rest and to rest the others are 0 for every motion, and
-are no rows.
+between them. (Rows at places instead are made use of between them, by a motion that weaves inside the
+tolerance.) The last ordinate is the first one of the next step. From rest and to rest the others are 0 for
+every motion, and are no rows.
 
 A row is (a.v - A_t v.e)/(A_t d), with v.e kept in d: the share of the limit, less 1. Of its curvature the
 model has what is positive of that of the products b.w: without it windows take many more iterations, or do

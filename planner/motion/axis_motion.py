@@ -10,8 +10,7 @@ measured,
     s(t) = integral of |velocity|,
 
 by Gauss quadrature with steps that adapt: the speed is the root of a polynomial of degree 4, a polynomial
-                                           itself on straight
-pieces. It has a kink where the motion turns back, hence steps end where an axis does.
+itself on straight pieces. It has a kink where the motion turns back, hence steps end where an axis does.
 """
 
 from __future__ import annotations

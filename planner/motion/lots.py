@@ -1,12 +1,12 @@
 """A motion along a path at given times, in lots of `LANES` samples.
 
 What is done for every sample is the same: the time law gives the arc length s, the polynomial of the grid
-                                           interval there (sampling.py)
-the parameter w, and the polynomials of the span the place and its derivatives. So the samples of a lot lie
-side by side, quantity Q of sample o at Q + o, and several are done in one instruction; each has its own copy
-of the coefficients, so that it does not matter how many samples an interval has. Straight legs are spans of
-degree one. Samples on arcs and corners, and those whose polynomial is too far off for one step, are evaluated
-one by one (`place_of`). A sample's value does not depend on the others of its lot.
+interval there (sampling.py) the parameter w, and the polynomials of the span the place and its derivatives.
+So the samples of a lot lie side by side, quantity Q of sample o at Q + o, and several are done in one
+instruction; each has its own copy of the coefficients, so that it does not matter how many samples an
+interval has. Straight legs are spans of degree one. Samples on arcs and corners, and those whose polynomial
+is too far off for one step, are evaluated one by one (`place_of`). A sample's value does not depend on the
+others of its lot.
 """
 
 from __future__ import annotations

@@ -18,16 +18,14 @@ long enough:**
     w >= v / (2 A),      w >= (A + sqrt(A^2 + (16/9) v J)) / (2 J).
 
 Proof: |phi'| <= phi and |phi''| <= phi, so that with u = p - 1 both |p'| <= u/w and |p''| <= u/w^2, of the
-       sum over places too. The
-acceleration is at most A/p^2 + v u/(w p^3), which is A or less if v/w <= A p (p + 1), and p >= 1. The jerk is
-at most J/p^3 + 3 A u/(w p^4) + v (3 u^2 + p u)/(w^2 p^5), which is J or less if 3 A/(w p) + v (3 u + p)/(w
-p)^2 <= J (p^2 + p + 1). The right side is 3 J or more, and (3 u + p)/p^2 = (4 p - 3)/p^2 <= 4/3. So room is
-needed nowhere: the slower pace itself makes it.
+sum over places too. The acceleration is at most A/p^2 + v u/(w p^3), which is A or less if v/w <= A p (p +
+1), and p >= 1. The jerk is at most J/p^3 + 3 A u/(w p^4) + v (3 u^2 + p u)/(w^2 p^5), which is J or less if 3
+A/(w p) + v (3 u + p)/(w p)^2 <= J (p^2 + p + 1). The right side is 3 J or more, and (3 u + p)/p^2 = (4 p -
+3)/p^2 <= 4/3. So room is needed nowhere: the slower pace itself makes it.
 
 At a rest p may jump, as nothing moves: what is slower ends at the rests around a place. A place costs d
-                                        (length + 4 w) of time at most,
-and never more than the whole way between these rests at the slower pace. Beyond `FAR` reaches nothing is left
-of phi but rounding.
+(length + 4 w) of time at most, and never more than the whole way between these rests at the slower pace.
+Beyond `FAR` reaches nothing is left of phi but rounding.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 control passes on; dwells; path control. Outputs are events; an input that is waited for is refused.
 
 The meaning of F, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one
-                                          over minutes (G93).
+over minutes (G93).
 
     G94    feed = F
     G95    feed = F S                 S in revolutions per minute

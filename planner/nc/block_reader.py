@@ -6,7 +6,7 @@ words that some code of the line uses, N at its start. What the words mean in th
 interpreter's business.
 
 Lines that are no words: commands to grbl ($X, $H, $100=250), and G28 with bare axis letters, as 3-D printers
-                         have it.
+have it.
 
 Settings and questions move nothing and are counted. Homing is a rapid to the position of G28 in the machine
 file, else to machine zero, and said so. Everything else that starts with $ may move ($J jogs) and is refused.

@@ -13,9 +13,8 @@ r along x (in G94 z).
     G75    the same with x and z exchanged
 
 Sources: the formats of Fanuc's lathes (series 0i-T) and of Haas (haascnc.com) as they are known; the order of
-         the moves of G75, and
-that the first groove has no relief: the programming manual of ADTECH's CNC4620, which has Fanuc's format,
-                                     page 55.
+the moves of G75, and that the first groove has no relief: the programming manual of ADTECH's CNC4620, which
+has Fanuc's format, page 55.
 
 The threading cycle G76 of Fanuc and Haas lathes: from its words to passes.
 
@@ -30,7 +29,7 @@ so that every pass takes the same section of chip. A chamfer of length g leaves 
 before z_E.
 
 Sources: Haas' description of G76 (haascnc.com); the two-block format as in Fanuc's operator's manuals for
-         series 0i-T.
+series 0i-T.
 """
 
 from __future__ import annotations

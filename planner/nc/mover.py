@@ -2,10 +2,10 @@
 compensation.
 
 G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by
-             switches.
+switches.
 
 G40, G41, G42, G41.1 and G42.1: the words that switch cutter radius compensation (cutter.py), and what is
-                                refused while it is on.
+refused while it is on.
 """
 
 from __future__ import annotations

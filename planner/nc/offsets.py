@@ -9,11 +9,10 @@ the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 giv
 takes coordinates as absolute, whatever G90 and G91 say; a tool's new offset is in force from its next G43 on.
 
 Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59.
-                                  After G91 both would add,
-which is refused: the flat program (language/flat.py) could not say it.
+After G91 both would add, which is refused: the flat program (language/flat.py) could not say it.
 
 Axes beside x, y and z: rotary A B C in degrees, and U V W, which are linear too, in mm. They are joints: no
-                        kinematics.
+kinematics.
 
 A machine that has one gives its letter to programs. Its coordinates follow the rules of the others, without
 rotation of the work system and without tool offsets:
@@ -21,11 +20,10 @@ rotation of the work system and without tool offsets:
     machine position = origin of the work system + G92 offset + programmed coordinate
 
 F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w,
-                       else that of the rotary
-axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in absolute mode to the
-programmed place within a turn, forwards if the number is positive (0 included), backwards if it has a minus;
-after G53 too, where LinuxCNC takes the magnitude of the number less the offsets (rs274ngc/interp_find.cc,
-find_ends and unwrap_rotary).
+else that of the rotary axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in
+absolute mode to the programmed place within a turn, forwards if the number is positive (0 included),
+backwards if it has a minus; after G53 too, where LinuxCNC takes the magnitude of the number less the offsets
+(rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
 """
 
 from __future__ import annotations

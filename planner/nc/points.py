@@ -2,8 +2,7 @@
 are no NC program.
 
 The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid
-                  moves, and `tolerance` [mm]
-or null. Numbers are written so that they read back exactly.
+moves, and `tolerance` [mm] or null. Numbers are written so that they read back exactly.
 """
 
 from __future__ import annotations

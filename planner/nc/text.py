@@ -2,9 +2,8 @@
 same program again.
 
 The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T
-                            words for the events, of
-which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to `DECIMALS`, a tenth of what
-the reader may be off.
+words for the events, of which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to
+`DECIMALS`, a tenth of what the reader may be off.
 """
 
 from __future__ import annotations

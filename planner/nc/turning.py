@@ -15,7 +15,7 @@ The way to a level and to the first point is fast if the profile's first move is
 cycles end at A.
 
 Sources: the formats as Haas describes them (haascnc.com, G71, G73) and Hurco's and Fanuc's programmers'
-         manuals (G71 U R, G71 P Q U W).
+manuals (G71 U R, G71 P Q U W).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 figures into words.
 
 What a plan says beside its motion: the active limits, what more of them would save, and the corners where
-                                    tolerance saves most.
+tolerance saves most.
 
 The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the
 terminal and numbers for `summary.json`.

@@ -322,9 +322,8 @@ def divided_difference(t: FloatArray, values: FloatArray, order: int) -> FloatAr
     order  : 1, 2 or 3
 
     At sample i: order 1 over i-1, i+1; order 2 over i-1, i, i+1; order 3 over i-1 .. i+2. Before the first
-                 sample and after the last
-    the values are held, as a machine at rest holds them. Exact for polynomials of degree 1, 2 and 3 on equal
-    steps.
+    sample and after the last the values are held, as a machine at rest holds them. Exact for polynomials of
+    degree 1, 2 and 3 on equal steps.
     """
     after = 1 if order < 3 else 2
     steps = np.diff(t)

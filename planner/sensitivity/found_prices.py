@@ -2,9 +2,8 @@
 that search (joint/price.py).
 
 Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So
-                                   nothing is solved again. A
-limit acts at every step through its price there; the tolerance, and accelerations once more, through what eq.
-(20) leaves for the path,
+nothing is solved again. A limit acts at every step through its price there; the tolerance, and accelerations
+once more, through what eq. (20) leaves for the path,
 
     dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
 

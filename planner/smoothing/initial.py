@@ -17,8 +17,8 @@ distances
     h(u) = the longest h with  turning within h around u  *  h <= FITTING * tolerance,
 
 one corner of theta: h = FITTING tol/theta; an arc of radius R: h = sqrt(FITTING tol R), however it is cut
-                     into chords. They grow
-by `GROWTH` of the distance from there, and stay below what a motion needs to build up its acceleration.
+into chords. They grow by `GROWTH` of the distance from there, and stay below what a motion needs to build up
+its acceleration.
 """
 
 from __future__ import annotations

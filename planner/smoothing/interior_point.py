@@ -12,8 +12,7 @@ inside its ball:
     (H + sum z_j G_j + sum z_j/(-g_j) grad g_j grad g_j') dc = -(H c + sum mu/(-g_j) grad g_j),
 
 block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the
-                               corridor; where the
-method ends early, the path is less smooth than it could be and no less inside.
+corridor; where the method ends early, the path is less smooth than it could be and no less inside.
 
 Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its
 iterates may be outside, and it cannot be called from a compiled kernel.

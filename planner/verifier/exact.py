@@ -9,10 +9,9 @@ the path, |x''| <= a, and samples at most h apart:
              (contour.py), and that where the acceleration is not judged
 
 A motion on the path always fits: its own course is a way through the free space of the matching, since chord
-                                  and motion are compared
-at the same time. One that leaves the path, or runs it in another order, leaves a block out or is not at its
-end, is lost. What stays within a h^2 / 8 of one place could be run between two samples; that it is left out
-is not seen.
+and motion are compared at the same time. One that leaves the path, or runs it in another order, leaves a
+block out or is not at its end, is lost. What stays within a h^2 / 8 of one place could be run between two
+samples; that it is left out is not seen.
 
 The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a
 full stop between: the corner there may be rounded.

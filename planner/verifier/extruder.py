@@ -13,7 +13,7 @@ place         when a joint is passed E is what the program says, but for what th
               the speed there; in the end it is that to rounding.
 
 Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the digits that a file was written
-                       with.
+with.
 """
 
 from __future__ import annotations

@@ -10,13 +10,12 @@ and several are applied one after the other. Before its start and after its end 
 result goes on for the delay Td = sum T_i after the end, and arrives exactly where the motion does.
 
 The longest filter comes first: of it the integral is exact, at any time. For the others y is known at times h
-                                apart with its
-derivative, and taken as a cubic between them; those y are the next filter's x. A cubic misses a jump a of the
-second derivative by at most h^2 a / 32, and a jump v of the first by h v / 8; a moving average leaves h / T
-of either, and h <= T/8 (T/32 with "hold"). A chord that turns by the speed v makes a = v/T1, a setpoint that
-jumps by d makes a jump d/T1 of the first derivative, and T1 is the longest filter: some nanometres, and with
-"hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The integrals begin anew in
-every chunk: no digit is lost in long motions.
+apart with its derivative, and taken as a cubic between them; those y are the next filter's x. A cubic misses
+a jump a of the second derivative by at most h^2 a / 32, and a jump v of the first by h v / 8; a moving
+average leaves h / T of either, and h <= T/8 (T/32 with "hold"). A chord that turns by the speed v makes a =
+v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and T1 is the longest filter: some
+nanometres, and with "hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The
+integrals begin anew in every chunk: no digit is lost in long motions.
 
 The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits
 are judged on the setpoints: a mean never exceeds what it is the mean of. A full stop is a vertex like any

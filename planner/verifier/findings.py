@@ -29,9 +29,8 @@ def joint_times(reading: Observed, pieces: ProgramPieces) -> FloatArray:
     before that is: its own is 0.
 
     A late time hides no fault: a joint is compared with the chords run while the piece before it is possible,
-                                so that its time reaches
-    only as far as the motion stays, in order, within the tolerance of that piece; the joints behind that it
-    delays were passed within it. An error of the tolerance is allowed there anyway.
+    so that its time reaches only as far as the motion stays, in order, within the tolerance of that piece;
+    the joints behind that it delays were passed within it. An error of the tolerance is allowed there anyway.
     """
     near: FloatArray = reading.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)

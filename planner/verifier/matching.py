@@ -28,8 +28,8 @@ not only found:
   place on the path is held until one of these works: the motion is lost.
 
 A lost motion has no distance from the path: which part of the path it would have to be near is what is not
-                                             known. Its samples enter
-no contour error, and a vertex on lost pieces that no chord was compared with keeps the distance inf.
+known. Its samples enter no contour error, and a vertex on lost pieces that no chord was compared with keeps
+the distance inf.
 """
 
 from __future__ import annotations

@@ -9,8 +9,7 @@ a fixed seed:
     every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
     every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between
                    the times from cutting corners: with an acceleration a they are off the motion by a h^2/8,
-                                                   which is kept below
-                   `BOW` of the tolerance
+                   which is kept below `BOW` of the tolerance
 
 so that a narrow peak cannot hide from all of them, two looks with one seed are the same, and with another
 seed they share no time but the motion's first and last.

@@ -10,8 +10,8 @@ Who is d away from where he rests left it, or has still to go, for
     tau(d) = the larger of  (6 d / j)^(1/3),  (2 d / a)^(1/2)
 
 at least, the largest of the axes: of a period between samples d0 and d1 away he can rest h - tau(d0) -
-                                   tau(d1), and no longer. Of a
-motion that leaves with the whole jerk, that is how long it rests, wherever the samples fall.
+tau(d1), and no longer. Of a motion that leaves with the whole jerk, that is how long it rests, wherever the
+samples fall.
 """
 
 from __future__ import annotations

@@ -11,10 +11,10 @@ over the chords of the motion, by dynamic programming over the vertices that eac
 passed where the motion rests.
 
 What sampling cannot tell: between two samples a motion with |acceleration| <= a is within b = a h^2 / 8 of
-                           its chord, and its direction
-within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the farthest that the nearest
-place of the motion and that of the chords can be apart, since the samples next to it are exact). A place
-nearest to a vertex at the distance d has its direction across that to the vertex, so that it is at most
+its chord, and its direction within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the
+farthest that the nearest place of the motion and that of the chords can be apart, since the samples next to
+it are exact). A place nearest to a vertex at the distance d has its direction across that to the vertex, so
+that it is at most
 
     reach  =  min( (d + b) r / (1 - r),  2 h (w + a h) )  +  rounding
 

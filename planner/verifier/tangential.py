@@ -1,10 +1,9 @@
 """The tangential acceleration |a.t| <= A_t, t = v/|v| of x, y and z, sample by sample.
 
 Twice: on the delivered columns, and by the lengths run between three samples. The mean speeds of two periods,
-       L/h,
-differ by at most A_t (h1 + h2)/2. A length L is at least its chord c. With a normal acceleration of at most N
-and a speed of at least v = c/h - |a| h the direction turns by no more than N h/(2 v) from that of the middle,
-so that L - c <= N^2 h^3/(24 v), which is taken off.
+L/h, differ by at most A_t (h1 + h2)/2. A length L is at least its chord c. With a normal acceleration of at
+most N and a speed of at least v = c/h - |a| h the direction turns by no more than N h/(2 v) from that of the
+middle, so that L - c <= N^2 h^3/(24 v), which is taken off.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ become chords, collinear lines of one feed are one leg. Paper 001 runs along the
 (chord_guide.py).
 
 Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is
-                                   declared so is checked
-and made read-only, picked for some runs and put back, for every record in the same way.
+declared so is checked and made read-only, picked for some runs and put back, for every record in the same
+way.
 """
 
 from __future__ import annotations

@@ -33,14 +33,13 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     wherever on the segment.
 
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest
-                                         limit of the axes that
-    move, each over the largest component that a unit vector has there (`_components`), must hold for the
-    vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm stays below a,
-    and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the path the norm of
-    the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). The tangential acceleration is
-    bounded by the share of the path that is in x, y and z, on curves as if all of it were. Normal
-    acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound of
-    |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
+    limit of the axes that move, each over the largest component that a unit vector has there (`_components`),
+    must hold for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm
+    stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the
+    path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). The tangential
+    acceleration is bounded by the share of the path that is in x, y and z, on curves as if all of it were.
+    Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound
+    of |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
     takes least time from rest to rest: none of these limits makes it longer when it gets larger.
     """
     axes = toolpath.axes

@@ -6,7 +6,7 @@ are written in the control's words (translate.py). Chords replace only lines who
 words tell (rows.py).
 
 What LinuxCNC is given: the program's own words or the planned path, whichever a model of its planner finds
-                        faster.
+faster.
 
 Candidates are the program as it is, with G64 P of the whole tolerance, or with half of it for P and half for
 Q, which joins short moves; and the planned path as chords, with G64 P for the room that they leave. The model

@@ -9,8 +9,7 @@ of what is allowed); the fastest is written. LinuxCNC rounds corners itself and 
 its own (candidates.py); benchmarks/results/controls.md says how they did.
 
 Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners
-                                     of LinuxCNC add up to
-it at most. A plan that uses all of it leaves no room; one with a tenth less does.
+of LinuxCNC add up to it at most. A plan that uses all of it leaves no room; one with a tenth less does.
 """
 
 from __future__ import annotations

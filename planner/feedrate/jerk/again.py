@@ -21,7 +21,7 @@ which has the state at q = 0. A range that gets no solution is tried once more w
 both sides. If that has none either, it keeps its profile, and its limits what they were.
 
 Multipliers stay those of the solution before: between two states that are fixed they would price these
-                                               instead of the limits.
+instead of the limits.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ up to as many before its end, if `POINTS` lie between. What lies between held ra
 own: from X or rest to X or rest.
 
 Multipliers: a change of x_i changes the intervals on both of its sides, of h = 2 ds/(v_i + v_{i+1}), for
-             which the bound alone answers,
+which the bound alone answers,
 
     lam_i = X (ds_{i-1} + ds_i) / (4 X^(3/2)),
 

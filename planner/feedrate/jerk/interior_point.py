@@ -13,9 +13,8 @@ Steps are predictor-corrector (Mehrotra 1992, SIAM J. Optim. 2:575): the step wi
 the barrier may fall, and its second-order terms are made up for.
 
 The barrier counts by time: an interval's rows share mu times its duration h, as if the barrier were
-                            integrated along the motion. So a
-ramp of a nanometre beside millimetres at constant speed has no more than its part in it, and finer grids do
-not change the problem.
+integrated along the motion. So a ramp of a nanometre beside millimetres at constant speed has no more than
+its part in it, and finer grids do not change the problem.
 
 What every number is set to, and why: settings.py.
 """

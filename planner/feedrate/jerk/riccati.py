@@ -9,8 +9,7 @@ The recursion is linear in N, and its factors serve the predictor and the correc
 Rawlings 1998; interior_point.py).
 
 What belongs to interval i (layout.py): the feedback GAIN, dp_i = K0 dx_i + K1 du_i + K2, and of the cost to
-                                        go from its *end* the
-second derivatives TO_GO (xx, xu, uu) and the slope TO_GO_X.
+go from its *end* the second derivatives TO_GO (xx, xu, uu) and the slope TO_GO_X.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 interior_point.py works on.
 
 Unknowns of a window with N intervals: z_i = (x_i, u_i), feed^2 and acceleration along the path at the N+1
-                                       points (both ends
-given), and p_i = u_{i+1} - u_i on the intervals. The jerk is constant on an interval, so the kinematics are
-exact cubics: with vm = (v_i + v_{i+1})/2, v = sqrt(x),
+points (both ends given), and p_i = u_{i+1} - u_i on the intervals. The jerk is constant on an interval, so
+the kinematics are exact cubics: with vm = (v_i + v_{i+1})/2, v = sqrt(x),
 
     ds = vm h - p h^2/12                    =>  h = 2 ds / (vm + sqrt(vm^2 - p ds/3))           duration
     x_{i+1} = x_i + (2u + p) ds + p (2u + p) h^2/12,   u_{i+1} = u_i + p                           dynamics

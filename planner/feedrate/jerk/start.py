@@ -3,7 +3,7 @@
 `envelope` is what the solver starts from, turned into a motion where that is found (track.py):
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k,
-         nor of what axis jerks
+nor of what axis jerks
    allow, |r'''_k| x^(3/2) <= j_k.
 2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share
 of the jerk, up to a share

@@ -2,9 +2,8 @@
 feedrate/sampling/samples.py).
 
 In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans
-                          that begins there. Free
-parts and corners are cut at all ends of blocks, spans where the motion passes changes of the feed. Where a
-piece ends there is a closing row.
+that begins there. Free parts and corners are cut at all ends of blocks, spans where the motion passes changes
+of the feed. Where a piece ends there is a closing row.
 """
 
 from __future__ import annotations

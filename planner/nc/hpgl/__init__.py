@@ -2,6 +2,5 @@
 programs.
 
 In reading order: `instructions` (what there is, why some of it is not read, how it is written), `plotter`
-                  (what it means), `drawing`
-(user units, the blocks so far).
+(what it means), `drawing` (user units, the blocks so far).
 """

@@ -1,9 +1,8 @@
 """A rounding or chamfer between two moves of a contour.
 
 The rounding of radius R touches both moves: its centre lies on both, moved by R to the side to which the
-                                             contour turns
-(`offset_lines.meeting`), and each move ends or begins at the foot of the centre on it. A chamfer is cut
-between straight moves only; it lies
+contour turns (`offset_lines.meeting`), and each move ends or begins at the foot of the centre on it. A
+chamfer is cut between straight moves only; it lies
 
     CHR    the given distance from the corner on both moves
     CHF    such that it is itself as long as given: length / (2 cos(turn / 2)) from the corner on both

@@ -3,7 +3,7 @@
 Programmed frames: shifts, rotations, mirror images and scales.
 
 Siemens: TRANS, ROT, SCALE and MIRROR replace the frame, ATRANS, AROT, ASCALE and AMIRROR add to it in the
-         coordinates in force,
+coordinates in force,
 
     p -> A (B p + b) + t      from      p -> A p + t.
 

@@ -13,7 +13,7 @@ start. M62, M63 and M67 happen with the motion and take no time. What waits for 
 no time unless `m_codes` names it. Of plotter files the pen takes its times in the motion (`[plotter]`).
 
 Not counted at all: the spindle turning faster or slower (S words), T words without M6, M2 and M30, and what
-                    the control itself takes.
+the control itself takes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
 1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance.
-                              It becomes
+It becomes
    chords so fine that they are the path (baselines/fir/chord_guide.py).
 2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of
 every run between full

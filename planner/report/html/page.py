@@ -6,8 +6,7 @@ DecompressionStream. Texts of the program and of names are data as well, and the
 that nothing in a program is ever run.
 
 The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's
-                                      script, some five
-megabytes, is run and the columns are unpacked.
+script, some five megabytes, is run and the columns are unpacked.
 """
 
 from __future__ import annotations

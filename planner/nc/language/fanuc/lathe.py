@@ -5,9 +5,8 @@
     G76             thread of many passes (nc/lathe_cuts.py)
 
 Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q
-                                     R), and one, G71 P Q U W I
-K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least increments (0.001 mm, 0.0001 inch)
-where they have no point.
+R), and one, G71 P Q U W I K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least
+increments (0.001 mm, 0.0001 inch) where they have no point.
 
 A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles.py) and G70 runs to cut it.
 """

@@ -2,7 +2,7 @@
 become rows of words.
 
 Rows are those of a lathe under LinuxCNC: G7 (diameters), G18, G33 for threads; so what a cycle was expanded
-                                          to can be read by others.
+to can be read by others.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@
     202 boring               Q208 feed out, Q214 direction in which the tool leaves the wall by 0.2 mm
     203, 205 pecking         Q202 infeed, less by Q212 each time but at least Q205; Q256 retract to break the chip, Q208 feed out;
                              203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks,
-                                  Q258 and Q259 how far
-                             above the ground rapid speed ends
+                             Q258 and Q259 how far above the ground rapid speed ends
     206, 207, 209 tapping    at Q206; with the lead Q239; breaking the chip each Q257, back by Q256 leads (0: out of the hole)
     208 bore milling         Q335 diameter, Q334 infeed per turn
     251 rectangular pocket   Q218 Q219 sides, Q220 corners, Q224 turned by, Q367 where the tool stands in it

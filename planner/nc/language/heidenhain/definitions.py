@@ -1,7 +1,7 @@
 """Statements that move nothing: the program's units, tool calls, definitions of cycles, M codes.
 
 Source: HEIDENHAIN TNC 640 (34059x), conversational programming, M functions of path behaviour and of rotary
-        axes.
+axes.
 """
 
 from __future__ import annotations

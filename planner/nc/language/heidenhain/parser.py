@@ -11,8 +11,8 @@ machine coordinates.
 On a machine with kinematics M128 and M129 switch the tool centre point, and L takes A, B and C.
 
 Refused with their block: PLANE, M128 without kinematics, LN, free contours (FK), APPR and DEP with polar
-                          coordinates, other cycles, M89
-and other M codes that change moves, polar coordinates without a pole, texts and QS parameters.
+coordinates, other cycles, M89 and other M codes that change moves, polar coordinates without a pole, texts
+and QS parameters.
 """
 
 from __future__ import annotations

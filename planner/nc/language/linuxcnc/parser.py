@@ -10,7 +10,7 @@ program, else that of the file name.ngc in the program's folder. Parameters 1 to
 arguments, then zeros; so are named parameters that do not begin with an underscore. M98 shares its caller's.
 
 What LinuxCNC refuses and this reader takes: a subprogram that stands after its call, break and continue in
-                                             repeat loops.
+repeat loops.
 """
 
 from __future__ import annotations

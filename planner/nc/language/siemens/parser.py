@@ -12,8 +12,7 @@ Lines of plain words stay as the lexer split them. The mode of G90 and G91 is th
 for AC and IC.
 
 Refused with their line: tilted frames (ROT X, CYCLE800 with angles), TRAORI without kinematics, KONT, G451,
-                         RNDM, G331, polar
-coordinates (AP, RP), SLOT1, LONGHOLE and other cycles.
+RNDM, G331, polar coordinates (AP, RP), SLOT1, LONGHOLE and other cycles.
 """
 
 from __future__ import annotations

@@ -9,8 +9,9 @@ the tests (tests/base/test_sizes.py plans both ways; `PLANNER_SIZES=small python
 module is imported, and holds for the processes that are started from there.
 
     parts  : the same computation, cut otherwise or on other threads: the same result to rounding
-    routes : other windows and ranges of the same optimisation: another way to the same optimum effort : what
-    is not tried, or less finely, because the job is large: a slower motion by what is written beside the size
+    routes : other windows and ranges of the same optimisation: another way to the same optimum
+    effort : what is not tried, or less finely, because the job is large: a slower motion by what is written
+             beside the size
     shown  : what a page or a table has no room for
 
 A size beyond which something is refused is no setting: there is no large way behind it.

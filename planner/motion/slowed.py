@@ -103,8 +103,10 @@ def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, A
 class Slowed:
     """A motion run slower in places, and standing longer where it rests.
 
-    motion : as it was places : where it is slower stands : (n, 2) when it rests [s], at the pace it has here
-    without these rests, and for how much longer [s]; ascending
+    motion : as it was
+    places : where it is slower
+    stands : (n, 2) when it rests [s], at the pace it has here without these rests, and for how much longer
+             [s]; ascending
     """
 
     motion: MotionInTime

@@ -83,8 +83,9 @@ class Findings:
     """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or
     time, and other notes.
 
-    strict : such assumptions are faults faults : of the chunks so far, in the order of their words; a line
-    that is executed many times is named once
+    strict : such assumptions are faults
+    faults : of the chunks so far, in the order of their words; a line that is executed many times is named
+             once
     """
 
     def __init__(self, *, strict: bool = False) -> None:

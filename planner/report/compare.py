@@ -42,8 +42,9 @@ class Row:
     cycle_time    : [s]; None without a motion, as the following fields
     worst         : for each quantity the largest ratio to its limit, and the name of that limit ("jerk.y")
     free          : quantities that this method does not limit
-    contour_error, vertex_error : [mm] after_filters : the larger of both behind the filters of the machine
-    [mm]; None without filters, or where it is not known
+    contour_error, vertex_error : [mm]
+    after_filters : the larger of both behind the filters of the machine [mm]; None without filters, or where
+                    it is not known
     corner_ratio  : the largest ratio of eq. 18-19 at the programmed corners [-]; None without corners
     gain          : median of the speed there over eq. 20 of the paper's corner [-]; None where it is not
                     defined

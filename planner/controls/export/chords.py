@@ -61,8 +61,9 @@ class Group:
 def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
     """The planned motion as a polyline.
 
-    within : how far it may miss a setpoint [mm], above the rounding of coordinates breaks : (K,) blocks
-    before which something else happens, ascending; None for those of the program's events
+    within : how far it may miss a setpoint [mm], above the rounding of coordinates
+    breaks : (K,) blocks before which something else happens, ascending; None for those of the program's
+             events
 
     Raises ValueError for a plan without a trajectory.
     """

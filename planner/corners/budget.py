@@ -27,6 +27,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.machine import Machine
 
+NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
+
 
 def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArray:
     """How much of the tolerance the rounding may use, eq. (20).
@@ -38,9 +40,6 @@ def allocate(tol: FloatArray, acceleration: FloatArray, rate: float) -> FloatArr
     Returns eps_ap (n,) [mm].
     """
     return tol - rate * np.minimum(acceleration, tol / (2.0 * rate))
-
-
-NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
 
 
 def chord_rate(machine: Machine) -> float:

@@ -43,9 +43,7 @@ from planner.machine import Machine
 # there, 4e-16 mm apart beside a jump of a limit of one's own.
 SWITCH_MIN = 1e-9
 
-# Spacing of points for jerk-limited profiles (module text) [tau]; lines, pentagon and zigzag at jerks 2e4 to
-# 2e6 are within 0.15 % of a grid four times finer, with STEP 0.5 and NEAR 2 within 0.8 %, at the same number
-# of points on long lines.
+# Spacing of points for jerk-limited profiles (module text) [tau].
 STEP = 0.25
 NEAR = 1.0
 

@@ -41,7 +41,7 @@ NEWTON_STEPS = 60
 # Rows whose |a u| stays below this share of their limit, for every u that the other limits allow, bound x
 # alone [-]. Not a threshold on a itself: beside an axis with a limit a million times larger even |r'_k| =
 # 1e-9 counts. Not rounding either: with a u of 1e-13 of the limit the greedy pass would trade the last digit
-# of x_i for all of u_i (module text; a zigzag with r'_k = 1e-16 lost 7e-6).
+# of x_i for all of u_i (module text).
 NEGLIGIBLE = 1e-10
 # Relative slack under which an end condition counts as reachable: rounding of the passes [-].
 ROUNDING = 1e-9

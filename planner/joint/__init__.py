@@ -1,1 +1,1 @@
-"""The free optimum inside the tolerance: geometry and feed of a short job found together."""
+"""The joint search: path and feed found together, in time, inside the tolerance."""

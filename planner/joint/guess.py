@@ -34,11 +34,7 @@ NEAREST_STEPS = 5
 
 
 class Cut(NamedTuple):
-    """How finely a motion is cut into steps.
-
-    Twice as many find motions 2e-5 to 5e-5 faster in three times the time; begun with half as many, a corner
-    of 90 degrees and a pentagon do not converge.
-    """
+    """How finely a motion is cut into steps."""
 
     per_unit: float = 4.0  # steps in a unit of time where the jerk is at its limit (module text) [-]
     of_leg: float = 2.0  # steps of a leg at least [-]

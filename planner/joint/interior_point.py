@@ -28,21 +28,18 @@ from planner.joint.rows import VECTORS, Linear, put_rows, slopes
 from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
-# Growth of prox per iteration once it grows, and its largest value [-]: with 1.5 searches of 80 random jobs
-# take 1.2 times as many iterations and end at the same times within 2e-5 on the mean.
+# Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations.
 FREEZE, FROZEN = 2.5, 1e4
 # The time has settled when it changes by no more than this share of the complementarity asked for in so many
-# iterations in a row, and at last after so many at that complementarity. Of 29 runs of random jobs, frozen as
-# soon as that was reached (with a growth of 1.5), one ended 4.4e-4 slower, and all 6e-5 on the mean; half as
-# many of the second end 1e-5 slower.
+# iterations in a row, and at last after so many at that complementarity: frozen as soon as that is reached,
+# motions end slower.
 STILL, STILL_FOR, CLOSE_FOR = 0.1, 2, 40
 MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning.least` lets it [-]
-# Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: on two
-# starts of the bracket all of them take 1.7 and 1.6 times as many iterations, in which more windows fail.
+# Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: behind
+# a short step they lead astray.
 PREDICTED = 0.3
 # Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up.
-# With 1e-10 for all steps 18 of 71 windows of a relief of 10,000 blocks went on to the last iteration: the
-# last gap stays at 1e-9 once durations hardly change.
+# The last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule

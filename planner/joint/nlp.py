@@ -50,20 +50,16 @@ from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
 from planner.joint.state_limits import REST, formula
 
-# Weight of ((h - guess)/guess)^2 against a step's time [-]: 1e-4 costs less than 1e-5 of the cycle time and
-# saves a third of the iterations on single corners; without it, the pentagon does not converge in 500. 1e-2
-# costs 5e-4.
+# Weight of ((h - guess)/guess)^2 against a step's time [-]: without it windows take more iterations, or do not
+# converge; a larger one costs time.
 PULL = 1e-4
 # Weight of the squares of all jerks, as shares of their limits, against the time [-]: where jerk saves next
-# to nothing there is little of it, instead of as much as there may be. On nine jobs 1e-4 costs up to 1e-5 of
-# the time and 1e-3 up to 9e-5; with the first the jerk of the bracket changes half as much in all, that of a
-# circle of chords a twentieth.
+# to nothing there is little of it, instead of as much as there may be.
 SMOOTH = 3e-4
 # Steps may become this much longer or shorter than they were guessed [-].
 LONGER = 4.0
 # The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the
-# limits hold, and ipopt begins between them with tiny steps. 1.2 settles 7 of the 8 runs tried (single
-# corners, pentagon, arcs, spiral) in 47 to 295 iterations, 1.5 the eighth.
+# limits hold, and ipopt begins between them with tiny steps.
 SLOWER = (1.2, 1.5, 1.0)
 # Where normal acceleration is limited it is watched at these places of every step [-], and steps become no
 # more than this much longer: with the others' freedom one step reaches round the whole corner, with twice the
@@ -75,8 +71,7 @@ NOT_SLOWER = 1e-4
 # By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt
 # needs room there.
 RELAXED = 1e-6
-# A job may have this many legs (arcs count as many as the steps they need). Measured, beside other work: a
-# spiral of 100 chords takes 7 s, one of 400 two minutes and 0.44 GB.
+# A job may have this many legs (arcs count as many as the steps they need): what memory and time allow.
 LEGS_MAX = 500
 
 

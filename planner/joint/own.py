@@ -42,10 +42,9 @@ WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.se
 # it would be.
 JOIN_WITHIN = SIZES.searched_join
 # What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do
-# not converge with the first do with the second (pentagon on mill), and the other way round. By how much rows
-# may be missed at the end [-]: on some windows with arcs they keep trembling by 1e-5. Where a plan is made
-# otherwise if one window fails there is one try: of 130 random jobs (benchmarks/campaign/jobs.py, effort
-# quick and normal) two were 1.9e-3 and 2.8e-3 slower for it, all took 0.78 of the CPU seconds.
+# not converge with the first may with the second, and the other way round. By how much rows may be missed at
+# the end [-]: on some windows with arcs they keep trembling by 1e-5. Where a plan is made otherwise if one
+# window fails there is one try.
 TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 # The most that rows may be missed by [-].
 MISSED_MOST = max(missed for _, missed in TRIES)
@@ -75,8 +74,7 @@ class TubeOwn:
                search ends at the first one that fails
     progress : called with the share of the steps that are done [-]
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
-               where it does not fall: 31 runs, those of random jobs, 2.5e-5 faster on the mean in 1.2 times
-               the iterations
+               where it does not fall, ends a little faster in more iterations
     """
 
     gap: float = 1e-5

@@ -19,7 +19,7 @@ from planner.joint.outcome import BROKE_DOWN, OUTCOMES
 # Residual of the rows [-]: what is left is integrated away (joint/motion.py).
 FEASIBILITY = 1e-6
 # Barrier parameter at the beginning [-]; that of ipopt decreases monotonely. Adaptive ones drop early, hug
-# the limits and trickle (pentagon: more than 300 iterations instead of 112).
+# the limits and trickle.
 BARRIER = 0.1
 # The search of ipopt may end when the time changes by less than this fraction in each of so many iterations
 # [-], with all rows kept and the complementarity below the last of them [-].

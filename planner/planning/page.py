@@ -42,8 +42,8 @@ from planner.planning.optimal.result import prices_of
 # Runs on which the verdict finds something are planned each by itself where they are no more than this share
 # of all [-].
 ALONE_SHARE = 0.1
-# Of motions in closed form, whose accelerations bound what filters do to them: these four are as fast in the
-# mean as seven were, for 0.7 of the processor time (48 random jobs by `kinematic` and `bezier`).
+# Of motions in closed form, whose accelerations bound what filters do to them, less of the
+# tolerance for the path may be faster (`Method.ways`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
 
 

@@ -130,7 +130,7 @@ def row_of(
 
     shown : samples of the motion to keep for a page, at most; 0 for none
     """
-    from planner import plan
+    from planner.planning.methods.registry import plan
 
     label = method if isinstance(method, str) else _label(method)
     how = {"method": method, "tolerance": tolerance, "progress": progress}

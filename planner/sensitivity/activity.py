@@ -18,8 +18,7 @@ from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_
 from planner.sensitivity.records import GridHistory
 
 # An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with
-# jerk limits are within 1e-3 of some limit for 94 to 98 % of their time, within 1e-2 for 98 to 99.6 %
-# (pentagon, zig-zag, arcs, spiral); more does not help.
+# jerk limits are that close to some limit for nearly all of their time.
 HELD = 1e-2
 NONE, REST = "none", "rest"
 

@@ -48,9 +48,7 @@ from planner.sensitivity.records import PriceList
 from planner.sensitivity.savings import Change, more_of, solved_again
 
 WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
-# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time]:
-# 2.5e-4 with 1e-4 more or less of the tolerance (pentagon), 1e-3 with more jerk (bracket: 5e-4 was too little
-# for jerk.y).
+# By how much a plan on splines, made again, is faster or slower for no other reason [share of the time].
 UNREST = 1e-3
 CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.corners.budget import largest_normal
 from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
 from planner.feedrate.constraints.axis_jerk import AxisJerk
 from planner.feedrate.constraints.axis_velocity import AxisVelocity
@@ -75,7 +76,7 @@ class Limits:
             velocity=VELOCITY.of(machine, axes),
             acceleration=acceleration,
             jerk=JERK.of(machine, axes),
-            normal=machine.normal_acceleration or np.inf,
+            normal=largest_normal(machine),
             tangential=binding(machine, axes, acceleration),
             along=(*built_in, *machine.own),
         )

@@ -8,9 +8,9 @@ overlap are one.
 
 An optimal profile is nearly always at some limit, and most of its states are at the edge of what can be
 continued: while it brakes into a bend, or takes its acceleration back below the largest feed, with all its
-jerk. A problem that begins there has no room, and no solution is found (a relief of 6,000 blocks: 13 ranges
-of 70). So ranges end at rest, where the feed is held without acceleration, and at dips of the feed, where
-feed^2 is below `DEEP` of that of the peaks on both sides.
+jerk. A problem that begins there has no room, and no solution is found. So ranges end at rest, where the feed
+is held without acceleration, and at dips of the feed, where feed^2 is below `DEEP` of that of the peaks on
+both sides.
 
 From such a state the range's solution is looked for beside the known profile slowed down to rest, x W over
 the way s with

@@ -23,9 +23,8 @@ from planner.feedrate.jerk.window import ScaledWindow, Way, Window
 # Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4
 # of some profiles' time, 5 gains nothing.
 BRAKING_WAYS = 3.0
-# Share of a^3/j^2 that counts as a way to brake [-] (4 mm on `mill`): of motions in windows of 150 and 300
-# intervals that are joined at slow points some take 5e-4 longer with 1/6, 3e-4 with 0.7, 1e-4 with 1; then 6
-# % more has to be solved (relief of 10,000 blocks).
+# Share of a^3/j^2 that counts as a way to brake [-]: with less, windows that are joined at slow points end
+# slower; with more, more has to be solved.
 BUILDING = 0.7
 # At most this fraction of a window is kept [-]: the rest is the way ahead that the next window starts with.
 KEPT_SHARE_MAX = 0.95

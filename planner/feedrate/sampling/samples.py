@@ -45,8 +45,7 @@ from planner.machine import Machine
 # first order in the step, because u is constant on it.
 RESOLUTION = 2e-3
 # Jobs with more corners than the first number get the second resolution instead, or their grids would fill
-# the memory (a relief of 170,000 sharp corners: 20 million points); it costs another 0.3 to 0.5 % of the
-# cycle time.
+# the memory.
 MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
 # For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis
 # needs for its acceleration [-], where feedrate/sampling/calm.py does not say that it may last longer.

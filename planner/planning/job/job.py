@@ -41,8 +41,7 @@ NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of th
 # share of its time [-].
 CHEAP = 1e-4
 # A motion that turns in less time than the filters are long is nearer to its path than the closed form says.
-# Twice its acceleration is as fast as 3 and 4 times for less processor time, and faster than once (40 jobs
-# with filters, the first ones of the campaign behind seed 70000).
+# More than twice its acceleration gains nothing and takes longer.
 BOLDER = 2.0
 
 

@@ -21,8 +21,7 @@ from planner.planning.optimal.shaped import shaped_plan
 from planner.planning.page import Method, best_of
 
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature,
-# takes 0.1 to 0.9 % longer (pentagon, zig-zag, circle and spiral of chords at 2e5 mm/s3; 0.92 to 0.97 are
-# within 0.3 % of each other).
+# is slower.
 SIGMA2 = 0.94
 
 

@@ -36,8 +36,7 @@ COMPARED_POINTS = SIZES.corners_compared
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
 # Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried
-# there [-]: times on the coarse grid are up to 8e-3 longer (splines of zig-zag, relief and bracket, on both
-# machines).
+# there [-]: times on the coarse grid are longer by up to that.
 CLOSE = 1.01
 FASTER = (
     1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap

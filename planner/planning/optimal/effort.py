@@ -20,17 +20,14 @@ from planner.joint.guess import Cut
 from planner.planning.optimal.order import Order
 
 # Interpolation error of the axis accelerations on the coarsest grid [share of the limit]
-# (feedrate/sampling/samples.py). Rounds of reshaping on a quarter of it end 2e-3 faster on the bracket and
-# take 1.6 times as long.
+# (feedrate/sampling/samples.py).
 COARSE = 3.2e-2
 
 
-# The first steps of a search, those of the second one, and the gaps of both [-]. On bracket, star and spiral,
-# 2,000 chords and a relief of 2,000 blocks two steps of a leg at least find 1e-6 to 1.7e-5 more in 1.07 to
-# 1.34 times the time.
+# The first steps of a search, those of the second one, and the gaps of both [-].
 FIRST_CUT, SECOND_CUT = Cut(per_unit=1.0, of_leg=1.0), Cut(per_unit=4.0, of_leg=1.0)
 FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
-# For the best of efforts: on those jobs 1.2e-5 to 2e-5 more.
+# For the best of efforts.
 BEST_CUT, BEST_GAP = Cut(per_unit=8.0, of_leg=2.0), 1e-6
 
 
@@ -97,10 +94,7 @@ class Effort:
         return next(size for size in self.sizes if points <= size.points)
 
 
-# Rounds: on the bracket the first two gain 2.5e-2 of the time, the next four 5e-3, and the next four 5e-4.
-# Final grids: motions on 8e-3, 2e-3 and 5e-4 take up to 4e-3, 1.5e-3 and 4e-4 longer than on 2e-4 (zig-zag on
-# mill; a relief on peers 3e-4 on the first); the memory sets the limit. Rounds on the coarse grid leave small
-# jobs 1e-3 slower.
+# The first rounds gain most. Final grids are as fine as the memory allows: a motion on a coarser one is slower.
 _TINY, _FEW, _MANY = SIZES.small_grids
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {

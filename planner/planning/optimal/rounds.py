@@ -20,10 +20,9 @@ from planner.smoothing.spline_path import SplineShape, with_spline
 QUIET_ROUNDS, QUIET_GAIN, QUIET_PROMISE, MOST_PULL = 2, 3e-5, 3e-4, 10.0
 # A run that a round made slower is not pulled more, but done, where the chord error bounds the feed for more
 # than this share of its time [-]: a step does not know that the farther the curve is from the path, the less
-# is left to chords. Fifty such random jobs take the same time, and 10 % less computing.
+# is left to chords.
 ON_CHORDS = 0.1
-# Of a round, at first and at least (smoothing/combined.py): with 0.1 for the second the bracket ends 4e-4
-# slower, with 0 to 1e-2 at the same time within 1e-4.
+# Pull of a round, at first and at least (smoothing/combined.py).
 FIRST_PULL, LEAST_PULL = 0.5, 1e-3
 # Factors on a run's pull after a round that gained more than GOOD of what it promised, and less than POOR of
 # it [-].

@@ -39,16 +39,15 @@ TIGHTENED_EXCESS = 1e-5
 TIGHTENING_ROUNDS = 2
 # Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more
 # than the first of `WORTH` [-] at first, where nearly all has to be solved again anyway, and then of more
-# than the second, while there is one: of a relief of 100,000 blocks 0.35 is solved again in the second round,
-# with the first everywhere 0.82. Few places are left to the later rounds.
+# than the second, while there is one: few places are left to the later rounds.
 TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
-SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps, by 5e-9 a round on SheepTile
+SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps
 # What is slowed down is slowed down by this much more [-]; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
 # Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict:
-# the verifier looks at places of its own, and finds up to 3.2e-5 more of a jerk (an hour of 250,000 blocks);
-# a second verdict takes as long as the first.
+# the verifier looks at places of its own, and finds a little more; a second verdict takes as long as the
+# first.
 SEEN_BEFORE = 1.0 + 2e-5
 
 

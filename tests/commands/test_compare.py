@@ -13,7 +13,6 @@ import pytest
 from hand_made import SQUARE, make_plan
 from typer.testing import CliRunner, Result
 
-import planner
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import METHODS
 from planner.cli import app
@@ -41,7 +40,7 @@ def answers(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
                 raise how
             return make_plan(**how)
 
-        monkeypatch.setitem(vars(planner), "plan", plan)
+        monkeypatch.setattr("planner.planning.methods.registry.plan", plan)
         return asked
 
     return answer

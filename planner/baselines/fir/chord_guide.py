@@ -18,7 +18,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.command import lower_between
-from planner.baselines.fir.guide import Guide, per_leg, picked
+from planner.baselines.fir.guide import Guide
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
@@ -49,21 +49,25 @@ class ChordGuide(Guide):
     segment    : (R,) segment of the toolpath
     """
 
-    feed: FloatArray = per_leg(finite=False)
-    programmed: FloatArray = per_leg(finite=False)
-    kappa: FloatArray = per_leg()
-    v_acc: FloatArray = per_leg(finite=False)
-    v_jerk: FloatArray = per_leg(finite=False)
-    tol: FloatArray = per_leg()
-    corner: Array = per_leg(np.int64)
-    sin_half: FloatArray = per_leg()
-    whole: FloatArray = per_leg()
-    segment: Array = per_leg(np.int64)
+    programmed: FloatArray
+    kappa: FloatArray
+    v_acc: FloatArray
+    v_jerk: FloatArray
+    tol: FloatArray
+    corner: Array
+    sin_half: FloatArray
+    whole: FloatArray
+    segment: Array
 
     @property
     def budget(self) -> FloatArray:
         """(R, 2) the same on both halves of a chord [mm]."""
         return np.stack([self.tol, self.tol], axis=1)
+
+
+_OF_CHORDS = (
+    "direction", "feed", "programmed", "kappa", "v_acc", "v_jerk", "tol", "corner", "sin_half", "whole", "segment",
+)  # fmt: skip  # columns of a `ChordGuide` of which both parts of a chord that is cut have the same
 
 
 def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
@@ -81,7 +85,7 @@ def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
     s = np.setdiff1d(s[inside], guide.s)
     at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
     rows = np.insert(np.arange(len(guide)), at + 1, at)
-    columns = picked(guide, {"leg": rows, "joint": np.arange(len(guide) + 1)})
+    columns = {name: getattr(guide, name)[rows] for name in _OF_CHORDS}
     cuts = guide.point[at] + (s - guide.s[at])[:, None] * guide.direction[at]
     columns["point"] = np.insert(guide.point, at + 1, cuts, axis=0)
     columns["s"] = np.insert(guide.s, at + 1, s)

@@ -3,23 +3,19 @@
 Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself: arcs
 become chords, collinear lines of one feed are one leg. Paper 001 runs along the fine chords of a smooth path
 (chord_guide.py).
-
-Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is
-declared so is checked and made read-only, picked for some runs and put back, for every record in the same
-way.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
@@ -29,75 +25,6 @@ from planner.machine import Machine
 # Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with
 # feed^2, so that this costs half of it in feed.
 CHORD_FRACTION = 0.05
-
-
-def per_run(width: int | None = None) -> Any:
-    """A field (S,), or (S, width), of float64."""
-    return _column("run", np.float64, width)
-
-
-def per_leg(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
-    """A field (R,), or (R, A) with `axes`; with `finite=False` infinity is allowed."""
-    return _column("leg", dtype, -1 if axes else None, finite)
-
-
-def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
-    """A field (R+1,), or (R+1, A) with `axes`."""
-    return _column("joint", dtype, -1 if axes else None, finite)
-
-
-def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
-    """A field with its rows, type and width in the metadata; width -1 for one column per axis."""
-    return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
-
-
-def _columns(record: Any) -> list[tuple[str, Any]]:
-    """Names and metadata of the columns of a record."""
-    return [(one.name, one.metadata) for one in fields(record) if "rows" in one.metadata]
-
-
-def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
-    """Check the columns of a record and make them read-only.
-
-    sizes : number of rows per "run", "leg" and "joint"
-    axes  : A, the width of columns with `axes`
-
-    Raises ValueError for a column of another shape, or one that is not finite and should be.
-    """
-    for name, of in _columns(record):
-        width = () if of["width"] is None else (axes if of["width"] < 0 else of["width"],)
-        freeze(record, name, of["dtype"], (sizes[of["rows"]], *width), finite=of["finite"])
-
-
-def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
-    """Indices of the rows that the chosen runs have, for "run", "leg" and "joint".
-
-    first  : (S+1,) first joint of each run, as of `Guide`
-    chosen : (S,) True for the runs that are meant, one at least
-    """
-    run = np.flatnonzero(chosen)
-    legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))
-    return {"run": run, "leg": legs, "joint": np.append(legs, first[run[-1] + 1])}
-
-
-def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
-    """The given rows (n,) of "run", "leg" and "joint" (`chosen_rows`) of all columns, by name."""
-    return {name: getattr(record, name)[rows[of["rows"]]] for name, of in _columns(record)}
-
-
-def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
-    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run
-    belongs to the next one.
-
-    rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
-    chosen : a record of these rows alone
-    """
-    columns: dict[str, Any] = {}
-    for name, of in _columns(record):
-        last = -1 if of["rows"] == "joint" else None
-        columns[name] = getattr(record, name).copy()
-        columns[name][rows[of["rows"]][:last]] = getattr(chosen, name)[:last]
-    return columns
 
 
 class Line(NamedTuple):
@@ -141,17 +68,11 @@ class Guide(ABC):
     own: tuple[float, float] | None = None
     first: Array
     dwell: FloatArray
-    point: FloatArray = per_joint(axes=True)
-    s: FloatArray = per_joint()
-    length: FloatArray = per_leg()
-    direction: FloatArray = per_leg(axes=True)
-    feed: FloatArray = per_leg()
-
-    def __post_init__(self) -> None:
-        freeze(self, "first", np.int64, (None,))
-        freeze(self, "dwell", np.float64, (len(self.first),))
-        legs = len(self.length)
-        freeze_columns(self, {"leg": legs, "joint": legs + 1}, len(self.axes))
+    point: FloatArray
+    s: FloatArray
+    length: FloatArray
+    direction: FloatArray
+    feed: FloatArray
 
     def __len__(self) -> int:
         return len(self.length)
@@ -197,16 +118,6 @@ class Guide(ABC):
         T2, T1 = sorted(self.own or (0.0, 0.0))
         return np.full(self.runs, T1), np.full(self.runs, T2)
 
-    def pick(self, chosen: Array) -> Self:
-        """The runs `chosen` (S,), each shifted to where the one before ends, without the dwells: good for
-        planning only."""
-        columns = picked(self, chosen_rows(self.first, chosen))
-        along = np.cumsum(columns["length"][:, None] * columns["direction"], axis=0)
-        columns["point"] = np.vstack([np.zeros((1, len(self.axes))), along])
-        columns["s"] = np.concatenate([[0.0], np.cumsum(columns["length"])])
-        first = np.concatenate([[0], np.cumsum(np.diff(self.first)[chosen])])
-        return dataclasses.replace(self, first=first, dwell=np.zeros(len(first)), **columns)
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LegGuide(Guide):
@@ -222,12 +133,12 @@ class LegGuide(Guide):
     """
 
     lines: Toolpath
-    joint_at: Array = per_joint(np.int64)
-    slower: Array = per_leg(np.bool_)
-    a_max: FloatArray = per_leg()
-    j_max: FloatArray = per_leg()
-    tol: FloatArray = per_joint()
-    sin_half: FloatArray = per_joint()
+    joint_at: Array
+    slower: Array
+    a_max: FloatArray
+    j_max: FloatArray
+    tol: FloatArray
+    sin_half: FloatArray
 
     @property
     def budget(self) -> FloatArray:

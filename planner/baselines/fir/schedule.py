@@ -17,7 +17,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command, VelocityPulses, command_of, lower_between
-from planner.baselines.fir.guide import LegGuide, per_joint, per_leg
+from planner.baselines.fir.guide import LegGuide
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
@@ -42,11 +42,12 @@ class Schedule(SpeedPlan):
     holding : (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
     """
 
+    rows = SpeedPlan.rows | {"speed": "leg", "passing": "joint", "overlap": "joint", "holding": "leg"}
     guide: LegGuide
-    speed: FloatArray = per_leg()
-    passing: FloatArray = per_joint(finite=False)
-    overlap: FloatArray = per_joint()
-    holding: Array = per_leg(np.bool_)
+    speed: FloatArray
+    passing: FloatArray
+    overlap: FloatArray
+    holding: Array
 
     def at_joints(self) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the run that each joint lies in (the last joint: of the last one)."""
@@ -75,7 +76,7 @@ class Schedule(SpeedPlan):
         n    : rounds before this one; from `ROUNDS` on the guide is run from joint to joint
         """
         if n >= ROUNDS - 1:
-            return _stopping(self)
+            return _stopping(self, made.wrong[self.guide.run])
         return _slower(self, made, slowing(made.seen.worst, max(SLOWEST, 1.0 - HASTE * n)))
 
 
@@ -145,12 +146,12 @@ def _leg_times(guide: LegGuide, command: Command) -> tuple[FloatArray, FloatArra
     return t[first], np.where(standing, t[last], np.append(t[first[1:]], t[-1]))
 
 
-def _stopping(plan: Schedule) -> Schedule:
-    """Full stops at all joints, and half the speed."""
-    inner = plan.guide.inner
+def _stopping(plan: Schedule, legs: Array) -> Schedule:
+    """Full stops at all joints of the `legs` (R,), and half the speed."""
+    inner = plan.guide.inner & np.append(legs, False)
     return dataclasses.replace(
         plan,
-        speed=plan.speed / 2,
+        speed=np.where(legs, plan.speed / 2, plan.speed),
         passing=np.where(inner, np.inf, plan.passing),
         overlap=np.where(inner, 0.0, plan.overlap),
     )

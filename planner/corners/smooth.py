@@ -70,30 +70,20 @@ SAME_CURVATURE = 1e-6
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SmoothPath:
-    """Legs and corners of a job; R legs, R+1 joints between and around them.
-
-    joint       : (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
-    d           : (R+1,) tangent length of the corner [mm]; 0 where there is none
-    params      : (R+1, 4) parameters of the corner's shape
-    scale     : (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more
-                (`CLOSE`)
-    tol         : (R+1,) contour error budget eps [mm]
-    tol_ap      : (R+1,) what the rounding uses of it, E(m) [mm]
-    normal_max  : (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
-    spline      : runs of joints that are replaced by curves, where d is 0
-    """
+    """Legs and corners of a job; R legs, R+1 joints between and around them."""
 
     toolpath: Toolpath
     legs: Legs
     corner: CornerShape
-    joint: Array
-    d: FloatArray
-    params: FloatArray
+    joint: Array  # (R+1,) `Joint`: STOP, SMOOTH (tangent, passed as it is) or CORNER (blended)
+    d: FloatArray  # (R+1,) tangent length of the corner [mm]; 0 where there is none
+    params: FloatArray  # (R+1, 4) parameters of the corner's shape
+    # (R+1, 2) factors on the tangent lengths before and after the vertex, 1 or a little more (`CLOSE`)
     scale: FloatArray
-    tol: FloatArray
-    tol_ap: FloatArray
-    normal_max: FloatArray
-    spline: Spline
+    tol: FloatArray  # (R+1,) contour error budget eps [mm]
+    tol_ap: FloatArray  # (R+1,) what the rounding uses of it, E(m) [mm]
+    normal_max: FloatArray  # (R+1,) largest kappa feed^2 within the corner [mm/s2] (eq. (18)-(20))
+    spline: Spline  # runs of joints that are replaced by curves, where d is 0
 
     def __post_init__(self) -> None:
         joints = len(self.legs) + 1

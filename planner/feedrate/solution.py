@@ -77,18 +77,13 @@ class Prices:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Multipliers:
-    """Multipliers of the interval to the right of each point [s]; 0 where there is no interval.
+    """Multipliers of the interval to the right of each point [s]; 0 where there is no interval."""
 
-    rows     : (P, A, 4) of the axis limits, as shares of the limits: acceleration at the interval's start,
-               jerk there, jerk at its end, acceleration there; negative where the lower side is the one that
-               holds
-    feed     : (P, 2) of x / feed_sq_max at the point and in the middle of the interval
-    dynamics : (P,) of the kinematics of x [s per mm2/s2]
-    """
-
+    # (P, A, 4) of the axis limits, as shares of the limits: acceleration at the interval's start, jerk there,
+    # jerk at its end, acceleration there; negative where the lower side is the one that holds
     rows: FloatArray
-    feed: FloatArray
-    dynamics: FloatArray
+    feed: FloatArray  # (P, 2) of x / feed_sq_max at the point and in the middle of the interval
+    dynamics: FloatArray  # (P,) of the kinematics of x [s per mm2/s2]
 
     def __post_init__(self) -> None:
         points, axes, _ = np.shape(self.rows)
@@ -99,38 +94,27 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FeedrateSolution:
-    """The profile of a `FeedrateProblem` with P points: constant jerk along the path on every interval.
+    """The profile of a `FeedrateProblem` with P points: constant jerk along the path on every interval."""
 
-    status       : see `Status`
-    sentence     : what happened and, on failure, what to do
-    solver       : repr of the solver
-    feed_sq      : (P,) x [mm2/s2]; all NaN unless solved, like the next three
-    acc_s        : (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a
-                   piece that ends at rest
-    jerk_s       : (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere
-                   at second order
-    duration     : (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile
-                   rests at both ends
-    solve_time   : [s]
-    iterations   : of an iterative solver; the largest of all pieces
-    effort       : what else the solver counted, by name
-    jerk_limited : True if the jerk limits of the problem were kept
-    prices       : what the limits cost, if the solver knows
-    multipliers  : of limits and kinematics, if the solver knows; see feedrate/lagrangian.py
-    """
-
-    status: Status
-    sentence: str
-    solver: str
-    feed_sq: FloatArray
+    status: Status  # see `Status`
+    sentence: str  # what happened and, on failure, what to do
+    solver: str  # repr of the solver
+    feed_sq: FloatArray  # (P,) x [mm2/s2]; all NaN unless solved, like the next three
+    # (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a piece that ends
+    # at rest
     acc_s: FloatArray
+    # (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere at second
+    # order
     jerk_s: FloatArray
+    # (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile rests at both
+    # ends
     duration: FloatArray
-    solve_time: float
-    iterations: int = 0
-    effort: dict[str, int] = field(default_factory=dict)
-    jerk_limited: bool = False
-    prices: Prices | None = None
+    solve_time: float  # [s]
+    iterations: int = 0  # of an iterative solver; the largest of all pieces
+    effort: dict[str, int] = field(default_factory=dict)  # what else the solver counted, by name
+    jerk_limited: bool = False  # True if the jerk limits of the problem were kept
+    prices: Prices | None = None  # what the limits cost, if the solver knows
+    # of limits and kinematics, if the solver knows; see feedrate/lagrangian.py
     multipliers: Multipliers | None = None
 
     def __post_init__(self) -> None:

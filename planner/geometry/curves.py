@@ -44,16 +44,11 @@ CHORD_SHARE = 0.01  # of the tolerance [-]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Curves:
-    """K rational cubics, one row each (module text).
+    """K rational cubics, one row each (module text)."""
 
-    points : (K, 4, A) control points [mm]
-    weight : (K, 2) weights of the inner two, > 0; those of the outer two are 1 [-]
-    twist  : (K,) bound of |d3p/ds3|, s the arc length [1/mm2]
-    """
-
-    points: FloatArray
-    weight: FloatArray
-    twist: FloatArray
+    points: FloatArray  # (K, 4, A) control points [mm]
+    weight: FloatArray  # (K, 2) weights of the inner two, > 0; those of the outer two are 1 [-]
+    twist: FloatArray  # (K,) bound of |d3p/ds3|, s the arc length [1/mm2]
 
     def __post_init__(self) -> None:
         curves, _, axes = np.shape(self.points)
@@ -73,22 +68,14 @@ class Curves:
 
 
 class CurveSegments(NamedTuple):
-    """The segments (n,) that the curves of a program are divided into, in order.
+    """The segments (n,) that the curves of a program are divided into, in order."""
 
-    owner     : (n,) row of the program's piece
-    chord     : (n,) True for what is run as a chord; then the rest is that of a straight curve
-    curves    : the segments
-    length    : (n,) arc length [mm]
-    curvature : (n,) bound of |d2p/dx2| and of the curvature [1/mm]
-    ends      : (n, 2, 4, A) points and x-derivatives at both ends
-    """
-
-    owner: Array
-    chord: Array
-    curves: Curves
-    length: FloatArray
-    curvature: FloatArray
-    ends: FloatArray
+    owner: Array  # (n,) row of the program's piece
+    chord: Array  # (n,) True for what is run as a chord; then the rest is that of a straight curve
+    curves: Curves  # the segments
+    length: FloatArray  # (n,) arc length [mm]
+    curvature: FloatArray  # (n,) bound of |d2p/dx2| and of the curvature [1/mm]
+    ends: FloatArray  # (n, 2, 4, A) points and x-derivatives at both ends
 
 
 def curve_segments(pieces: FloatArray, near: FloatArray) -> CurveSegments:

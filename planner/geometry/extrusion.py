@@ -36,28 +36,17 @@ LEAST_LEFT = 0.5  # of the length between two joints, whatever is saved of it [-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Extrusion:
     """The extruder along a path of M segments: K joints where it has its programmed place, P moves while the
-    other axes wait.
+    other axes wait."""
 
-    limits : (3,) of its velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3]
-    joint  : (K,) index, ascending, the first 0 and the last M
-    arrive : (K,) its place on arrival there [mm of filament], 0 at the beginning of the program
-    leave  : (K,) its place when the motion goes on [mm]
-    ratio  : (M,) mm of filament per mm of way on each segment, at most [-]
-    at     : (P,) joint of each move alone, not decreasing
-    delay  : (P,) from the arrival at the joint to its begin [s]
-    amount : (P,) of filament, negative back [mm]
-    speed  : (P,) that is asked for [mm/s]
-    """
-
-    limits: FloatArray
-    joint: Array
-    arrive: FloatArray
-    leave: FloatArray
-    ratio: FloatArray
-    at: Array
-    delay: FloatArray
-    amount: FloatArray
-    speed: FloatArray
+    limits: FloatArray  # (3,) of its velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3]
+    joint: Array  # (K,) index, ascending, the first 0 and the last M
+    arrive: FloatArray  # (K,) its place on arrival there [mm of filament], 0 at the beginning of the program
+    leave: FloatArray  # (K,) its place when the motion goes on [mm]
+    ratio: FloatArray  # (M,) mm of filament per mm of way on each segment, at most [-]
+    at: Array  # (P,) joint of each move alone, not decreasing
+    delay: FloatArray  # (P,) from the arrival at the joint to its begin [s]
+    amount: FloatArray  # (P,) of filament, negative back [mm]
+    speed: FloatArray  # (P,) that is asked for [mm/s]
 
     def __post_init__(self) -> None:
         knots, moves = len(self.joint), len(self.at)
@@ -71,18 +60,12 @@ class Extrusion:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waits:
-    """Standstills in the order of the program, and what the extruder does in them.
+    """Standstills in the order of the program, and what the extruder does in them."""
 
-    block  : (W,) of the program
-    lasts  : (W,) [s]
-    amount : (W,) of filament [mm]
-    speed  : (W,) that is asked for [mm/s]
-    """
-
-    block: Array
-    lasts: FloatArray
-    amount: FloatArray
-    speed: FloatArray
+    block: Array  # (W,) of the program
+    lasts: FloatArray  # (W,) [s]
+    amount: FloatArray  # (W,) of filament [mm]
+    speed: FloatArray  # (W,) that is asked for [mm/s]
 
 
 class Laid(NamedTuple):

@@ -26,19 +26,14 @@ JOINED_ANGLE = 1e-7
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Legs:
-    """R legs of a toolpath and the R+1 joints between them.
+    """R legs of a toolpath and the R+1 joints between them."""
 
-    first  : (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the
-             leg's start
-    offset : (M,) place of each segment's start on its leg [mm]
-    length : (R,) range of the leg's parameter x [mm]
-    table  : (R,) records of `leg_dtype`, the same geometry for the kernels
-    """
-
+    # (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the leg's
+    # start
     first: Array
-    offset: FloatArray
-    length: FloatArray
-    table: Array
+    offset: FloatArray  # (M,) place of each segment's start on its leg [mm]
+    length: FloatArray  # (R,) range of the leg's parameter x [mm]
+    table: Array  # (R,) records of `leg_dtype`, the same geometry for the kernels
 
     def __post_init__(self) -> None:
         legs = len(self.length)

@@ -31,18 +31,13 @@ CHORD_SAFETY = 0.9
 class Nurbs:
     """A NURBS curve over the first A linear axes.
 
-    degree  : p >= 1
-    points  : (n, A) control points [mm], A = 2 or 3
-    knots   : (n + p + 1,) non-decreasing
-    weights : (n,) > 0
-
     Raises InputError for data that do not define a curve.
     """
 
-    degree: int
-    points: FloatArray
-    knots: FloatArray
-    weights: FloatArray
+    degree: int  # p >= 1
+    points: FloatArray  # (n, A) control points [mm], A = 2 or 3
+    knots: FloatArray  # (n + p + 1,) non-decreasing
+    weights: FloatArray  # (n,) > 0
 
     def __post_init__(self) -> None:
         freeze(self, "points", np.float64, (None, None))

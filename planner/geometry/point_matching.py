@@ -45,22 +45,14 @@ ENTERED, THROUGH = 1, 2
 
 
 class PathChain(NamedTuple):
-    """K straight links and the K+1 vertices around them.
+    """K straight links and the K+1 vertices around them."""
 
-    vertex    : (K+1, A) [mm]
-    at_vertex : (K+1,) budget there [mm]
-    budget    : (K,) of each link, the larger one of its block's two joints [mm]
-    skipped   : (K,) price of leaving a link without a point [mm2], 0 for the parts of an arc
-    feed      : (K,) programmed [mm/s]
-    segment   : (K,) of the toolpath; first (M+1,) link of each segment
-    """
-
-    vertex: FloatArray
-    at_vertex: FloatArray
-    budget: FloatArray
-    skipped: FloatArray
-    feed: FloatArray
-    segment: Array
+    vertex: FloatArray  # (K+1, A) [mm]
+    at_vertex: FloatArray  # (K+1,) budget there [mm]
+    budget: FloatArray  # (K,) of each link, the larger one of its block's two joints [mm]
+    skipped: FloatArray  # (K,) price of leaving a link without a point [mm2], 0 for the parts of an arc
+    feed: FloatArray  # (K,) programmed [mm/s]
+    segment: Array  # (K,) of the toolpath; first (M+1,) link of each segment
     first: Array
 
 

@@ -23,24 +23,18 @@ def span_dtype(axes: int) -> np.dtype:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spline:
-    """Q runs of spans, in the order of the path; S spans in all.
+    """Q runs of spans, in the order of the path; S spans in all."""
 
-    first       : (Q+1,) run q holds the spans first[q] : first[q+1]
-    joint_first, joint_last : (Q,) the joints between legs that run q replaces; it begins on the leg before
-                              the first of them and
-                  ends on the leg after the last
-    x_first, x_last : (Q,) where on those legs [mm]
-    spans       : (S,) records of `span_dtype`
-    budget      : (S,) what the shape leaves of the tolerance for chord and filter errors, proved [mm]
-    """
-
-    first: Array
+    first: Array  # (Q+1,) run q holds the spans first[q] : first[q+1]
+    # joint_first and joint_last: (Q,) the joints between legs that run q replaces; it begins on the leg
+    # before the first of them and ends on the leg after the last
     joint_first: Array
     joint_last: Array
+    # x_first and x_last: (Q,) where on those legs [mm]
     x_first: FloatArray
     x_last: FloatArray
-    spans: Array
-    budget: FloatArray
+    spans: Array  # (S,) records of `span_dtype`
+    budget: FloatArray  # (S,) what the shape leaves of the tolerance for chord and filter errors, proved [mm]
 
     def __post_init__(self) -> None:
         runs = len(self.joint_first)

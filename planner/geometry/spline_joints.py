@@ -56,19 +56,13 @@ def passed_places(toolpath: Toolpath, legs: Legs, spline: Spline) -> FloatArray:
 
 
 class _Marks(NamedTuple):
-    """Points that are passed in order: the start of each segment, and points of arcs.
+    """Points that are passed in order: the start of each segment, and points of arcs."""
 
-    segment : (K,) it is on, first (M+1,) mark of each segment
-    point   : (K, A) [mm]
-    link    : (K,) of the chain (point_matching.py)
-    fine    : (K,) whether the feed changes there
-    """
-
-    segment: Array
+    segment: Array  # (K,) it is on, first (M+1,) mark of each segment
     first: Array
-    point: FloatArray
-    link: Array
-    fine: Array
+    point: FloatArray  # (K, A) [mm]
+    link: Array  # (K,) of the chain (point_matching.py)
+    fine: Array  # (K,) whether the feed changes there
 
 
 def _marks(toolpath: Toolpath, chain: PathChain) -> _Marks:

@@ -128,20 +128,13 @@ class ToolData(Record):
 
 class Times(Record):
     """The times of events while the axes stand still, beside dwells [s]; None where it is not known, and left
-    out of totals.
+    out of totals."""
 
-    tool_change   : M6, with stopping the spindle, and of plotters another pen
-    spindle_start : M3 and M4, until the spindle turns as it should
-    spindle_stop  : M5, and the stop before it turns the other way
-    m_code        : every other M code that `m_codes` does not name
-    m_codes       : of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a
-                    person
-    """
-
-    tool_change: NotNegative | None = None
-    spindle_start: NotNegative | None = None
-    spindle_stop: NotNegative | None = None
-    m_code: NotNegative | None = None
+    tool_change: NotNegative | None = None  # M6, with stopping the spindle, and of plotters another pen
+    spindle_start: NotNegative | None = None  # M3 and M4, until the spindle turns as it should
+    spindle_stop: NotNegative | None = None  # M5, and the stop before it turns the other way
+    m_code: NotNegative | None = None  # every other M code that `m_codes` does not name
+    # of single codes, such as {"M8": 0.5}; M0, M1 and M60 too, which otherwise wait for a person
     m_codes: dict[str, NotNegative] = {}
 
     @field_validator("m_codes")
@@ -170,22 +163,16 @@ class DialectData(Record):
 
 class ControlData(Record):
     """The settings of the control's own planner, for predictions of how long it takes
-    (controls/export/models.py); None for its default.
+    (controls/export/models.py); None for its default."""
 
-    name                   : of the control; the other keys count for programs that are written for it
-    acceleration           : largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204
-    square_corner_velocity : of Klipper, speed at a corner of 90 degrees [mm/s]
-    minimum_cruise_ratio   : of Klipper [-], the share of the way that is not to be sped up and braked on
-    junction_deviation     : of grbl ($11) and Marlin (M205 J) [mm]
-    corner_jump            : of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have
-                             [mm/s]
-    """
-
+    # of the control; the other keys count for programs that are written for it
     name: Literal["grbl", "klipper", "marlin", "reprapfirmware", "linuxcnc"]
-    acceleration: Positive | None = None
-    square_corner_velocity: NotNegative | None = None
+    acceleration: Positive | None = None  # largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204
+    square_corner_velocity: NotNegative | None = None  # of Klipper, speed at a corner of 90 degrees [mm/s]
+    # of Klipper [-], the share of the way that is not to be sped up and braked on
     minimum_cruise_ratio: Annotated[float, Field(ge=0, lt=1)] | None = None
-    junction_deviation: NotNegative | None = None
+    junction_deviation: NotNegative | None = None  # of grbl ($11) and Marlin (M205 J) [mm]
+    # of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have [mm/s]
     corner_jump: dict[str, Positive] = {}
 
 

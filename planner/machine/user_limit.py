@@ -69,15 +69,11 @@ class Place:
 
 
 class OwnLimit(Protocol):
-    """The protocol of a limit, for planner and judge.
+    """The protocol of a limit, for planner and judge."""
 
-    name  : what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
-    unit  : of q
-    turn  : what q may jump by because it starts again, 2 pi for an angle of arctan2; None if it does not
-    """
-
-    name: str
-    unit: str
+    name: str  # what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
+    unit: str  # of q
+    # what q may jump by because it starts again, 2 pi for an angle of arctan2; None if it does not
     turn: float | None
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:

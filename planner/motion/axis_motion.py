@@ -38,30 +38,18 @@ GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisMotion:
     """L pieces of constant jerk over A axes; a standstill is a piece without velocity. After the last piece
-    everything is at rest.
+    everything is at rest."""
 
-    axes         : axis letters
-    t            : (L,) start of each piece [s], non-decreasing; the first is 0
-    position     : (L, A) there [mm]
-    velocity     : (L, A) just after t [mm/s]
-    acceleration : (L, A) just after t [mm/s2]
-    jerk         : (L, A) on the piece [mm/s3]
-    block        : (L,) index of the program's block
-    line         : (L,) source line of that block
-    end          : end of the last piece [s]
-    radius       : at which the angles of rotary axes are lengths [mm]
-    """
-
-    axes: tuple[str, ...]
-    t: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    block: Array
-    line: Array
-    end: float
-    radius: float = 1.0
+    axes: tuple[str, ...]  # axis letters
+    t: FloatArray  # (L,) start of each piece [s], non-decreasing; the first is 0
+    position: FloatArray  # (L, A) there [mm]
+    velocity: FloatArray  # (L, A) just after t [mm/s]
+    acceleration: FloatArray  # (L, A) just after t [mm/s2]
+    jerk: FloatArray  # (L, A) on the piece [mm/s3]
+    block: Array  # (L,) index of the program's block
+    line: Array  # (L,) source line of that block
+    end: float  # end of the last piece [s]
+    radius: float = 1.0  # at which the angles of rotary axes are lengths [mm]
 
     def __post_init__(self) -> None:
         pieces, axes = len(self.t), len(self.axes)

@@ -44,12 +44,10 @@ PERIOD_ROUNDING = 1e-9
 class Filters:
     """Moving averages in series.
 
-    times : their lengths [s]
-
     Raises InputError unless there is one at least, and all are positive and finite.
     """
 
-    times: tuple[float, ...]
+    times: tuple[float, ...]  # their lengths [s]
 
     def __post_init__(self) -> None:
         if not self.times or not all(0 < T < np.inf for T in self.times):

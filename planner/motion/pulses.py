@@ -37,22 +37,14 @@ TIME_ROUNDING = 1e-13  # of a period: where a pulse is on it [-]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisPulses:
-    """The n pulses of one axis over a trajectory of T samples.
+    """The n pulses of one axis over a trajectory of T samples."""
 
-    axis       : its letter
-    steps      : pulses per mm (rotary axes: per degree)
-    time       : (n,) when each pulse is sent [s], non-decreasing
-    direction  : (n,) +1 or -1
-    line       : (n,) source line of the NC program
-    per_period : (T-1,) pulses between two samples, up minus down
-    """
-
-    axis: str
-    steps: float
-    time: FloatArray
-    direction: Array
-    line: Array
-    per_period: Array
+    axis: str  # its letter
+    steps: float  # pulses per mm (rotary axes: per degree)
+    time: FloatArray  # (n,) when each pulse is sent [s], non-decreasing
+    direction: Array  # (n,) +1 or -1
+    line: Array  # (n,) source line of the NC program
+    per_period: Array  # (T-1,) pulses between two samples, up minus down
 
     def __post_init__(self) -> None:
         pulses = len(self.time)
@@ -85,14 +77,11 @@ class AxisPulses:
 class Drive:
     """The limits of the drives' inputs.
 
-    frequency_max : pulses per second [Hz]; None for no limit
-    width         : shortest time that the step signal has to be high, and low, for each pulse [s]; None for
-                    no limit
-
     Raises InputError unless they are positive and finite.
     """
 
-    frequency_max: float | None = None
+    frequency_max: float | None = None  # pulses per second [Hz]; None for no limit
+    # shortest time that the step signal has to be high, and low, for each pulse [s]; None for no limit
     width: float | None = None
 
     def __post_init__(self) -> None:

@@ -39,14 +39,10 @@ from planner.motion.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shaper:
-    """n delayed copies of a motion (module text).
+    """n delayed copies of a motion (module text)."""
 
-    delay  : (n,) t_i [s], ascending from 0
-    weight : (n,) A_i [-], positive, of sum 1
-    """
-
-    delay: FloatArray
-    weight: FloatArray
+    delay: FloatArray  # (n,) t_i [s], ascending from 0
+    weight: FloatArray  # (n,) A_i [-], positive, of sum 1
 
     def __post_init__(self) -> None:
         copies = len(self.delay)

@@ -49,22 +49,14 @@ STEPS, SETTLED = 60, 4e-16
 
 
 class Place(NamedTuple):
-    """Where a motion is run slower.
+    """Where a motion is run slower."""
 
-    begin : in the motion's own time [s]
-    end   : [s]
-    by    : d, the share by which it takes longer there [-]
-    reach : w, of what is slower before and behind [s]
-    low   : nothing is slower before this [s], >= 0: the motion rests there
-    high  : nor behind this [s]
-    """
-
-    begin: float
-    end: float
-    by: float
-    reach: float
-    low: float = 0.0
-    high: float = np.inf
+    begin: float  # in the motion's own time [s]
+    end: float  # [s]
+    by: float  # d, the share by which it takes longer there [-]
+    reach: float  # w, of what is slower before and behind [s]
+    low: float = 0.0  # nothing is slower before this [s], >= 0: the motion rests there
+    high: float = np.inf  # nor behind this [s]
 
 
 def reach(v: float, A: float, J: float) -> float:
@@ -101,16 +93,12 @@ def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, A
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Slowed:
-    """A motion run slower in places, and standing longer where it rests.
+    """A motion run slower in places, and standing longer where it rests."""
 
-    motion : as it was
-    places : where it is slower
-    stands : (n, 2) when it rests [s], at the pace it has here without these rests, and for how much longer
-             [s]; ascending
-    """
-
-    motion: MotionInTime
-    places: tuple[Place, ...]
+    motion: MotionInTime  # as it was
+    places: tuple[Place, ...]  # where it is slower
+    # (n, 2) when it rests [s], at the pace it has here without these rests, and for how much longer [s];
+    # ascending
     stands: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def _pace(self, theta: FloatArray) -> _Pace:

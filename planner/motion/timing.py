@@ -40,24 +40,15 @@ from planner.motion.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TimeLaw:
-    """s(t) in L pieces of constant jerk along the path; dwells are pieces without motion.
+    """s(t) in L pieces of constant jerk along the path; dwells are pieces without motion."""
 
-    t       : (L,) start of each piece [s], non-decreasing
-    s       : (L,) arc length there [mm]
-    feed    : (L,) ds/dt there
-    acc_s   : (L,) d2s/dt2 just after t
-    jerk_s  : (L,) d3s/dt3 on the piece
-    run     : (L,) which piece of the path, between full stops, it belongs to
-    end     : end of the last piece [s]
-    """
-
-    t: FloatArray
-    s: FloatArray
-    feed: FloatArray
-    acc_s: FloatArray
-    jerk_s: FloatArray
-    run: Array
-    end: float
+    t: FloatArray  # (L,) start of each piece [s], non-decreasing
+    s: FloatArray  # (L,) arc length there [mm]
+    feed: FloatArray  # (L,) ds/dt there
+    acc_s: FloatArray  # (L,) d2s/dt2 just after t
+    jerk_s: FloatArray  # (L,) d3s/dt3 on the piece
+    run: Array  # (L,) which piece of the path, between full stops, it belongs to
+    end: float  # end of the last piece [s]
 
     def __post_init__(self) -> None:
         pieces = len(self.t)

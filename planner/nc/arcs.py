@@ -56,17 +56,12 @@ class Arc:
 
 
 class ArcWay(NamedTuple):
-    """How an arc leads from its start to its end.
+    """How an arc leads from its start to its end."""
 
-    normal : index of the axis normal to its plane
-    turns  : 1 for less than a full turn, one more for every further turn
-    unit   : mm per programmed length unit, which decides how far start and end may be off one circle
-    """
-
-    normal: int
+    normal: int  # index of the axis normal to its plane
     clockwise: bool
-    turns: int
-    unit: float
+    turns: int  # 1 for less than a full turn, one more for every further turn
+    unit: float  # mm per programmed length unit, which decides how far start and end may be off one circle
 
 
 def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> Arc:

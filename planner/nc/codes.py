@@ -12,14 +12,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Refusal:
-    """A construct that is not read: what it is, and what to do.
-
-    takes_axes : the axis words beside it are its own and must not be read as a move
-    """
+    """A construct that is not read: what it is, and what to do."""
 
     what: str
     remedy: str
-    takes_axes: bool = False
+    takes_axes: bool = False  # the axis words beside it are its own and must not be read as a move
 
     def __str__(self) -> str:
         return f"{self.what} not supported; {self.remedy}"

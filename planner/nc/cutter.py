@@ -54,21 +54,14 @@ class CutterFault(ValueError):
 
 @dataclass
 class _Open:
-    """The last move, whose end the next corner may move.
-
-    row   : its block, or, once it is fixed, that of the first move along the normal after it, or -1
-    arc   : its row among the arcs, or -1
-    begin : where the tool begins it
-    sweep : of an arc, as it is now
-    fixed : its end is not moved any more
-    """
+    """The last move, whose end the next corner may move."""
 
     side: OffsetMove
-    row: int
-    arc: int
-    begin: complex
-    sweep: float = 0.0
-    fixed: bool = False
+    row: int  # its block, or, once it is fixed, that of the first move along the normal after it, or -1
+    arc: int  # its row among the arcs, or -1
+    begin: complex  # where the tool begins it
+    sweep: float = 0.0  # of an arc, as it is now
+    fixed: bool = False  # its end is not moved any more
 
 
 class Cutter:

@@ -48,30 +48,19 @@ STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which mus
 @dataclass(frozen=True)
 class Hole:
     """A hole in programmed coordinates and units: in the plane (a, b), along its normal c. (Pecks are counted
-    in programmed units, so that decimal fractions of an inch add up as they do in the control.)
+    in programmed units, so that decimal fractions of an inch add up as they do in the control.)"""
 
-    code    : tenths of the G code
-    place   : (a, b)
-    bottom  : c of its depth
-    clear   : c of R
-    retract : c after it
-    peck    : Q;  dwell : P [s]
-    beside  : (a, b) offset of G87;  counterbore : c of its K
-    turning : of the spindle, 1 or -1
-    unit    : of length [mm]
-    """
-
-    code: int
-    place: tuple[float, float]
-    bottom: float
-    clear: float
-    retract: float
-    peck: float = 0.0
+    code: int  # tenths of the G code
+    place: tuple[float, float]  # (a, b)
+    bottom: float  # c of its depth
+    clear: float  # c of R
+    retract: float  # c after it
+    peck: float = 0.0  # Q;  dwell : P [s]
     dwell: float = 0.0
-    beside: tuple[float, float] = (0.0, 0.0)
+    beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87;  counterbore : c of its K
     counterbore: float = 0.0
-    turning: int = 1
-    unit: float = 1.0
+    turning: int = 1  # of the spindle, 1 or -1
+    unit: float = 1.0  # of length [mm]
 
 
 @dataclass(frozen=True)

@@ -21,23 +21,16 @@ def _zeros() -> FloatArray:
 
 @dataclass(slots=True)
 class ExtraAxes:
-    """Further axes, arrays (6,) in the order of `LETTERS`, in degrees and mm.
+    """Further axes, arrays (6,) in the order of `LETTERS`, in degrees and mm."""
 
-    letters  : those that the machine has and that are read
-    wrapped  : those of them that are wrapped
-    position : in machine coordinates
-    origins  : of work systems, by code
-    g92, g92_saved : the G92 offset, and what G92.3 brings back
-    homes    : positions of G28 (280) and G30 (300)
-    """
-
-    letters: str = ""
-    wrapped: str = ""
-    position: FloatArray = field(default_factory=_zeros)
-    origins: dict[int, FloatArray] = field(default_factory=dict)
+    letters: str = ""  # those that the machine has and that are read
+    wrapped: str = ""  # those of them that are wrapped
+    position: FloatArray = field(default_factory=_zeros)  # in machine coordinates
+    origins: dict[int, FloatArray] = field(default_factory=dict)  # of work systems, by code
+    # g92 and g92_saved: the G92 offset, and what G92.3 brings back
     g92: FloatArray = field(default_factory=_zeros)
     g92_saved: FloatArray = field(default_factory=_zeros)
-    homes: dict[int, FloatArray] = field(default_factory=dict)
+    homes: dict[int, FloatArray] = field(default_factory=dict)  # positions of G28 (280) and G30 (300)
 
     @property
     def columns(self) -> list[int]:

@@ -77,12 +77,9 @@ INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 
 @dataclass(frozen=True)
 class Integers:
-    """The meaning of numbers without a point.
+    """The meaning of numbers without a point."""
 
-    increment : of lengths [mm], or None: they are whole units
-    """
-
-    increment: float | None = None
+    increment: float | None = None  # of lengths [mm], or None: they are whole units
 
     def scale(self, words: Words) -> FloatArray:
         """(R,) what a length without a point is multiplied by on each row."""

@@ -47,23 +47,18 @@ class ThreadFault(ValueError):
 
 @dataclass(frozen=True)
 class LatheThread:
-    """A thread; lengths in mm, x as radii.
+    """A thread; lengths in mm, x as radii."""
 
-    start, end : (z, x) where the tool stands, and the root at the thread's end
-    height     : k, from the crest to the root;  first : d;  least : d_min;  finish : r
-    lead       : of a turn, along the longer of z and x
-    springs    : how often the full depth is cut
-    angle      : of the tool [degrees];  taper : i, x at the beginning less x at the end;  chamfer : g
-    """
-
+    # start and end: (z, x) where the tool stands, and the root at the thread's end
     start: complex
     end: complex
-    height: float
+    height: float  # k, from the crest to the root;  first : d;  least : d_min;  finish : r
     first: float
-    lead: float
+    lead: float  # of a turn, along the longer of z and x
     least: float = 0.0
     finish: float = 0.0
-    springs: int = 1
+    springs: int = 1  # how often the full depth is cut
+    # of the tool [degrees];  taper : i, x at the beginning less x at the end;  chamfer : g
     angle: float = 0.0
     taper: float = 0.0
     chamfer: float = 0.0
@@ -138,19 +133,14 @@ def _require(thread: LatheThread) -> None:
 
 @dataclass(frozen=True)
 class Pecking:
-    """The words of G74, or with x and z exchanged of G75; lengths in mm.
+    """The words of G74, or with x and z exchanged of G75; lengths in mm."""
 
-    start, end : (z, x) where the tool stands, and the bottom of the last hole or groove
-    peck       : q, how much deeper each peck goes; inf for all at once
-    shift      : p, from one to the next along x; inf for one to the end at once
-    retract    : e;  relief : at the bottom, against the shift, at most the way of the shift
-    """
-
+    # start and end: (z, x) where the tool stands, and the bottom of the last hole or groove
     start: complex
     end: complex
-    peck: float
-    shift: float
-    retract: float
+    peck: float  # q, how much deeper each peck goes; inf for all at once
+    shift: float  # p, from one to the next along x; inf for one to the end at once
+    retract: float  # e;  relief : at the bottom, against the shift, at most the way of the shift
     relief: float = 0.0
 
 

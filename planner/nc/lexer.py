@@ -48,26 +48,17 @@ class Unreadable(IntEnum):
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Words:
     """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one
-    line many times.
+    line many times."""
 
-    letter : (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number
-             follows it
-    value  : (W,) number, as written (no unit applied)
-    at     : (W,) byte offset of the letter in `data`
-    line   : (R,) 1-based source line
-    first  : (R+1,) index of a row's first word; row r holds words first[r] ... first[r+1]-1
-    data   : the source
-    frame  : (R,) index of the call that the row stands in (`Program.frames`); 0 in the main program
-    files  : further files in `data`: where each begins, and its name, ascending
-    """
-
+    # (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number follows it
     letter: Array
-    value: FloatArray
-    at: Array
-    line: Array
-    first: Array
-    data: bytes
-    frame: Array
+    value: FloatArray  # (W,) number, as written (no unit applied)
+    at: Array  # (W,) byte offset of the letter in `data`
+    line: Array  # (R,) 1-based source line
+    first: Array  # (R+1,) index of a row's first word; row r holds words first[r] ... first[r+1]-1
+    data: bytes  # the source
+    frame: Array  # (R,) index of the call that the row stands in (`Program.frames`); 0 in the main program
+    # further files in `data`: where each begins, and its name, ascending
     files: tuple[tuple[int, str], ...] = ()
 
     def file(self, word: int) -> str:

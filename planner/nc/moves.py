@@ -54,39 +54,26 @@ class WordFault(Exception):
 
 @dataclass(slots=True)
 class Block:
-    """One line of a program.
+    """One line of a program."""
 
-    line    : 1-based source line
-    g, m    : codes in tenths by modal group
-    value   : numbers by letter, other than G, M and N
-    at      : index of the word by letter or modal group, for messages
-    ended   : the line is a "%"
-    foreign : a code that is not supported uses the line's words; no move is read from it
-    refused_motion : such a code is a motion code and stays in force
-    partial : some words were reported and left out; others may have belonged to them
-    events  : letter and number of words that move nothing and are kept, in their order
-    homing  : axes that go to their home position
-    stops   : one of `events` is a full stop
-    settings : commands that set a factor or a limit
-    own     : letters of the words that codes of the line use
-    tool_point : number of the M code that switches the tool centre point, or None
-    """
-
-    line: int
+    line: int  # 1-based source line
+    # g and m: codes in tenths by modal group
     g: dict[str, int] = field(default_factory=dict)
     m: dict[str, int] = field(default_factory=dict)
-    value: dict[str, float] = field(default_factory=dict)
+    value: dict[str, float] = field(default_factory=dict)  # numbers by letter, other than G, M and N
+    # index of the word by letter or modal group, for messages
     at: dict[str, int] = field(default_factory=dict)
-    ended: bool = False
-    foreign: bool = False
-    refused_motion: bool = False
-    partial: bool = False
+    ended: bool = False  # the line is a "%"
+    foreign: bool = False  # a code that is not supported uses the line's words; no move is read from it
+    refused_motion: bool = False  # such a code is a motion code and stays in force
+    partial: bool = False  # some words were reported and left out; others may have belonged to them
+    # letter and number of words that move nothing and are kept, in their order
     events: list[tuple[str, float]] = field(default_factory=list)
-    homing: str = ""
-    stops: bool = False
-    settings: list[Setting] = field(default_factory=list)
-    own: frozenset[str] = frozenset()
-    tool_point: int | None = None
+    homing: str = ""  # axes that go to their home position
+    stops: bool = False  # one of `events` is a full stop
+    settings: list[Setting] = field(default_factory=list)  # commands that set a factor or a limit
+    own: frozenset[str] = frozenset()  # letters of the words that codes of the line use
+    tool_point: int | None = None  # number of the M code that switches the tool centre point, or None
 
     def has(self, letters: str) -> bool:
         """True if the block has a word with one of the letters."""

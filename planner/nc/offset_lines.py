@@ -11,15 +11,12 @@ NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of
 
 @dataclass(frozen=True)
 class OffsetMove:
-    """An offset move: where it would end, its tangent there and at its start, and its line or circle.
-
-    turning : +1 counter-clockwise, -1 clockwise, 0 for a line
-    """
+    """An offset move: where it would end, its tangent there and at its start, and its line or circle."""
 
     end: complex
     first: complex  # unit tangent
     last: complex  # unit tangent
-    turning: int = 0
+    turning: int = 0  # +1 counter-clockwise, -1 clockwise, 0 for a line
     centre: complex = 0j
     radius: float = 0.0
 

@@ -61,34 +61,23 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """A call that was open while blocks were made; the main program is the first.
+    """A call that was open while blocks were made; the main program is the first."""
 
-    name   : what was called, as the program names it; empty for the main program
-    source : the file that the blocks' lines belong to
-    line   : the line of the call, in the caller's file; 0 for the main program
-    caller : index of the calling frame; -1 for the main program
-    """
-
-    name: str
-    source: str
-    line: int
-    caller: int
+    name: str  # what was called, as the program names it; empty for the main program
+    source: str  # the file that the blocks' lines belong to
+    line: int  # the line of the call, in the caller's file; 0 for the main program
+    caller: int  # index of the calling frame; -1 for the main program
 
 
 @dataclass(frozen=True, kw_only=True)
 class Expansion:
-    """Counts of the expansion of a program that computes.
+    """Counts of the expansion of a program that computes."""
 
-    dialect : whose language it is: "linuxcnc", "fanuc", "heidenhain" or "siemens"
-    calls   : subprograms in the order of their first call, and how often each was called
-    turns   : turns of loops, jumps and calls
-    rows    : lines executed, each as often as it was
-    """
-
-    dialect: str
+    dialect: str  # whose language it is: "linuxcnc", "fanuc", "heidenhain" or "siemens"
+    # subprograms in the order of their first call, and how often each was called
     calls: tuple[tuple[str, int], ...]
-    turns: int
-    rows: int
+    turns: int  # turns of loops, jumps and calls
+    rows: int  # lines executed, each as often as it was
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,17 +110,12 @@ class SetLimit:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Origins:
-    """Where programmed zero is, from block to block: K rows, one for each change.
+    """Where programmed zero is, from block to block: K rows, one for each change."""
 
-    block  : (K,) the first block that it holds for, not decreasing; of several rows of one block the last
-             holds
-    offset : (K, 3) its machine position: work offset, G92 and tool length together [mm]
-    turned : (K,) whether the work system is rotated about z, so that adding `offset` is not enough
-    """
-
+    # (K,) the first block that it holds for, not decreasing; of several rows of one block the last holds
     block: Array
-    offset: FloatArray
-    turned: Array
+    offset: FloatArray  # (K, 3) its machine position: work offset, G92 and tool length together [mm]
+    turned: Array  # (K,) whether the work system is rotated about z, so that adding `offset` is not enough
 
     def __post_init__(self) -> None:
         changes = len(self.block)
@@ -148,17 +132,13 @@ class Origins:
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
     """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the
-    program.
+    program."""
 
-    block   : (K,) block of each, not decreasing: a block has one after the other
-    points  : (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is
-              where it ends itself
-    weights : (K, 4) > 0 [-]
-    """
-
-    block: Array
+    block: Array  # (K,) block of each, not decreasing: a block has one after the other
+    # (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it
+    # ends itself
     points: FloatArray
-    weights: FloatArray
+    weights: FloatArray  # (K, 4) > 0 [-]
 
     def __post_init__(self) -> None:
         pieces, _, axes = np.shape(self.points)
@@ -326,18 +306,12 @@ class MadeWhenAsked(Sequence[One]):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EventTable(MadeWhenAsked[Event]):
-    """E events.
+    """E events."""
 
-    block  : (E,) the block before which it happens
-    line   : (E,) 1-based source line
-    letter : (E,) "S", "T", "M" or "G", as its code
-    value  : (E,) the word's number
-    """
-
-    block: Array
-    line: Array
-    letter: Array
-    value: FloatArray
+    block: Array  # (E,) the block before which it happens
+    line: Array  # (E,) 1-based source line
+    letter: Array  # (E,) "S", "T", "M" or "G", as its code
+    value: FloatArray  # (E,) the word's number
 
     def __post_init__(self) -> None:
         count = len(self.block)

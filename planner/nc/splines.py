@@ -36,25 +36,17 @@ Pieces = tuple[FloatArray, FloatArray]  # (K, 4, 3) control points [mm] and (K, 
 
 @dataclass(slots=True)
 class OpenSpline:
-    """A curve of several lines, as far as it was read.
+    """A curve of several lines, as far as it was read."""
 
-    line, word : where it begins
-    code       : NURBS or NURBS_WITH_KNOTS
-    order      : degree plus one
-    blocks     : of the program before it
-    points     : control points (3,) [mm]
-    weights    : of each [-]
-    knots      : of G6.2
-    """
-
+    # line and word: where it begins
     line: int
     word: int
-    code: int
-    order: int
-    blocks: int
-    points: list[FloatArray] = field(default_factory=list)
-    weights: list[float] = field(default_factory=list)
-    knots: list[float] = field(default_factory=list)
+    code: int  # NURBS or NURBS_WITH_KNOTS
+    order: int  # degree plus one
+    blocks: int  # of the program before it
+    points: list[FloatArray] = field(default_factory=list)  # control points (3,) [mm]
+    weights: list[float] = field(default_factory=list)  # of each [-]
+    knots: list[float] = field(default_factory=list)  # of G6.2
 
     @property
     def ended(self) -> bool:

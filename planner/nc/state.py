@@ -95,78 +95,52 @@ class CycleSeries:
 
 @dataclass(slots=True)
 class State:
-    """Modal state; starts as RS274NGC does: G21 G90 G17 G94 G40 G49 G54 G91.1 G99 G8 and no motion code.
+    """Modal state; starts as RS274NGC does: G21 G90 G17 G94 G40 G49 G54 G91.1 G99 G8 and no motion code."""
 
-    motion       : 0 ... 3, the tenths of another motion code (81 is 810), NO_MOTION or REFUSED_MOTION
-    normal       : index of the axis normal to the arc plane
-    unit         : mm per programmed length unit
-    diameters    : X words are diameters (G7)
-    feed         : [mm/s], 0 where none has been given
-    feed_factor  : by which F counts (M220), in `feed` already
-    feed_per_turn : F of G95 [mm]
-    feed_unit    : mm per programmed length unit when the feed was given
-    tolerance    : P of G64 [mm], NaN where none
-    position     : (3,) machine position [mm]
-    offset       : (3,) machine position of the programmed zero, without rotation [mm]
-    rotated      : whether the work system in force is rotated
-    g92_saved    : what G92.3 brings back [mm]
-    tool_offset  : (3,) in force (G43) [mm]
-    systems      : work systems by code (54 is 540, 54.1 P3 is 54103)
-    homes        : (3,) machine positions of G28 (280) and G30 (300) [mm]
-    tools        : by number
-    to_level     : canned cycles retract to the level before them (G98), not to R (G99)
-    retract_given : a G98 or G99 was read
-    series       : canned cycles in force
-    cycle_dwell  : the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
-    actual       : (3,) where the tool is instead of at `position`, which cutter radius compensation moves it
-                   from; or None
-    strict       : nothing is assumed (`Reading.strict`)
-    fanuc        : G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
-    seconds_meant : the unit of dwells is known
-    plane_known  : G17, G18 or G19 was read, or the control starts with G17
-    change_timed : how long a tool change takes is known
-    in_thread    : the last block was cut in step with the spindle
-    further      : axes beside x, y and z
-    """
-
+    # 0 ... 3, the tenths of another motion code (81 is 810), NO_MOTION or REFUSED_MOTION
     motion: int = NO_MOTION
-    normal: int = 2
-    unit: float = 1.0
+    normal: int = 2  # index of the axis normal to the arc plane
+    unit: float = 1.0  # mm per programmed length unit
     absolute: bool = True
     absolute_centre: bool = False
-    diameters: bool = False
-    feed: float = 0.0
-    feed_factor: float = 1.0
+    diameters: bool = False  # X words are diameters (G7)
+    feed: float = 0.0  # [mm/s], 0 where none has been given
+    feed_factor: float = 1.0  # by which F counts (M220), in `feed` already
     feed_mode: FeedMode = "per minute"
-    feed_per_turn: float = 0.0
-    feed_unit: float = 1.0
+    feed_per_turn: float = 0.0  # F of G95 [mm]
+    feed_unit: float = 1.0  # mm per programmed length unit when the feed was given
     spindle: Spindle = field(default_factory=Spindle)
     path_control: PathControl = PathControl.BLEND
-    tolerance: float = np.nan
-    position: FloatArray = field(default_factory=lambda: np.zeros(3))
+    tolerance: float = np.nan  # P of G64 [mm], NaN where none
+    position: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,) machine position [mm]
+    # (3,) machine position of the programmed zero, without rotation [mm]
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
-    rotated: bool = False
+    rotated: bool = False  # whether the work system in force is rotated
     system: int = 540
+    # work systems by code (54 is 540, 54.1 P3 is 54103)
     systems: dict[int, System] = field(default_factory=dict)
     g92: FloatArray = field(default_factory=lambda: np.zeros(3))
-    g92_saved: FloatArray = field(default_factory=lambda: np.zeros(3))
+    g92_saved: FloatArray = field(default_factory=lambda: np.zeros(3))  # what G92.3 brings back [mm]
+    # (3,) machine positions of G28 (280) and G30 (300) [mm]
     homes: dict[int, FloatArray] = field(default_factory=dict)
-    tools: dict[int, Tool] = field(default_factory=dict)
-    tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))
+    tools: dict[int, Tool] = field(default_factory=dict)  # by number
+    tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,) in force (G43) [mm]
     tool_selected: int = 0
     tool_loaded: int = 0
-    to_level: bool = False
-    retract_given: bool = False
-    series: CycleSeries | None = None
+    to_level: bool = False  # canned cycles retract to the level before them (G98), not to R (G99)
+    retract_given: bool = False  # a G98 or G99 was read
+    series: CycleSeries | None = None  # canned cycles in force
+    # the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     cycle_dwell: float = 0.0
+    # (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     actual: FloatArray | None = None
-    change_timed: bool = False
-    in_thread: bool = False
-    strict: bool = False
-    fanuc: bool = False
-    seconds_meant: bool = False
-    plane_known: bool = True
-    further: ExtraAxes = field(default_factory=ExtraAxes)
+    change_timed: bool = False  # how long a tool change takes is known
+    in_thread: bool = False  # the last block was cut in step with the spindle
+    strict: bool = False  # nothing is assumed (`Reading.strict`)
+    fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
+    seconds_meant: bool = False  # the unit of dwells is known
+    plane_known: bool = True  # G17, G18 or G19 was read, or the control starts with G17
+    further: ExtraAxes = field(default_factory=ExtraAxes)  # axes beside x, y and z
 
     @property
     def letters(self) -> str:

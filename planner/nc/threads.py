@@ -47,23 +47,20 @@ _ENTRY, _END = 1, 2  # bits of L
 
 @dataclass(frozen=True)
 class Thread:
-    """A thread in programmed coordinates and units, x and depths as radii.
+    """A thread in programmed coordinates and units, x and depths as radii."""
 
-    start, end  : (x, z) of the drive line and z of its end
-    peak        : I, from the drive line to the thread's peak;  depth : K;  first : J;  degression : R;  angle : Q [degrees]
-    pitch       : P
-    taper       : E;  tapered : L;  springs : H
-    """
-
+    # start and end: (x, z) of the drive line and z of its end
     start: tuple[float, float]
     end: float
+    # I, from the drive line to the thread's peak;  depth : K;  first : J;  degression : R;  angle : Q
+    # [degrees]
     peak: float
     depth: float
     first: float
-    pitch: float
+    pitch: float  # P
     degression: float = 1.0
     angle: float = 0.0
-    taper: float = 0.0
+    taper: float = 0.0  # E;  tapered : L;  springs : H
     tapered: int = 0
     springs: int = 0
 

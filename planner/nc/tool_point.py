@@ -61,14 +61,10 @@ class Switch(NamedTuple):
 
 @dataclass
 class ToolPointSwitch:
-    """Follows the switch through a program; does nothing on machines without kinematics.
+    """Follows the switch through a program; does nothing on machines without kinematics."""
 
-    chain    : kinematics of the machine, or None
-    switches : so far
-    """
-
-    chain: Chain | None
-    switches: list[Switch] = dataclasses.field(default_factory=list)
+    chain: Chain | None  # kinematics of the machine, or None
+    switches: list[Switch] = dataclasses.field(default_factory=list)  # so far
 
     @classmethod
     def of(cls, machine: Machine | None) -> ToolPointSwitch:

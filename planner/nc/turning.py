@@ -69,17 +69,12 @@ class TurningStep:
 
 @dataclass(frozen=True)
 class Roughing:
-    """How much a pass of G71 or G72 takes.
+    """How much a pass of G71 or G72 takes."""
 
-    depth     : of a pass [mm]
-    retract   : e, by which the tool leaves each pass in x and z [mm]
-    allowance : left for G70, w + i u / 2 [mm]
-    more      : left by the passes beside it, and taken off by the last one along the profile, k + i i [mm]
-    """
-
-    depth: float
-    retract: float
-    allowance: complex
+    depth: float  # of a pass [mm]
+    retract: float  # e, by which the tool leaves each pass in x and z [mm]
+    allowance: complex  # left for G70, w + i u / 2 [mm]
+    # left by the passes beside it, and taken off by the last one along the profile, k + i i [mm]
     more: complex = 0j
 
 

@@ -101,16 +101,13 @@ class _FeedModes(NamedTuple):
 
 
 class _New(NamedTuple):
-    """Feeds to write on the rows (n,) of feed moves.
-
-    wanted, programmed : (n,) feeds in each row's units; wanted is NaN where the programmed one holds
-    often              : (n,) runs per minute, under G93; NaN for a feed
-    """
+    """Feeds to write on the rows (n,) of feed moves."""
 
     row: Array
+    # wanted and programmed: (n,) feeds in each row's units; wanted is NaN where the programmed one holds
     wanted: FloatArray
     programmed: FloatArray
-    often: FloatArray
+    often: FloatArray  # (n,) runs per minute, under G93; NaN for a feed
 
 
 def _feed_mode(words: Words) -> _FeedModes:

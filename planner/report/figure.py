@@ -66,21 +66,16 @@ FLAT = 0.12  # third extent over the largest below which a path is seen along it
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """A line of a panel.
-
-    column : its numbers, in `unit` once times `scale`
-    limit  : what they are held against in that unit; NaN where there is none
-    before : of the column that it is drawn over, before its name in `AGAINST`
-    """
+    """A line of a panel."""
 
     name: str
-    column: str
+    column: str  # its numbers, in `unit` once times `scale`
     unit: str
     colour: str
     dashed: bool = False
     scale: float = 1.0
-    limit: float = math.nan
-    before: str = ""
+    limit: float = math.nan  # what they are held against in that unit; NaN where there is none
+    before: str = ""  # of the column that it is drawn over, before its name in `AGAINST`
 
 
 @dataclass(frozen=True, kw_only=True)

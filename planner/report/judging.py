@@ -26,16 +26,13 @@ KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs th
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Judgement:
-    """A motion with the axes of a program, what it was judged by, and the verdict.
-
-    notes : what was done to the axes, one sentence each
-    """
+    """A motion with the axes of a program, what it was judged by, and the verdict."""
 
     motion: Trajectory
     toolpath: Toolpath
     machine: Machine
     verdict: Verdict
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was done to the axes, one sentence each
 
 
 def judge(
@@ -75,23 +72,15 @@ def judge(
 @dataclass(frozen=True, kw_only=True)
 class FileSays:
     """The metadata of a trajectory file. It is used where nobody says otherwise, always reported, and never a
-    reason to pass.
+    reason to pass."""
 
-    machine     : its machine, as in a machine file, or None
-    tolerance   : the tolerance it was planned with [mm], or None
-    not_limited : quantities that its plan did not limit
-    reading     : how its program was read
-    program     : the file of its program; "<text>" and the like where it had none; None where the file does
-                  not say
-    wrong       : names of entries that no plan writes so
-    """
-
-    machine: dict[str, Any] | None
-    tolerance: float | None
-    not_limited: tuple[str, ...]
-    reading: Reading = AS_USUAL
+    machine: dict[str, Any] | None  # its machine, as in a machine file, or None
+    tolerance: float | None  # the tolerance it was planned with [mm], or None
+    not_limited: tuple[str, ...]  # quantities that its plan did not limit
+    reading: Reading = AS_USUAL  # how its program was read
+    # the file of its program; "<text>" and the like where it had none; None where the file does not say
     program: str | None = None
-    wrong: tuple[str, ...] = ()
+    wrong: tuple[str, ...] = ()  # names of entries that no plan writes so
 
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> FileSays:

@@ -47,18 +47,12 @@ NUMBER_MAX = 2.0**31 - 1.0  # of a line or a block
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrajectoryFile:
-    """A trajectory as it was read from a file.
+    """A trajectory as it was read from a file."""
 
-    trajectory : the samples
-    given      : which columns the file had, and with how many digits
-    metadata   : what the file says about itself; empty for files made elsewhere
-    notes      : columns that the file lacks and how they were filled, one sentence each
-    """
-
-    trajectory: Trajectory
-    given: Given
-    metadata: dict[str, Any]
-    notes: tuple[str, ...]
+    trajectory: Trajectory  # the samples
+    given: Given  # which columns the file had, and with how many digits
+    metadata: dict[str, Any]  # what the file says about itself; empty for files made elsewhere
+    notes: tuple[str, ...]  # columns that the file lacks and how they were filled, one sentence each
 
 
 def trajectory_file(path: Path) -> Path:

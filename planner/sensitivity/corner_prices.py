@@ -60,18 +60,13 @@ BUDGETS = (
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerPrices:
-    """The prices of the R+1 corners of a path, by the cycle time T.
-
-    size    : (R+1,) dT/d(d), d the tangent length [s/mm]
-    budget  : (R+1,) dT/d(ln budget) of the chord and filter errors [s]
-    segment : (M,) the same of the budgets of segments between corners [s]
-    """
+    """The prices of the R+1 corners of a path, by the cycle time T."""
 
     path: SmoothPath
     machine: Machine
-    size: FloatArray
-    budget: FloatArray
-    segment: FloatArray
+    size: FloatArray  # (R+1,) dT/d(d), d the tangent length [s/mm]
+    budget: FloatArray  # (R+1,) dT/d(ln budget) of the chord and filter errors [s]
+    segment: FloatArray  # (M,) the same of the budgets of segments between corners [s]
 
     def by_acceleration(self, axis: str) -> float:
         """dT/d(ln acceleration) of an axis, as far as it acts through sizes and budgets of the corners

@@ -54,14 +54,10 @@ CHORDS = 0.2  # what chords between samples may use of the tolerance before what
 
 
 class SitePrices(NamedTuple):
-    """The prices of the corridor of splines at J sites.
+    """The prices of the corridor of splines at J sites."""
 
-    place : (J,) along the legs [mm]
-    price : (J,) dT/d(tolerance) there [s/mm]
-    """
-
-    place: FloatArray
-    price: FloatArray
+    place: FloatArray  # (J,) along the legs [mm]
+    price: FloatArray  # (J,) dT/d(tolerance) there [s/mm]
 
 
 def path_prices(

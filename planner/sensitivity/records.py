@@ -17,27 +17,19 @@ PRICES_SHOWN = 4  # of a price list, in a line
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerTable:
-    """One row for each rounded corner, in the order of the path.
+    """One row for each rounded corner, in the order of the path."""
 
-    line             : (C,) NC line of the block that ends at the corner
-    theta            : (C,) turning angle [rad]
-    d_in, d_out      : (C,) tangent lengths before and after the vertex [mm]
-    tol_ap           : (C,) part of the tolerance that the rounding uses, eps_ap [mm]
-    kappa_max        : (C,) curvature at the apex [1/mm]
-    feed_closed_form : (C,) speed by error allocation, eq. 19 with the curvature of this corner [mm/s]
-    feed_planned     : (C,) planned speed at the apex [mm/s]
-    limited_by       : (C,) name of the constraint that is closest to its limit there
-    """
-
-    line: Array
-    theta: FloatArray
+    line: Array  # (C,) NC line of the block that ends at the corner
+    theta: FloatArray  # (C,) turning angle [rad]
+    # d_in and d_out: (C,) tangent lengths before and after the vertex [mm]
     d_in: FloatArray
     d_out: FloatArray
-    tol_ap: FloatArray
-    kappa_max: FloatArray
+    tol_ap: FloatArray  # (C,) part of the tolerance that the rounding uses, eps_ap [mm]
+    kappa_max: FloatArray  # (C,) curvature at the apex [1/mm]
+    # (C,) speed by error allocation, eq. 19 with the curvature of this corner [mm/s]
     feed_closed_form: FloatArray
-    feed_planned: FloatArray
-    limited_by: Array
+    feed_planned: FloatArray  # (C,) planned speed at the apex [mm/s]
+    limited_by: Array  # (C,) name of the constraint that is closest to its limit there
 
     def __post_init__(self) -> None:
         corners = len(self.line)
@@ -92,20 +84,13 @@ class GridHistory:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DearCorners:
-    """The corners where more tolerance saves most, the largest saving first.
+    """The corners where more tolerance saves most, the largest saving first."""
 
-    line     : (C,) NC line of the block that ends at the corner
-    position : (C, A) vertex [mm]
-    theta    : (C,) turning angle [rad]
-    price    : (C,) dT/d(tolerance at that corner alone) [s/mm]
-    saved    : (C,) time saved by `MORE_TOLERANCE` there [s]
-    """
-
-    line: Array
-    position: FloatArray
-    theta: FloatArray
-    price: FloatArray
-    saved: FloatArray
+    line: Array  # (C,) NC line of the block that ends at the corner
+    position: FloatArray  # (C, A) vertex [mm]
+    theta: FloatArray  # (C,) turning angle [rad]
+    price: FloatArray  # (C,) dT/d(tolerance at that corner alone) [s/mm]
+    saved: FloatArray  # (C,) time saved by `MORE_TOLERANCE` there [s]
 
     def __post_init__(self) -> None:
         corners = len(self.line)

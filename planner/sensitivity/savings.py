@@ -33,16 +33,11 @@ SOLVER = JerkLimited(tol=1e-5)  # with a gap a tenth of the usual one: differenc
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Change:
-    """More of something, as functions of the share that is added [-].
+    """More of something, as functions of the share that is added [-]."""
 
-    machine   : share -> the machine with so much more
-    feed      : share -> factor on the programmed feed [-]
-    tolerance : share -> what is added to the tolerance [mm]
-    """
-
-    machine: Callable[[float], Machine]
-    feed: Callable[[float], float] = lambda share: 1.0
-    tolerance: Callable[[float], float] = lambda share: 0.0
+    machine: Callable[[float], Machine]  # share -> the machine with so much more
+    feed: Callable[[float], float] = lambda share: 1.0  # share -> factor on the programmed feed [-]
+    tolerance: Callable[[float], float] = lambda share: 0.0  # share -> what is added to the tolerance [mm]
 
 
 def solved_again(

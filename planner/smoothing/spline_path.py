@@ -31,22 +31,18 @@ RELATIVE_GAP = 0.1
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class SplineShape:
-    """The splines of a path with what is needed to change their shape within the tolerance.
+    """The splines of a path with what is needed to change their shape within the tolerance."""
 
-    runs, corridor, splines : what the splines replace, the corridor along which they are laid, and the
-                              splines
-    left       : (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm];
-                 negative where a run has none
-    reserve    : the part of the tolerance that it leaves to chord and filter errors [mm]
-    used       : (J,) radius that each site may use [mm]
-    """
-
+    # runs, corridor and splines: what the splines replace, the corridor along which they are laid, and the
+    # splines
     runs: SplineRuns
     corridor: Corridor
     splines: Splines
+    # (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where
+    # a run has none
     left: FloatArray
-    reserve: float
-    used: FloatArray
+    reserve: float  # the part of the tolerance that it leaves to chord and filter errors [mm]
+    used: FloatArray  # (J,) radius that each site may use [mm]
 
 
 def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None = None) -> SplineShape:

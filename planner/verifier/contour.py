@@ -33,16 +33,11 @@ VISITS_MAX = 3e8  # samples times pieces within reach that are looked at for a n
 
 @dataclass(frozen=True)
 class Apart:
-    """The readings that measure the distance of motion and path.
+    """The readings that measure the distance of motion and path."""
 
-    readings   : the readings
-    pieces  : the path with its own budgets
-    widened : their budgets were so many times those of `pieces`
-    """
-
-    readings: list[Observed]
-    pieces: ProgramPieces
-    widened: float = 1.0
+    readings: list[Observed]  # the readings
+    pieces: ProgramPieces  # the path with its own budgets
+    widened: float = 1.0  # their budgets were so many times those of `pieces`
 
     @property
     def fits(self) -> bool:

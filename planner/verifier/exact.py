@@ -73,13 +73,10 @@ def exact_faults(
 
 @dataclass
 class _Worst:
-    """The sample that is farthest from the exact ones of some pieces: its distance [mm], time [s] and piece.
-
-    exact : (N,) True for pieces that count
-    """
+    """The sample that is farthest from the exact ones of some pieces: its distance [mm], time [s] and piece."""
 
     pieces: ProgramPieces
-    exact: Array
+    exact: Array  # (N,) True for pieces that count
     apart: float = 0.0
     time: float = 0.0
     piece: int = 0

@@ -91,24 +91,16 @@ SPANS_MAX = 20_000  # of a reading; a motion with more is broken everywhere
 
 @dataclass(frozen=True, kw_only=True)
 class Excess:
-    """A span of time in which a motion exceeds a limit or the tolerance.
+    """A span of time in which a motion exceeds a limit or the tolerance."""
 
-    kind  : what the fault is about
-    name  : the quantity: "jerk", "feed", "contour", "eq. 18", ...; of limits of one's own "velocity.NAME"
-    begin : when it is first seen [s]
-    end   : when it is last seen [s]
-    ratio : the largest value over what is allowed [-], > 1
-    power : a motion that is f times slower there has 1/f^power of it
-    still : share of what is allowed that does not get less: the path's own error [-]
-    """
-
-    kind: Kind
+    kind: Kind  # what the fault is about
+    # the quantity: "jerk", "feed", "contour", "eq. 18", ...; of limits of one's own "velocity.NAME"
     name: str
-    begin: float
-    end: float
-    ratio: float
-    power: int
-    still: float = 0.0
+    begin: float  # when it is first seen [s]
+    end: float  # when it is last seen [s]
+    ratio: float  # the largest value over what is allowed [-], > 1
+    power: int  # a motion that is f times slower there has 1/f^power of it
+    still: float = 0.0  # share of what is allowed that does not get less: the path's own error [-]
 
     @property
     def slower(self) -> float:
@@ -121,12 +113,9 @@ class Excess:
 
 @dataclass
 class Spans:
-    """Spans of consecutive samples above a limit, as they are read.
+    """Spans of consecutive samples above a limit, as they are read."""
 
-    column : which quantity each is of (`NAMES`)
-    """
-
-    column: list[int] = field(default_factory=list)
+    column: list[int] = field(default_factory=list)  # which quantity each is of (`NAMES`)
     begin: list[float] = field(default_factory=list)
     end: list[float] = field(default_factory=list)
     ratio: list[float] = field(default_factory=list)

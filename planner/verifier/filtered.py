@@ -163,16 +163,11 @@ def bow_share(machine: Machine | None = None) -> float:
 
 
 class At(NamedTuple):
-    """The signal at T times.
+    """The signal at T times."""
 
-    place  : (T, A) less the origin [mm]
-    area   : (T, A) integral of that from the first setpoint kept [mm s]
-    origin : (A,) [mm]
-    """
-
-    place: FloatArray
-    area: FloatArray
-    origin: FloatArray
+    place: FloatArray  # (T, A) less the origin [mm]
+    area: FloatArray  # (T, A) integral of that from the first setpoint kept [mm s]
+    origin: FloatArray  # (A,) [mm]
 
 
 class Signal:

@@ -43,19 +43,14 @@ STATE = 3  # numbers of a state
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ringing:
-    """The ringing of one mode on every axis.
+    """The ringing of one mode on every axis."""
 
-    frequency, damping : the mode's [Hz], [-]
-    axes               : their letters
-    during             : (A,) largest deflection while the setpoints move [mm], rotary axes [rad]
-    after              : (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary
-                         axes [rad]
-    """
-
+    # frequency and damping: the mode's [Hz], [-]
     frequency: float
     damping: float
-    axes: tuple[str, ...]
-    during: FloatArray
+    axes: tuple[str, ...]  # their letters
+    during: FloatArray  # (A,) largest deflection while the setpoints move [mm], rotary axes [rad]
+    # (A,) amplitude with which it still rings at the end of the setpoints [mm], rotary axes [rad]
     after: FloatArray
 
     def __post_init__(self) -> None:

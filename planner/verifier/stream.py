@@ -32,26 +32,20 @@ COLUMNS = ("t", "position", *DERIVATIVES)
 
 @dataclass(eq=False, kw_only=True)
 class Observed:
-    """The findings on a motion.
+    """The findings on a motion."""
 
-    note        : of which reading: "" for the delivered samples
-    match       : the state of the matching
-    worst       : of the limits, rows as in limits.py
-    apart       : (2,) largest distance of linear and of rotary axes from the path [mm]
-    first, last : (A,) first and last position [mm]
-    gap_max     : longest period [s]
-    """
-
-    match: Match
-    worst: Worst
-    note: str = ""
+    match: Match  # the state of the matching
+    worst: Worst  # of the limits, rows as in limits.py
+    note: str = ""  # of which reading: "" for the delivered samples
+    # (2,) largest distance of linear and of rotary axes from the path [mm]
     apart: FloatArray = field(default_factory=lambda: np.zeros(2))
     samples: int = 0
+    # first and last: (A,) first and last position [mm]
     first: FloatArray = field(default_factory=lambda: np.empty(0))
     last: FloatArray = field(default_factory=lambda: np.empty(0))
     t_first: float = np.nan
     t_last: float = -np.inf
-    gap_max: float = 0.0
+    gap_max: float = 0.0  # longest period [s]
 
     def noted(self, text: str) -> str:
         """A text with the note of this reading behind it."""

@@ -63,19 +63,14 @@ class LimitCheck:
 @dataclass(frozen=True, kw_only=True)
 class ThreadCheck:
     """How far one move in step with the spindle is from where the turns of the spindle want it
-    (spindle_sync.py).
+    (spindle_sync.py)."""
 
-    line       : NC line
-    feed       : at which the move is to be cut [mm/s]
-    error_mm   : the largest distance from there, between run-in and run-out [mm]; 0 where there are no
-                 samples between them
-    allowed_mm : the contour tolerance [mm]
-    """
-
-    line: int
-    feed: float
+    line: int  # NC line
+    feed: float  # at which the move is to be cut [mm/s]
+    # the largest distance from there, between run-in and run-out [mm]; 0 where there are no samples between
+    # them
     error_mm: float
-    allowed_mm: float
+    allowed_mm: float  # the contour tolerance [mm]
 
     @property
     def ratio(self) -> float:

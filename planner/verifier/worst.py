@@ -131,47 +131,35 @@ def less_error(difference: tuple[FloatArray, FloatArray]) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Limits:
-    """The limits of the motion: (3, A) velocity, acceleration, jerk; and the rest.
-
-    linear        : (A,) True on x, y and z, of which the normal acceleration is
-    judged        : (3,) True for the columns velocity, acceleration, jerk that were delivered
-    rounding      : (A,) largest error of a position by its digits [mm]
-    time_rounding : the same of a time [s]
-    normal, tangential : of the normal and of the tangential acceleration [mm/s2], or inf
-    acceleration_at_stop : (A,) inf where acceleration is not limited [mm/s2]
-    user          : the user's limits (user_limits.py)
-    """
+    """The limits of the motion: (3, A) velocity, acceleration, jerk; and the rest."""
 
     axes: tuple[str, ...]
     per_axis: FloatArray
-    linear: Array
-    judged: Array
-    rounding: FloatArray
-    time_rounding: float
+    linear: Array  # (A,) True on x, y and z, of which the normal acceleration is
+    judged: Array  # (3,) True for the columns velocity, acceleration, jerk that were delivered
+    rounding: FloatArray  # (A,) largest error of a position by its digits [mm]
+    time_rounding: float  # the same of a time [s]
+    # normal and tangential: of the normal and of the tangential acceleration [mm/s2], or inf
     normal: float
     tangential: float
-    acceleration_at_stop: FloatArray
+    acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited [mm/s2]
     jerk_limited: bool
-    user: tuple[Any, ...] = ()
+    user: tuple[Any, ...] = ()  # the user's limits (user_limits.py)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SampleBlock:
-    """Samples n of a motion, those before `skip` for the differences only.
+    """Samples n of a motion, those before `skip` for the differences only."""
 
-    t         : (n,) [s]; position, velocity, acceleration, jerk: (n, A), zeros where they were not delivered
-    piece     : (n,) the piece of the path that each is on
-    travelled : path length run before [mm]
-    """
-
+    # (n,) [s]; position, velocity, acceleration, jerk: (n, A), zeros where they were not delivered
     t: FloatArray
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
-    piece: Array
+    piece: Array  # (n,) the piece of the path that each is on
     skip: int = 0
-    travelled: float = 0.0
+    travelled: float = 0.0  # path length run before [mm]
 
     def travelled_to(self) -> FloatArray:
         """(n,) path length run at each sample [mm]."""

@@ -35,29 +35,19 @@ STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChordGuide(Guide):
-    """The chords of a smooth path, with what paper 001's formulas need of each.
+    """The chords of a smooth path, with what paper 001's formulas need of each."""
 
-    programmed : (R,) programmed feed, inf for rapids [mm/s]
-    kappa      : (R,) largest curvature of the path at the chord [1/mm]
-    v_acc      : (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13);
-                 inf if straight
-    v_jerk     : (R,) the same for their jerks (par. 17)
-    tol        : (R,) what filters and interpolation may use of the tolerance [mm]
-    corner     : (R,) joint whose rounded corner the chord belongs to, ascending, or -1
-    sin_half   : (R,) sine of half the turning angle there [-]
-    whole      : (R,) tolerance, with what the rounding uses of it [mm]
-    segment    : (R,) segment of the toolpath
-    """
-
-    programmed: FloatArray
-    kappa: FloatArray
+    programmed: FloatArray  # (R,) programmed feed, inf for rapids [mm/s]
+    kappa: FloatArray  # (R,) largest curvature of the path at the chord [1/mm]
+    # (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13); inf if
+    # straight
     v_acc: FloatArray
-    v_jerk: FloatArray
-    tol: FloatArray
-    corner: Array
-    sin_half: FloatArray
-    whole: FloatArray
-    segment: Array
+    v_jerk: FloatArray  # (R,) the same for their jerks (par. 17)
+    tol: FloatArray  # (R,) what filters and interpolation may use of the tolerance [mm]
+    corner: Array  # (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half: FloatArray  # (R,) sine of half the turning angle there [-]
+    whole: FloatArray  # (R,) tolerance, with what the rounding uses of it [mm]
+    segment: Array  # (R,) segment of the toolpath
 
     @property
     def budget(self) -> FloatArray:

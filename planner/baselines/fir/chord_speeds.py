@@ -73,16 +73,12 @@ MEAN_OVER = 0.02
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChordSpeeds(SpeedPlan):
-    """Speeds on the R chords of a guide in S runs.
-
-    v      : (R,) constant speed of each chord [mm/s]
-    margin : (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
-    """
+    """Speeds on the R chords of a guide in S runs."""
 
     rows = SpeedPlan.rows | {"v": "leg", "margin": "run"}
     guide: ChordGuide
-    v: FloatArray
-    margin: FloatArray
+    v: FloatArray  # (R,) constant speed of each chord [mm/s]
+    margin: FloatArray  # (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
 
     def time(self) -> FloatArray:
         """(S,) durations of the runs [s], dwells not counted."""

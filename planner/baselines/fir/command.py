@@ -17,16 +17,11 @@ from planner.baselines.fir.guide import Guide
 
 
 class VelocityPulses(NamedTuple):
-    """C velocity pulses in order: legs, or what they are cut into, each run at a constant speed.
+    """C velocity pulses in order: legs, or what they are cut into, each run at a constant speed."""
 
-    leg    : (C,) leg of the guide, non-decreasing
-    length : (C,) [mm]
-    speed  : (C,) [mm/s]
-    """
-
-    leg: Array
-    length: FloatArray
-    speed: FloatArray
+    leg: Array  # (C,) leg of the guide, non-decreasing
+    length: FloatArray  # (C,) [mm]
+    speed: FloatArray  # (C,) [mm/s]
 
 
 class Command(NamedTuple):
@@ -35,26 +30,18 @@ class Command(NamedTuple):
 
     Column A of velocity and position is the length along the guide and its rate: filtered like the axes it
     tells where on the guide the motion belongs.
-
-    first    : (S+1,) first step of each run
-    t        : (N,) start [s], from the start of the run
-    velocity : (N, A+1) [mm/s]
-    position : (N, A+1) at the start of the step [mm]
-    leg      : (N,) leg that is run, or whose end is waited at
-    T1, T2   : (S,) filters of each run [s]
-    begin    : (S,) start of each run [s]
-    dwell    : (S,) standstill when the filters are empty [s]
     """
 
-    first: Array
-    t: FloatArray
-    velocity: FloatArray
-    position: FloatArray
-    leg: Array
+    first: Array  # (S+1,) first step of each run
+    t: FloatArray  # (N,) start [s], from the start of the run
+    velocity: FloatArray  # (N, A+1) [mm/s]
+    position: FloatArray  # (N, A+1) at the start of the step [mm]
+    leg: Array  # (N,) leg that is run, or whose end is waited at
+    # T1 and T2: (S,) filters of each run [s]
     T1: FloatArray
     T2: FloatArray
-    begin: FloatArray
-    dwell: FloatArray
+    begin: FloatArray  # (S,) start of each run [s]
+    dwell: FloatArray  # (S,) standstill when the filters are empty [s]
 
     @property
     def end(self) -> FloatArray:

@@ -52,27 +52,18 @@ class Guide(ABC):
     full stops.
 
     The legs of a guide are straight: legs of the program, or chords of a smooth path.
-
-    axes      : axis letters
-    own       : lengths of the two filters that every run has [s]; None to choose them
-    first     : (S+1,) first joint of each run, and the last joint of all
-    dwell     : (S+1,) standstill before the first run and after each [s]
-    point     : (R+1, A) the joints [mm]
-    s         : (R+1,) length from the start [mm]
-    length    : (R,) [mm]
-    direction : (R, A) unit vectors
-    feed      : (R,) programmed feed, at most what the axes' velocities allow along the leg [mm/s]
     """
 
-    axes: tuple[str, ...]
+    axes: tuple[str, ...]  # axis letters
+    # lengths of the two filters that every run has [s]; None to choose them
     own: tuple[float, float] | None = None
-    first: Array
-    dwell: FloatArray
-    point: FloatArray
-    s: FloatArray
-    length: FloatArray
-    direction: FloatArray
-    feed: FloatArray
+    first: Array  # (S+1,) first joint of each run, and the last joint of all
+    dwell: FloatArray  # (S+1,) standstill before the first run and after each [s]
+    point: FloatArray  # (R+1, A) the joints [mm]
+    s: FloatArray  # (R+1,) length from the start [mm]
+    length: FloatArray  # (R,) [mm]
+    direction: FloatArray  # (R, A) unit vectors
+    feed: FloatArray  # (R,) programmed feed, at most what the axes' velocities allow along the leg [mm/s]
 
     def __len__(self) -> int:
         return len(self.length)
@@ -121,24 +112,15 @@ class Guide(ABC):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LegGuide(Guide):
-    """The legs of a program, with what paper 000's rules need of them.
+    """The legs of a program, with what paper 000's rules need of them."""
 
-    lines     : the toolpath with its arcs as chords
-    joint_at  : (R+1,) index of each joint among those of `lines`
-    slower    : (R,) True where the program asks for less than on another leg of the run
-    a_max     : (R,) acceleration along the leg that the axes allow [mm/s2]
-    j_max     : (R,) jerk along the leg that the axes allow [mm/s3]
-    tol       : (R+1,) contour error budget at the joint [mm]
-    sin_half  : (R+1,) sine of half the turning angle at the joint, 0 at full stops
-    """
-
-    lines: Toolpath
-    joint_at: Array
-    slower: Array
-    a_max: FloatArray
-    j_max: FloatArray
-    tol: FloatArray
-    sin_half: FloatArray
+    lines: Toolpath  # the toolpath with its arcs as chords
+    joint_at: Array  # (R+1,) index of each joint among those of `lines`
+    slower: Array  # (R,) True where the program asks for less than on another leg of the run
+    a_max: FloatArray  # (R,) acceleration along the leg that the axes allow [mm/s2]
+    j_max: FloatArray  # (R,) jerk along the leg that the axes allow [mm/s3]
+    tol: FloatArray  # (R+1,) contour error budget at the joint [mm]
+    sin_half: FloatArray  # (R+1,) sine of half the turning angle at the joint, 0 at full stops
 
     @property
     def budget(self) -> FloatArray:

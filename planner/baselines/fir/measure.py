@@ -39,20 +39,13 @@ FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is roundi
 
 class Measured(NamedTuple):
     """Measured at n times: start and middle of all pieces, and when the joints that are no full stops are
-    passed.
+    passed."""
 
-    t            : (n,) ascending [s]
-    error        : (n,) deviation from the guide with the chord error, over the tolerance there [-]
-    normal       : (n,) normal acceleration of the linear axes over its limit [-]
-    acceleration : (n,) largest over the axes, over the limit [-]
-    jerk         : (n,) largest over the axes just after t, over the limit [-]
-    """
-
-    t: FloatArray
-    error: FloatArray
-    normal: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
+    t: FloatArray  # (n,) ascending [s]
+    error: FloatArray  # (n,) deviation from the guide with the chord error, over the tolerance there [-]
+    normal: FloatArray  # (n,) normal acceleration of the linear axes over its limit [-]
+    acceleration: FloatArray  # (n,) largest over the axes, over the limit [-]
+    jerk: FloatArray  # (n,) largest over the axes just after t, over the limit [-]
 
     @property
     def worst(self) -> FloatArray:

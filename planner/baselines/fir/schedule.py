@@ -34,20 +34,14 @@ HASTE = 0.02
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Schedule(SpeedPlan):
-    """Speeds and overlaps of a guide of R legs.
-
-    speed   : (R,) largest speed on each leg [mm/s]
-    passing : (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
-    overlap : (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
-    holding : (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
-    """
+    """Speeds and overlaps of a guide of R legs."""
 
     rows = SpeedPlan.rows | {"speed": "leg", "passing": "joint", "overlap": "joint", "holding": "leg"}
     guide: LegGuide
-    speed: FloatArray
-    passing: FloatArray
-    overlap: FloatArray
-    holding: Array
+    speed: FloatArray  # (R,) largest speed on each leg [mm/s]
+    passing: FloatArray  # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
+    overlap: FloatArray  # (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
+    holding: Array  # (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
 
     def at_joints(self) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the run that each joint lies in (the last joint: of the last one)."""

@@ -33,19 +33,14 @@ ANCHOR_EVERY = 32
 
 
 class Filtered(NamedTuple):
-    """L pieces of constant jerk, over the A axes and the guide (column A), in S runs.
+    """L pieces of constant jerk, over the A axes and the guide (column A), in S runs."""
 
-    t     : (L,) start of each piece [s]
-    ends  : (L,) end of each piece [s]
-    state : (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the
-            piece [mm/s3]
-    first : (S+1,) first piece of each run
-    """
-
-    t: FloatArray
-    ends: FloatArray
+    t: FloatArray  # (L,) start of each piece [s]
+    ends: FloatArray  # (L,) end of each piece [s]
+    # (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece
+    # [mm/s3]
     state: FloatArray
-    first: Array
+    first: Array  # (S+1,) first piece of each run
 
     @property
     def begin(self) -> FloatArray:

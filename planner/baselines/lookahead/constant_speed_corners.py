@@ -35,14 +35,10 @@ QUANTITIES = ("acceleration", "jerk")
 
 
 class CornerSpeeds(NamedTuple):
-    """The largest constant speeds in the corners of a path of R legs.
+    """The largest constant speeds in the corners of a path of R legs."""
 
-    speed      : (R+1,) [mm/s]; inf where there is no corner
-    limited_by : (R+1,) name of the limit that holds it
-    """
-
-    speed: FloatArray
-    limited_by: Array
+    speed: FloatArray  # (R+1,) [mm/s]; inf where there is no corner
+    limited_by: Array  # (R+1,) name of the limit that holds it
 
 
 def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
@@ -78,21 +74,15 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
 
 class CornerChain(NamedTuple):
     """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only
-    the limits change.
+    the limits change."""
 
-    legs    : (n,) records `LEG`: what is free between two joints, each with what the corners beside it took
-              of their legs
-    passage : (n+1,) records `WAY`
-    joint   : (n+1,) the path's joint if it is a corner, -1 otherwise
-    run     : (n,) run between full stops that a leg belongs to
-    begin   : (n,) where each leg begins, or the corner before it [mm]
-    """
-
+    # (n,) records `LEG`: what is free between two joints, each with what the corners beside it took of their
+    # legs
     legs: np.recarray
-    passage: np.recarray
-    joint: Array
-    run: Array
-    begin: FloatArray
+    passage: np.recarray  # (n+1,) records `WAY`
+    joint: Array  # (n+1,) the path's joint if it is a corner, -1 otherwise
+    run: Array  # (n,) run between full stops that a leg belongs to
+    begin: FloatArray  # (n,) where each leg begins, or the corner before it [mm]
 
 
 def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArray) -> CornerChain:

@@ -65,22 +65,14 @@ BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 
 
 class CornerPieces(NamedTuple):
-    """L pieces of constant jerk.
+    """L pieces of constant jerk."""
 
-    joint    : (L,) the joint k that the piece is anchored at
-    leg      : (L,) the leg it belongs to
-    duration : (L,) [s], > 0
-    before   : (L, 4) c1 and its derivatives at the start
-    after    : (L, 4) c2
-    segment  : (L,) segment of the toolpath that it belongs to
-    """
-
-    joint: Array
-    leg: Array
-    duration: FloatArray
-    before: FloatArray
-    after: FloatArray
-    segment: Array
+    joint: Array  # (L,) the joint k that the piece is anchored at
+    leg: Array  # (L,) the leg it belongs to
+    duration: FloatArray  # (L,) [s], > 0
+    before: FloatArray  # (L, 4) c1 and its derivatives at the start
+    after: FloatArray  # (L, 4) c2
+    segment: Array  # (L,) segment of the toolpath that it belongs to
 
 
 def corner_pieces(ways: np.recarray, limits: np.recarray, path: Legs, dwell: FloatArray) -> CornerPieces:

@@ -63,22 +63,14 @@ def records(dtype: np.dtype, **columns: Any) -> np.recarray:
 
 
 class End(NamedTuple):
-    """One end of a leg, where the corner at it is over (module text).
+    """One end of a leg, where the corner at it is over (module text)."""
 
-    corner : length that the corner takes of the leg [mm]
-    A      : acceleration away from the corner [mm/s2]
-    start  : V', speed at which a ramp would have begun without acceleration [mm/s]
-    pre    : length of that ramp before this end [mm]
-    top    : W = V + A^2/(2j), the lowest speed without acceleration [mm/s]
-    ramp   : length of the ramp up to it [mm]
-    """
-
-    corner: float
-    A: float
-    start: float
-    pre: float
-    top: float
-    ramp: float
+    corner: float  # length that the corner takes of the leg [mm]
+    A: float  # acceleration away from the corner [mm/s2]
+    start: float  # V', speed at which a ramp would have begun without acceleration [mm/s]
+    pre: float  # length of that ramp before this end [mm]
+    top: float  # W = V + A^2/(2j), the lowest speed without acceleration [mm/s]
+    ramp: float  # length of the ramp up to it [mm]
 
 
 phase_times_of = njit(cache=True, error_model="numpy")(phase_times)

@@ -37,16 +37,11 @@ NUMBERS = ("cycle_time_s", "contour_error_mm", "vertex_error_mm", "corner_ratio"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep that is done.
+    """A sweep that is done."""
 
-    varied : settings and values
-    rows   : one for each combination, the last setting changing fastest
-    reused : how many of them were there before
-    """
-
-    varied: tuple[Varied, ...]
-    rows: tuple[dict[str, Any], ...]
-    reused: int
+    varied: tuple[Varied, ...]  # settings and values
+    rows: tuple[dict[str, Any], ...]  # one for each combination, the last setting changing fastest
+    reused: int  # how many of them were there before
 
 
 def sweep(

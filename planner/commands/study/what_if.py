@@ -52,20 +52,13 @@ AS_PLANNED, TOGETHER = "as it is", "all together"
 
 @dataclass(frozen=True, kw_only=True)
 class WhatIf:
-    """One row: a change, and what came of it.
+    """One row: a change, and what came of it."""
 
-    label    : the change in words
-    settings : the changed settings, none for the job as it is
-    row      : how the plan ended (report/compare.py)
-    change   : of the cycle time against the job as it is [s]; None without a motion
-    foretold : the same by prices; None where there are none
-    """
-
-    label: str
-    settings: tuple[Setting, ...]
-    row: Row
-    change: float | None
-    foretold: Forecast | None
+    label: str  # the change in words
+    settings: tuple[Setting, ...]  # the changed settings, none for the job as it is
+    row: Row  # how the plan ended (report/compare.py)
+    change: float | None  # of the cycle time against the job as it is [s]; None without a motion
+    foretold: Forecast | None  # the same by prices; None where there are none
 
 
 def what_if(

@@ -55,20 +55,13 @@ OWN_PATH = "program's own path, in the control's words"
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A program that the control might be given.
+    """A program that the control might be given."""
 
-    name     : as printed
-    line     : its moves, for the model
-    replaced : (R,) the rows that chords replace; None for the program as it is
-    mode     : LinuxCNC's G64, or ""
-    time     : predicted [s]
-    """
-
-    name: str
-    line: Polyline
-    replaced: Array | None
-    mode: str = ""
-    time: float = np.nan
+    name: str  # as printed
+    line: Polyline  # its moves, for the model
+    replaced: Array | None  # (R,) the rows that chords replace; None for the program as it is
+    mode: str = ""  # LinuxCNC's G64, or ""
+    time: float = np.nan  # predicted [s]
 
     def at(self, time: float) -> Candidate:
         """The candidate with its predicted time [s]."""

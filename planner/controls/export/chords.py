@@ -31,20 +31,13 @@ PLACES = 5  # of a chord at which its distance from the path is measured
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Polyline:
-    """Straight moves between n+1 points.
+    """Straight moves between n+1 points."""
 
-    points : (n+1, A) [mm], rounded to `DECIMALS`
-    feed   : (n,) planned feed: the highest of the setpoints from one point to the next [mm/s]
-    block  : (n,) block of the program of each move
-    rapid  : (n,) whether that is a rapid move
-    miss   : how far the moves miss a setpoint at most [mm]
-    """
-
-    points: FloatArray
-    feed: FloatArray
-    block: Array
-    rapid: Array
-    miss: float
+    points: FloatArray  # (n+1, A) [mm], rounded to `DECIMALS`
+    feed: FloatArray  # (n,) planned feed: the highest of the setpoints from one point to the next [mm/s]
+    block: Array  # (n,) block of the program of each move
+    rapid: Array  # (n,) whether that is a rapid move
+    miss: float  # how far the moves miss a setpoint at most [mm]
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,44 +29,32 @@ _NOT_USED = "the control has no such mode"
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
-    """A control's words. Codes are in tenths: G61.1 is 611.
-
-    g, m          : codes that mean there what they mean in RS274NGC
-    arcs, cycles  : it is given arcs, and everything that moves besides G0 to G3, as the program has them;
-                    else as straight moves
-    settings      : M numbers that it knows beside those, kept with all their words
-    idle          : codes ("G64") that change nothing of what it does, and why
-    instead       : M codes ("M6"), and what is written for them
-    letters       : of the words that it takes beside those of codes; axes are among them
-    one_command   : a line holds one code, at its start, and moves have G0 or G1 on every line
-    rapid_feed    : G0 moves at the F in force
-    milliseconds  : P of G4 counts them
-    inch          : it knows G20
-    speed_by_code : S stands beside M3 and M4 only
-    number, percent, paren : lines may begin with N, hold %, hold comments in parentheses
-    line_max      : longest line without blanks and comments; 0 for no limit
-    end           : the last line of a program that has none, or whose M2 or M30 it does not know
-    """
+    """A control's words. Codes are in tenths: G61.1 is 611."""
 
     name: str
+    # g and m: codes that mean there what they mean in RS274NGC
     g: frozenset[int]
     m: frozenset[int]
+    # arcs and cycles: it is given arcs, and everything that moves besides G0 to G3, as the program has them;
+    # else as straight moves
     arcs: bool = False
     cycles: bool = False
-    settings: frozenset[int] = frozenset()
+    settings: frozenset[int] = frozenset()  # M numbers that it knows beside those, kept with all their words
+    # codes ("G64") that change nothing of what it does, and why
     idle: dict[str, str] = field(default_factory=dict)
-    instead: dict[str, str] = field(default_factory=dict)
-    letters: str
-    one_command: bool = False
-    rapid_feed: bool = False
-    milliseconds: bool = False
-    inch: bool = True
-    speed_by_code: bool = False
+    instead: dict[str, str] = field(default_factory=dict)  # M codes ("M6"), and what is written for them
+    letters: str  # of the words that it takes beside those of codes; axes are among them
+    one_command: bool = False  # a line holds one code, at its start, and moves have G0 or G1 on every line
+    rapid_feed: bool = False  # G0 moves at the F in force
+    milliseconds: bool = False  # P of G4 counts them
+    inch: bool = True  # it knows G20
+    speed_by_code: bool = False  # S stands beside M3 and M4 only
+    # number, percent and paren: lines may begin with N, hold %, hold comments in parentheses
     number: bool = True
     percent: bool = False
     paren: bool = True
-    line_max: int = 0
-    end: str = "M2"
+    line_max: int = 0  # longest line without blanks and comments; 0 for no limit
+    end: str = "M2"  # the last line of a program that has none, or whose M2 or M30 it does not know
 
     @property
     def extruder(self) -> bool:

@@ -58,25 +58,17 @@ SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
-    """A control's planner.
-
-    deviation     : junction deviation [mm]; None for Klipper
-    square_corner : speed at a corner of 90 degrees [mm/s]; None for grbl and Marlin
-    cruise_ratio  : minimum cruise ratio of Klipper [-]
-    acceleration  : largest along the path [mm/s2]; None where it has none of its own
-    jump          : jump of velocity by axis [mm/s] that a corner may have, instead of a deviation
-    blocks        : how many blocks it looks ahead; None for all
-    block_time    : least time of a block [s]
-    """
+    """A control's planner."""
 
     name: str
-    deviation: float | None = None
-    square_corner: float | None = None
-    cruise_ratio: float = 0.5
-    acceleration: float | None = None
+    deviation: float | None = None  # junction deviation [mm]; None for Klipper
+    square_corner: float | None = None  # speed at a corner of 90 degrees [mm/s]; None for grbl and Marlin
+    cruise_ratio: float = 0.5  # minimum cruise ratio of Klipper [-]
+    acceleration: float | None = None  # largest along the path [mm/s2]; None where it has none of its own
+    # jump of velocity by axis [mm/s] that a corner may have, instead of a deviation
     jump: Mapping[str, float] = field(default_factory=dict)
-    blocks: int | None = None
-    block_time: float = 0.0
+    blocks: int | None = None  # how many blocks it looks ahead; None for all
+    block_time: float = 0.0  # least time of a block [s]
 
 
 # The values that these controls come with. grbl 1.1: config.h and defaults.h, BLOCK_BUFFER_SIZE 16, $11 =

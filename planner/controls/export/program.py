@@ -46,21 +46,16 @@ NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster t
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """The program as written.
+    """The program as written."""
 
-    file      : its name
-    sentence  : what it holds
-    predicted : predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path
-                mode of its own
-    assumptions : where coordinates and start are, and how a first run goes
-    notes     : what was left out or written another way, what the control needs, and what would leave the
-                chords more room
-    """
-
-    file: str
-    sentence: str
+    file: str  # its name
+    sentence: str  # what it holds
+    # predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path mode of
+    # its own
     predicted: dict[str, float]
-    assumptions: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()  # where coordinates and start are, and how a first run goes
+    # what was left out or written another way, what the control needs, and what would leave the chords more
+    # room
     notes: tuple[str, ...] = ()
 
 

@@ -130,14 +130,10 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """The rows of a program up to its end.
+    """The rows of a program up to its end."""
 
-    program : what the rows read as, block by block those of the plan
-    data    : the text
-    """
-
-    program: Program
-    data: bytes
+    program: Program  # what the rows read as, block by block those of the plan
+    data: bytes  # the text
     rows: list[Row]
 
     def dwell(self, row: Row) -> float:

@@ -28,14 +28,10 @@ from planner.nc.writer import FEED_MIN
 
 @dataclass(frozen=True, kw_only=True)
 class Translation:
-    """The program as written.
+    """The program as written."""
 
-    lines : of the file, without its header
-    notes : what was left out, or is written another way, each with its first line
-    """
-
-    lines: list[str]
-    notes: tuple[str, ...]
+    lines: list[str]  # of the file, without its header
+    notes: tuple[str, ...]  # what was left out, or is written another way, each with its first line
 
 
 class Translator(Switches):

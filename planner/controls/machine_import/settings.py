@@ -36,36 +36,28 @@ class FoundMode(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
     """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are
-    mappings.
-
-    wrapped      : letters of rotary axes whose places are within a turn
-    feed_max     : largest feed along the path [mm/s]
-    dt           : interpolation period [s]
-    tolerance    : of G64 P [mm], path_control: "blend", "exact_path" or "exact_stop", of a start-up code
-    inch         : whether programs without G20 and G21 are in inches
-    lathe        : whether it is a lathe whose programs have radii until G7
-    law          : keys of the table [control] of a machine file, and what the control has for them
-    corner_jump  : jump of velocity that a corner may have [mm/s]
-    kinematics   : keys of the table [kinematics] of a machine file; "type" is a text
-    modes        : vibration modes that the control suppresses
-    notes        : what of the settings has no counterpart in a machine file, one sentence each
-    """
+    mappings."""
 
     control: str
     velocity: Mapping[str, Sourced]
     acceleration: Mapping[str, Sourced]
     jerk: Mapping[str, Sourced] = field(default_factory=dict)
-    wrapped: str = ""
-    feed_max: Sourced | None = None
-    dt: Sourced | None = None
+    wrapped: str = ""  # letters of rotary axes whose places are within a turn
+    feed_max: Sourced | None = None  # largest feed along the path [mm/s]
+    dt: Sourced | None = None  # interpolation period [s]
+    # of G64 P [mm], path_control: "blend", "exact_path" or "exact_stop", of a start-up code
     tolerance: Sourced | None = None
     path_control: str | None = None
-    inch: bool = False
-    lathe: bool = False
+    inch: bool = False  # whether programs without G20 and G21 are in inches
+    lathe: bool = False  # whether it is a lathe whose programs have radii until G7
+    # keys of the table [control] of a machine file, and what the control has for them
     law: Mapping[str, Sourced | None] = field(default_factory=dict)
+    # jump of velocity that a corner may have [mm/s]
     corner_jump: Mapping[str, Sourced] = field(default_factory=dict)
+    # keys of the table [kinematics] of a machine file; "type" is a text
     kinematics: Mapping[str, Sourced | str] = field(default_factory=dict)
-    modes: tuple[FoundMode, ...] = ()
+    modes: tuple[FoundMode, ...] = ()  # vibration modes that the control suppresses
+    # what of the settings has no counterpart in a machine file, one sentence each
     notes: tuple[str, ...] = ()
 
 

@@ -49,20 +49,13 @@ SOLVED, OUT_OF_ITERATIONS, NOT_CONVEX, STALLED = range(4)
 
 
 class Minimum(NamedTuple):
-    """How `minimise_time` ended on a window, and how good what it left in `Blocks` is.
+    """How `minimise_time` ended on a window, and how good what it left in `Blocks` is."""
 
-    status     : `SOLVED`, `OUT_OF_ITERATIONS`: what was reached by then; `NOT_CONVEX`, `STALLED`: no use
-    iterations : used
-    gap        : complementarity, as a fraction of the time
-    residual   : largest of the rows, as a fraction of the limits
-    defect     : largest of the dynamics, as a fraction of the largest feed
-    """
-
-    status: int
-    iterations: int
-    gap: float
-    residual: float
-    defect: float
+    status: int  # `SOLVED`, `OUT_OF_ITERATIONS`: what was reached by then; `NOT_CONVEX`, `STALLED`: no use
+    iterations: int  # used
+    gap: float  # complementarity, as a fraction of the time
+    residual: float  # largest of the rows, as a fraction of the limits
+    defect: float  # largest of the dynamics, as a fraction of the largest feed
 
 
 @njit(cache=True, error_model="numpy", fastmath=LANE_MATH)

@@ -22,18 +22,12 @@ from planner.feedrate.jerk.slowing import slower_by
 
 
 class Solved(NamedTuple):
-    """The counts of a piece that was solved.
+    """The counts of a piece that was solved."""
 
-    slower     : by what factor it was slowed down to keep every limit
-    stops      : points where the profile rests because nothing better was found
-    iterations : of its longest window
-    effort     : what else was counted, by name (solver.py)
-    """
-
-    slower: float
-    stops: list[int]
-    iterations: int
-    effort: dict[str, int]
+    slower: float  # by what factor it was slowed down to keep every limit
+    stops: list[int]  # points where the profile rests because nothing better was found
+    iterations: int  # of its longest window
+    effort: dict[str, int]  # what else was counted, by name (solver.py)
 
 
 class Piece:

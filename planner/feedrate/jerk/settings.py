@@ -85,15 +85,10 @@ SETTINGS = InteriorPointSettings()
 
 @dataclass(frozen=True, kw_only=True)
 class WindowSettings:
-    """How a problem is solved in windows.
+    """How a problem is solved in windows."""
 
-    tol        : relative gap at which a window is optimal
-    iterations : at most, per window
-    window     : intervals solved at a time
-    settings   : of the interior-point method; the same for every problem
-    """
-
-    tol: float = 1e-4
-    iterations: int = 100
-    window: int = SIZES.solved_window
+    tol: float = 1e-4  # relative gap at which a window is optimal
+    iterations: int = 100  # at most, per window
+    window: int = SIZES.solved_window  # intervals solved at a time
+    # of the interior-point method; the same for every problem
     settings: InteriorPointSettings = field(default=SETTINGS, repr=False)

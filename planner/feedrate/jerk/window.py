@@ -89,25 +89,17 @@ class Window:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ScaledWindow:
-    """A window's problem in units of its own: fastest feed 1, largest acceleration 1.
+    """A window's problem in units of its own: fastest feed 1, largest acceleration 1."""
 
-    columns, begin : the problem, and where in it the window begins
-    blocks : the scaled problem, with room for profile and multipliers, which are worked on in place
-    s      : (N+1,) arc length [mm]
-    asked  : (N+1,) feed^2 of the envelope (start.py) [mm2/s2]
-    jerk   : of the slowest axis, scaled
-    feed   : unit of speed [mm/s]
-    time   : unit of time [s]
-    """
-
+    # columns and begin: the problem, and where in it the window begins
     columns: ProblemColumns
     begin: int
-    blocks: Blocks
-    s: FloatArray
-    asked: FloatArray
-    jerk: float
-    feed: float
-    time: float
+    blocks: Blocks  # the scaled problem, with room for profile and multipliers, which are worked on in place
+    s: FloatArray  # (N+1,) arc length [mm]
+    asked: FloatArray  # (N+1,) feed^2 of the envelope (start.py) [mm2/s2]
+    jerk: float  # of the slowest axis, scaled
+    feed: float  # unit of speed [mm/s]
+    time: float  # unit of time [s]
     settings: InteriorPointSettings = SETTINGS
 
     @classmethod

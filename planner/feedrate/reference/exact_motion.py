@@ -35,12 +35,9 @@ from planner.feedrate.solution import FeedrateSolution, Status, ratios_by_limit
 
 @dataclass(frozen=True, kw_only=True)
 class ExactMotion:
-    """A solver whose profiles are brought onto constant jerk on every interval.
+    """A solver whose profiles are brought onto constant jerk on every interval."""
 
-    solver : makes the profiles
-    """
-
-    solver: SequentialConvex
+    solver: SequentialConvex  # makes the profiles
 
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None

@@ -104,18 +104,12 @@ BROKE_DOWN = (
 
 @dataclass(frozen=True, kw_only=True)
 class JerkLimitedNLP:
-    """The jerk-limited reference.
+    """The jerk-limited reference."""
 
-    solver         : "ipopt" (with mumps), or "fatrop", which uses the stages
-    tol            : relative tolerance of optimality [-]
-    max_iterations : per piece
-    points_max     : larger problems are refused; None for `POINTS_MAX` of the solver
-    """
-
-    solver: Literal["ipopt", "fatrop"] = "ipopt"
-    tol: float = 1e-8
-    max_iterations: int = 500
-    points_max: int | None = None
+    solver: Literal["ipopt", "fatrop"] = "ipopt"  # "ipopt" (with mumps), or "fatrop", which uses the stages
+    tol: float = 1e-8  # relative tolerance of optimality [-]
+    max_iterations: int = 500  # per piece
+    points_max: int | None = None  # larger problems are refused; None for `POINTS_MAX` of the solver
 
     def __post_init__(self) -> None:
         if self.solver not in ("ipopt", "fatrop"):

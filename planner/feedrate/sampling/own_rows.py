@@ -39,31 +39,23 @@ FAR = 4.0  # caps of feed^2 beyond so many times those of the axes are as good a
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OwnRows:
-    """Rows of V limits at P grid points.
+    """Rows of V limits at P grid points."""
 
-    names              : of the limits
-    d1                 : (P, V) q'
-    d2_left, d2_right, d3_left, d3_right : (P, V) as those of the axes
-    least              : (3, V) least bounds of velocity, acceleration and jerk that were met, inf where
-                         nothing is bounded
-    acceleration, jerk : (P, V) bounds at the points
-    feed_sq_max        : (P, V) what the bounds of the velocity allow; inf where nothing
-    error              : (P,) of the interval to the right, share of the acceleration bounds [-]
-    coarse             : (P,) True where that interval needs points
-    """
-
-    names: tuple[str, ...]
-    d1: FloatArray
+    names: tuple[str, ...]  # of the limits
+    d1: FloatArray  # (P, V) q'
+    # d2_left, d2_right, d3_left and d3_right: (P, V) as those of the axes
     d2_left: FloatArray
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
+    # (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
     least: FloatArray
+    # acceleration and jerk: (P, V) bounds at the points
     acceleration: FloatArray
     jerk: FloatArray
-    feed_sq_max: FloatArray
-    error: FloatArray
-    coarse: Array
+    feed_sq_max: FloatArray  # (P, V) what the bounds of the velocity allow; inf where nothing
+    error: FloatArray  # (P,) of the interval to the right, share of the acceleration bounds [-]
+    coarse: Array  # (P,) True where that interval needs points
 
     @property
     def margin(self) -> FloatArray:

@@ -15,40 +15,31 @@ from planner.corners.smooth import SmoothPath
 class PathSamples:
     """The path on a grid: G pieces between full stops, P points in all, one interval to the right of every
     point but the last of each piece. At a full stop the point is there twice, as the end of one piece and the
-    start of the next.
-
-    piece     : (G+1,) piece g holds the points piece[g] : piece[g+1]
-    stop      : (G+1,) joint (0..R) at which each piece starts; the last entry is the end of the path
-    s         : (P,) arc length from the start of the job [mm]
-    position  : (P, A) [mm]
-    d1        : (P, A) r' = dr/ds
-    d2_left, d2_right : (P, A) r'' just before and just after the point [1/mm]; they differ where the
-                        curvature jumps
-    d3_left, d3_right : (P, A) r''' [1/mm2]
-    element   : (P,) element of the interval to the right (corners/elements.py); of the last interval at a
-                piece's end
-    w0, w1    : (P,) parameter range of that interval on its element
-    segment   : (P,) toolpath segment of that interval
-    margin    : (P,) interpolation error of that interval, share of the acceleration limits [-]
-    kappa_left, kappa_right : (P,) effective curvature in the intervals to the left and to the right [1/mm]
-    """
+    start of the next."""
 
     path: SmoothPath
     table: ElementTable
-    piece: Array
-    stop: Array
-    s: FloatArray
-    position: FloatArray
-    d1: FloatArray
+    piece: Array  # (G+1,) piece g holds the points piece[g] : piece[g+1]
+    stop: Array  # (G+1,) joint (0..R) at which each piece starts; the last entry is the end of the path
+    s: FloatArray  # (P,) arc length from the start of the job [mm]
+    position: FloatArray  # (P, A) [mm]
+    d1: FloatArray  # (P, A) r' = dr/ds
+    # d2_left and d2_right: (P, A) r'' just before and just after the point [1/mm]; they differ where the
+    # curvature jumps
     d2_left: FloatArray
     d2_right: FloatArray
+    # d3_left and d3_right: (P, A) r''' [1/mm2]
     d3_left: FloatArray
     d3_right: FloatArray
+    # (P,) element of the interval to the right (corners/elements.py); of the last interval at a piece's end
     element: Array
+    # w0 and w1: (P,) parameter range of that interval on its element
     w0: FloatArray
     w1: FloatArray
-    segment: Array
-    margin: FloatArray
+    segment: Array  # (P,) toolpath segment of that interval
+    margin: FloatArray  # (P,) interpolation error of that interval, share of the acceleration limits [-]
+    # kappa_left and kappa_right: (P,) effective curvature in the intervals to the left and to the right
+    # [1/mm]
     kappa_left: FloatArray
     kappa_right: FloatArray
 

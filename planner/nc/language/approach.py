@@ -37,26 +37,18 @@ KINDS = ("LT", "LN", "CT", "LCT")
 
 @dataclass
 class ContourWay:
-    """The words of an APPR or DEP block.
+    """The words of an APPR or DEP block."""
 
-    kind          : one of KINDS
-    length        : LEN [mm]
-    radius        : R [mm]
-    angle         : CCA [degrees]
-    feed          : F word, or None
-    line, at, frame : of the block
-    scale         : by what the frame multiplies lengths
-    """
-
-    kind: str
+    kind: str  # one of KINDS
+    # line, at and frame: of the block
     line: int
     at: int
     frame: int
-    length: float = 0.0
-    radius: float = 0.0
-    angle: float = 0.0
-    feed: float | None = None
-    scale: float = 1.0
+    length: float = 0.0  # LEN [mm]
+    radius: float = 0.0  # R [mm]
+    angle: float = 0.0  # CCA [degrees]
+    feed: float | None = None  # F word, or None
+    scale: float = 1.0  # by what the frame multiplies lengths
 
     def check(self, name: str) -> None:
         """Raises ValueError for what is missing or makes no sense."""

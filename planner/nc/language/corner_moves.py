@@ -172,16 +172,11 @@ _STRAIGHT_ON = 1e-6  # turn below which there is no corner [rad]
 
 @dataclass
 class CornerMove:
-    """A corner whose second move has not come.
+    """A corner whose second move has not come."""
 
-    kind : one of KINDS
-    size : R, or the number of the chamfer [mm]
-    line : where it stands
-    """
-
-    kind: str
-    size: float
-    line: int
+    kind: str  # one of KINDS
+    size: float  # R, or the number of the chamfer [mm]
+    line: int  # where it stands
     first: Move | None = None
 
     def joined(self, second: Move, normal: int) -> tuple[list[Move], Move]:

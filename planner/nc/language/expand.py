@@ -90,17 +90,13 @@ def expand(
 
 @dataclass(frozen=True)
 class _Front:
-    """The reader of a dialect.
-
-    files  : names, in small letters, of the file that holds a subprogram
-    set_up : gives a run the makers of its rows
-    """
+    """The reader of a dialect."""
 
     language: Language
     variables: type[SystemVariables]
     parser: Callable[[Source], Parser]
-    files: Callable[[str], frozenset[str]]
-    set_up: Callable[[ProgramRun], object] = lambda run: None
+    files: Callable[[str], frozenset[str]]  # names, in small letters, of the file that holds a subprogram
+    set_up: Callable[[ProgramRun], object] = lambda run: None  # gives a run the makers of its rows
 
 
 _FRONTS = {

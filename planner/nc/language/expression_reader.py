@@ -75,16 +75,11 @@ class ExpressionReader:
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A piece of a line.
+    """A piece of a line."""
 
-    kind : "word" (a letter and its number), "number", "name", "text" or "sign"
-    text : as it is written, in capitals
-    at   : where it begins in the line
-    """
-
-    kind: str
-    text: str
-    at: int
+    kind: str  # "word" (a letter and its number), "number", "name", "text" or "sign"
+    text: str  # as it is written, in capitals
+    at: int  # where it begins in the line
 
 
 class TokenReader(ExpressionReader):

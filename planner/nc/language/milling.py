@@ -174,37 +174,30 @@ RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
 class PocketPlan:
     """How a pocket is cut; lengths in the program's unit, feeds per minute.
 
-    clear, top, bottom, retract : z of the clearance, the surface, the bottom, and the end
-    radius           : of the tool
-    infeed           : most per pass, 0 for one pass
-    step             : most between two paths
-    side, floor      : allowances
-    rough            : cut up to the allowances
-    walls, base      : finish them
     feed, plunge_feed, finish_feed
-    finish_infeed    : most per pass along the walls, 0 for one pass
-    turning          : 1 counter-clockwise, -1 clockwise
-    plunge           : RAPID, STRAIGHT or HELIX, with the radius and the pitch of the helix
     """
 
+    # clear, top, bottom and retract: z of the clearance, the surface, the bottom, and the end
     clear: float
     top: float
     bottom: float
     retract: float
-    radius: float
-    infeed: float
-    step: float
+    radius: float  # of the tool
+    infeed: float  # most per pass, 0 for one pass
+    step: float  # most between two paths
     feed: float
     plunge_feed: float
     finish_feed: float
-    turning: int
+    turning: int  # 1 counter-clockwise, -1 clockwise
+    # side and floor: allowances
     side: float = 0.0
     floor: float = 0.0
-    rough: bool = True
+    rough: bool = True  # cut up to the allowances
+    # walls and base: finish them
     walls: bool = False
     base: bool = False
-    finish_infeed: float = 0.0
-    plunge: int = STRAIGHT
+    finish_infeed: float = 0.0  # most per pass along the walls, 0 for one pass
+    plunge: int = STRAIGHT  # RAPID, STRAIGHT or HELIX, with the radius and the pitch of the helix
     helix: tuple[float, float] = (0.0, 0.0)
 
     def check(self) -> None:

@@ -26,18 +26,13 @@ _MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SourceLine:
-    """A line of the source as text.
+    """A line of the source as text."""
 
-    row   : its row of words; -1 for a comment alone
-    start : byte offset of its first character in the words' data
-    scale : what a length without a point is multiplied by
-    """
-
-    row: int
+    row: int  # its row of words; -1 for a comment alone
     place: SourcePlace
-    start: int
+    start: int  # byte offset of its first character in the words' data
     text: str
-    scale: float = 1.0
+    scale: float = 1.0  # what a length without a point is multiplied by
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
         """A fault of the line, or of what begins at a byte of it."""

@@ -32,14 +32,11 @@ _IN_LINES = "; write the expression in several lines"
 
 @dataclass(frozen=True)
 class Spelling:
-    """functions : names of functions of one value;  ranks : operators with their rank, the highest first applied
-
-    long_values : an assignment takes an expression without brackets
-    """
+    """functions : names of functions of one value;  ranks : operators with their rank, the highest first applied"""
 
     functions: frozenset[str]
     ranks: Mapping[str, int]
-    long_values: bool = False
+    long_values: bool = False  # an assignment takes an expression without brackets
 
 
 class LineReader(ExpressionReader):

@@ -48,23 +48,16 @@ def words_of(rows: Sequence[TravelRow], data: bytes, files: tuple[tuple[int, str
 
 @dataclass(frozen=True)
 class Move:
-    """A move of a row, in the work system [mm].
+    """A move of a row, in the work system [mm]."""
 
-    rest       : the row without motion code, coordinates and centre
-    at         : byte offset of the row
-    code       : 0 to 3
-    begin, end : (3,)
-    axes       : indices of the coordinates to write
-    arc        : of codes 2 and 3
-    """
-
-    rest: TravelRow
-    at: int
-    code: int
+    rest: TravelRow  # the row without motion code, coordinates and centre
+    at: int  # byte offset of the row
+    code: int  # 0 to 3
+    # begin and end: (3,)
     begin: FloatArray
     end: FloatArray
-    axes: Sequence[int]
-    arc: Arc | None = None
+    axes: Sequence[int]  # indices of the coordinates to write
+    arc: Arc | None = None  # of codes 2 and 3
 
     def rows(self, normal: int) -> list[TravelRow]:
         """The move as a row."""

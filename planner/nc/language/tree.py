@@ -199,17 +199,13 @@ class Goto(NamedTuple):
 
 
 class Call(NamedTuple):
-    """Run a procedure `times` times.
-
-    procedure : its name, or an expression that gives its number
-    arguments : values of parameters by number, in a new set of local parameters; None shares the caller's
-    word      : as the program writes it, for messages
-    """
+    """Run a procedure `times` times."""
 
     place: SourcePlace
-    procedure: str | Expression
+    procedure: str | Expression  # its name, or an expression that gives its number
+    # values of parameters by number, in a new set of local parameters; None shares the caller's
     arguments: tuple[tuple[int, Expression], ...] | None
-    word: str
+    word: str  # as the program writes it, for messages
     times: Expression = Number(1.0)
 
 
@@ -253,10 +249,7 @@ def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRow
 @dataclass
 class OpenStatement:
     """A branch or loop whose end has not come: its body so far, and of a branch the conditions and bodies
-    before it.
-
-    count : of a loop that counts: its variable and last value
-    """
+    before it."""
 
     kind: str
     place: SourcePlace
@@ -264,7 +257,7 @@ class OpenStatement:
     label: str = ""
     body: list[Statement] = field(default_factory=list)
     branches: list[tuple[Expression, list[Statement]]] = field(default_factory=list)
-    count: tuple[Parameter, Expression] | None = None
+    count: tuple[Parameter, Expression] | None = None  # of a loop that counts: its variable and last value
 
     def another_branch(self, condition: Expression | None) -> None:
         """The next branch, with its condition; None for the one behind else."""
@@ -297,40 +290,29 @@ def statements_in(body: Sequence[Statement]) -> Iterator[Statement]:
 
 @dataclass(frozen=True)
 class Procedure:
-    """A subprogram, or the main program under the empty name.
-
-    place : of its first line
-    body  : its statements
-    """
+    """A subprogram, or the main program under the empty name."""
 
     name: str
-    place: SourcePlace
-    body: list[Statement]
+    place: SourcePlace  # of its first line
+    body: list[Statement]  # its statements
 
 
 @dataclass(frozen=True)
 class Language:
-    """The meaning of the operators and parameters of a language.
+    """The meaning of the operators and parameters of a language."""
 
-    operations : Python text by operator or function and number of operands, with {0} and {1} for the operands
-    conditions : those among them that are true or false rather than a number
-    locals     : parameters 1 to `locals` are a call's own
-    largest    : largest number of a parameter
-    vacant     : the value of a parameter that was never assigned; None where "no value" differs from 0
-    system_numbers, system_names : parameters that hold the state of the control
-    read       : the Python text of a parameter's value in an expression, with {0} for what was stored
-    raw        : operators that tell a parameter without a value from 0
-    """
-
+    # Python text by operator or function and number of operands, with {0} and {1} for the operands
     operations: Mapping[tuple[str, int], str]
-    conditions: frozenset[str]
-    locals: int
-    largest: int
+    conditions: frozenset[str]  # those among them that are true or false rather than a number
+    locals: int  # parameters 1 to `locals` are a call's own
+    largest: int  # largest number of a parameter
+    # the value of a parameter that was never assigned; None where "no value" differs from 0
     vacant: float | None
+    # system_numbers and system_names: parameters that hold the state of the control
     system_numbers: frozenset[int]
     system_names: frozenset[str] = frozenset()
-    read: str = "{0}"
-    raw: frozenset[str] = frozenset()
+    read: str = "{0}"  # the Python text of a parameter's value in an expression, with {0} for what was stored
+    raw: frozenset[str] = frozenset()  # operators that tell a parameter without a value from 0
 
 
 class Parser(Protocol):

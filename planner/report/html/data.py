@@ -36,26 +36,17 @@ NEAR, NEAR_SHARE = 20, 0.012
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """N samples of the motion.
+    """N samples of the motion."""
 
-    step      : every so many samples of the trajectory are shown
-    shown     : the samples, rotary axes in rad
-    limit     : (N,) index in `limits` of the limit that holds the motion there
-    limits    : their names; the last one is `NO_LIMIT`
-    feed      : (N,) as F words mean it [mm/s, deg/s where rotary axes move alone]
-    programmed : (N,) F of the block; inf for rapids
-    deviation : (N,) distance from the programmed path near the block of the sample [mm]
-    price     : (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None
-                where it is not known
-    """
-
-    step: int
-    shown: Trajectory
-    limit: Array
-    limits: tuple[str, ...]
-    feed: FloatArray
-    programmed: FloatArray
-    deviation: FloatArray
+    step: int  # every so many samples of the trajectory are shown
+    shown: Trajectory  # the samples, rotary axes in rad
+    limit: Array  # (N,) index in `limits` of the limit that holds the motion there
+    limits: tuple[str, ...]  # their names; the last one is `NO_LIMIT`
+    feed: FloatArray  # (N,) as F words mean it [mm/s, deg/s where rotary axes move alone]
+    programmed: FloatArray  # (N,) F of the block; inf for rapids
+    deviation: FloatArray  # (N,) distance from the programmed path near the block of the sample [mm]
+    # (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is
+    # not known
     price: FloatArray | None
 
 

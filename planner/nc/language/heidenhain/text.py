@@ -50,18 +50,14 @@ def parameter(number: int) -> tree.Numbered:
 @dataclass
 class Block:
     """A block of the program, read from left to right: its place, and its text without number and comment,
-    parts of continued lines joined by blanks.
-
-    at       : byte offset of the first character of each part, and where the part begins in `text`
-    function : the word that it begins with
-    column   : of the text that comes next
-    """
+    parts of continued lines joined by blanks."""
 
     place: tree.SourcePlace
     text: str
+    # byte offset of the first character of each part, and where the part begins in `text`
     at: tuple[tuple[int, int], ...]
-    function: str = ""
-    column: int = 0
+    function: str = ""  # the word that it begins with
+    column: int = 0  # of the text that comes next
 
     def byte(self, column: int) -> int:
         """Byte offset of a character of the text."""
@@ -213,26 +209,18 @@ POLAR = own("pr"), own("pa")
 
 @dataclass
 class Items:
-    """The words behind a path function.
+    """The words behind a path function."""
 
-    axes    : absolute or incremental ("I") coordinates by letter
-    polar   : PA, PR, IPA, IPR
-    turn    : -1 for DR-, 1 for DR+, 0 where it is not given
-    radius  : R of CR
-    feed    : F with a number;  fast : FMAX;  automatic : F AUTO
-    codes   : M codes, each with its column
-    side    : 1 for RL, -1 for RR, 0 for R0, None where none is given
-    """
-
+    # absolute or incremental ("I") coordinates by letter
     axes: dict[str, tuple[Expression, bool]] = field(default_factory=dict)
-    polar: dict[str, Expression] = field(default_factory=dict)
-    turn: int = 0
-    radius: Expression | None = None
-    feed: Expression | None = None
+    polar: dict[str, Expression] = field(default_factory=dict)  # PA, PR, IPA, IPR
+    turn: int = 0  # -1 for DR-, 1 for DR+, 0 where it is not given
+    radius: Expression | None = None  # R of CR
+    feed: Expression | None = None  # F with a number;  fast : FMAX;  automatic : F AUTO
     fast: bool = False
     automatic: bool = False
-    codes: list[tuple[int, int]] = field(default_factory=list)
-    side: int | None = None
+    codes: list[tuple[int, int]] = field(default_factory=list)  # M codes, each with its column
+    side: int | None = None  # 1 for RL, -1 for RR, 0 for R0, None where none is given
 
 
 def items(block: Block, turning: bool = False) -> Items:

@@ -29,6 +29,9 @@ LONGEST, MOST_FOR_LENGTH = 4.0, 60
 # Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to
 # move.
 ARC_STEP = 0.8
+# Where no jerk is limited, units of steps at a jump from no acceleration to the full one [-]: a step becomes
+# shorter by no more than a factor (nlp.py), and a long one beside the jump would be the ramp.
+JUMP = 3.0
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
 
@@ -124,7 +127,8 @@ def guess_from(
 
 def unit_of(run: TubeRun) -> float:
     """The unit of time in which a corner is shaped (module text) [s]."""
-    return float(min((run.acceleration / run.jerk).min(), np.cbrt(run.budget.min() / run.jerk.max())))
+    jerk = run.jerk_scale
+    return float(min((run.acceleration / jerk).min(), np.cbrt(run.budget.min() / jerk.max())))
 
 
 def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
@@ -134,12 +138,22 @@ def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
     return least
 
 
+def _busy(run: TubeRun, motion: Trajectory) -> FloatArray:
+    """(T-1,) how long the jerk is at its limit between samples, or without one, where accelerations jump, how
+    long it would be at its scale [s]."""
+    if not np.isfinite(run.jerk).all():
+        acceleration = motion.acceleration[:, run.axis].copy()
+        acceleration[[0, -1]] = 0.0
+        jump = np.abs(np.diff(acceleration, axis=0))
+        return np.asarray(JUMP * (jump / run.jerk_scale).max(axis=1))
+    share = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
+    return np.asarray(np.diff(motion.t) * (share[:-1] + share[1:]) / 2)
+
+
 def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
     unit = unit_of(run)
-    busy = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
-    lasting = np.diff(motion.t)
-    spent = np.append(0.0, np.cumsum(lasting * (busy[:-1] + busy[1:]) / 2)) * cut.per_unit / unit
+    spent = np.append(0.0, np.cumsum(_busy(run, motion))) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
     # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from
     # that of the run

@@ -108,7 +108,9 @@ def _limits(
     state = np.broadcast_to(run.state, (hi - lo, len(run.state))) * inside / acc
     if narrow[1] is not None:
         normal, state = normal / narrow[1], state / narrow[1][:, None]
-    axes = np.stack([run.jerk / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed])
+    axes = np.stack(
+        [run.jerk_scale / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed]
+    )
     h = guess.h[lo:hi] / second
     longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER
     curved = run.curvature[leg] > 0
@@ -155,6 +157,7 @@ def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray
     on = np.ones((len(leg), rows.count(axes) + ROWS * len(run.state) + WORD_ROWS * words), dtype=bool)
     more = on[:, 8 * axes :]
     velocity = (run.feed[leg] > run.velocity.min()).any()
+    on[:, : 2 * axes] = np.isfinite(run.jerk).all()
     on[:, 4 * axes : 8 * axes] = velocity
     more[:, rows.FEED_NODE : rows.TUBE_NODE] = (run.feed[leg] < np.linalg.norm(run.velocity)).any()
     more[at_vertex, rows.ORDER_NODE] = False

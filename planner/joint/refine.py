@@ -63,7 +63,7 @@ def divided(run: TubeRun, leg: Array, found: TubeSolution, cut: Cut) -> Divided:
     steps, place = found.steps, found.place
     assert steps is not None
     assert place is not None
-    busy = np.minimum((np.abs(steps.jerk) / run.jerk).max(axis=1), 1.0)
+    busy = (np.abs(steps.jerk) / run.jerk_scale).max(axis=1)
     lasting: FloatArray = np.bincount(leg, weights=steps.h, minlength=len(run)).astype(np.float64)
     even = (least_of_legs(run, lasting, cut) / lasting)[leg]
     wanted = steps.h * (busy * cut.per_unit / unit_of(run) + even)

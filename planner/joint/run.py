@@ -45,6 +45,7 @@ from planner.machine import LINEAR_AXES, Machine
 # largest angle that the arc turns by meanwhile [rad], within which tangents tell where a control point
 # belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+SHARP = 0.25
 ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
@@ -72,7 +73,7 @@ class TubeRun:
     across_max                   : (R,) largest normal acceleration that the rest of the budget and the
                                    machine allow [mm/s2]; inf where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
-    velocity, acceleration, jerk : (A,) limits of the axes
+    velocity, acceleration, jerk : (A,) limits of the axes; the jerk is inf where nothing limits it
     state                        : (K,) other limits of velocity and acceleration (state_limits.py)
     linear                       : (A,) 1 for x, y and z, else 0
     reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
@@ -119,13 +120,22 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
-        for name in ("velocity", "acceleration", "jerk", "linear", "counts"):
+        for name in ("velocity", "acceleration", "linear", "counts"):
             freeze(self, name, np.float64, (axes,))
+        freeze(self, "jerk", np.float64, (axes,), finite=False)
         freeze(self, "state", np.float64, (None,), finite=False)
         freeze(self, "word", np.float64, (legs, None), finite=False)
 
     def __len__(self) -> int:
         return len(self.length)
+
+    @property
+    def jerk_scale(self) -> FloatArray:
+        """(A,) the jerk limits; without them what takes an axis to its full acceleration in `SHARP` of the
+        time in which that moves it by the least budget [mm/s3]."""
+        acceleration = np.minimum(self.acceleration, self.state.min(initial=np.inf))
+        shaped = SHARP * np.sqrt(self.budget.min() / acceleration.max())
+        return np.where(np.isfinite(self.jerk), self.jerk, acceleration / shaped)
 
     @property
     def step_max(self) -> FloatArray:
@@ -180,9 +190,9 @@ class TubeRun:
         return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
 
 
-def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
-    """The runs between full stops, in order. Raises InputError for splines, and if the machine lacks an axis
-    of the toolpath."""
+def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = True) -> Iterator[TubeRun]:
+    """The runs between full stops, in order; without limits of the jerk if it is not `jerk_limited`. Raises
+    InputError for splines, and if the machine lacks an axis of the toolpath."""
     curves = np.flatnonzero(toolpath.curve >= 0)
     if len(curves):
         raise InputError(
@@ -219,7 +229,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine) -> Iterator[TubeRun]:
             vertex_budget=budgets.vertex,
             velocity=limits.velocity[moves],
             acceleration=limits.acceleration[moves],
-            jerk=limits.jerk[moves],
+            jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),
             state=bounds_of(limits, moves),
             linear=linear[moves],
             reserved=budgets.reserved,

@@ -101,7 +101,7 @@ def joint_plan(
     stays = motion is not None
     with job.stage("search") as report:
         start = Start(motion or planned.motion(), job, search.cut)
-        runs = list(tube_runs_of(job.toolpath, job.machine))
+        runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         most = search.steps_max
         if steps > search.small:  # no finer than what is delivered
@@ -113,7 +113,7 @@ def joint_plan(
     made = None
     if found is not None and any(one.steps for one in found):
         parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
-        made = with_runs_alone(job, parts, alone, most=ALONE_MOST)
+        made = with_runs_alone(job, parts, alone, ALONE_MOST, settings.not_limited)
     time = made.delivered.trajectory.cycle_time if made else np.nan
     count = len(made.plans) if made else 0
     job.tell("search", found=time, before=start.motion.end, kept=made is not None, steps=steps, alone=count)

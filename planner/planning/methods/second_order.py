@@ -1,8 +1,10 @@
-"""Method `second-order`: all limits but jerk, time-optimal on a smoothed path, by reachability analysis.
+"""Method `second-order`: the limits of `optimal` but that of the jerk, path and feed together where the joint
+search can.
 
-The machine's jerk limits are not used: the acceleration steps at grid points. The verdict reports the jerk as
-not limited. The algorithm is that of method `optimal` on a path (planning/optimal/path_motion.py), with
-another solver; splines are reshaped by the multipliers of this motion (feedrate/costates.py).
+The search has no row of the jerk; its accelerations rise and fall in steps as short as it finds them best.
+Where it does not run, the feed along a path is found by reachability analysis, accelerations step at grid
+points, and splines are reshaped by the multipliers of that motion (feedrate/costates.py). The verdict reports
+the jerk as not limited.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
-from planner.planning.attempts import ON_PATH
+from planner.planning.attempts import ATTEMPTS
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import EFFORTS, Settings
@@ -24,13 +26,13 @@ from planner.planning.page import Method, best_of
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderMethod(Method):
-    """The fastest motion under all limits but jerk, on splines or rounded corners.
+    """The fastest motion under all limits but jerk: path and feed together, or on splines or rounded corners.
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
              settings of your own
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a
              solver
-    effort : "quick", "normal" or "best": grids and rounds of reshaping (planning/optimal/effort.py)
+    effort : "quick", "normal" or "best": as of method `optimal` (planning/optimal/effort.py)
     rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """
@@ -47,6 +49,11 @@ class SecondOrderMethod(Method):
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
         effort = EFFORTS[effort_name(self.effort)]
         settings = Settings(
-            method="second-order", corner=self.corner, order=order, effort=effort, rounds=self.rounds
+            method="second-order",
+            corner=self.corner,
+            order=order,
+            effort=effort,
+            rounds=self.rounds,
+            joint=self.corner == AUTO and self.solver == REACHABILITY and self.rounds is None,
         )
-        return shaped_plan(job, settings) if self.shaped else best_of(ON_PATH, job, settings)
+        return shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)

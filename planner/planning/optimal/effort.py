@@ -16,6 +16,7 @@ from planner.base.names import BEST, NORMAL, QUICK
 from planner.base.sizes import SIZES
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
+from planner.feedrate.constraints.limits import JERK
 from planner.joint.guess import Cut
 from planner.planning.optimal.order import Order
 
@@ -142,6 +143,11 @@ class Settings:
     effort: Effort = EFFORTS[NORMAL]
     rounds: int | None = None
     joint: bool = False
+
+    @property
+    def not_limited(self) -> tuple[str, ...]:
+        """Quantities that the motions do not limit."""
+        return () if self.order.jerk_limited else (JERK.name,)
 
     @property
     def corner_name(self) -> str:

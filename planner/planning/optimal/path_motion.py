@@ -81,12 +81,13 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
         best, motion, filtered = within_filters(best, motion, settings.order, job)
     if motion.end > job.most:
         return plan_of_solution(job, best, None, settings)
-    not_limited = () if settings.order.jerk_limited else ("jerk",)
     if priced(best, job.machine) and len(best.samples) > PRICED_BESIDE and threads() > 1:
-        made, prices = beside(lambda: job.deliver(motion, not_limited), lambda: prices_of(best, job.machine))
+        made, prices = beside(
+            lambda: job.deliver(motion, settings.not_limited), lambda: prices_of(best, job.machine)
+        )
         tables = Tables(prices=prices)
     else:
-        made = job.deliver(motion, not_limited)
+        made = job.deliver(motion, settings.not_limited)
         tables = Tables(priced=best if priced(best, job.machine) else None)
     return plan_of_solution(job, best, made._replace(filtered=filtered), settings, tables)
 

@@ -204,8 +204,7 @@ def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0,
             sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
         )  # fmt: skip
-    not_limited = () if settings.order.jerk_limited else ("jerk",)
     # D is measured behind filters (settling.py), and p is made slower for it
-    made = job.deliver(found.delivered, not_limited)._replace(filtered=True)
+    made = job.deliver(found.delivered, settings.not_limited)._replace(filtered=True)
     plan = plan_of_solution(job, found.planned, made, settings)
     return dataclasses.replace(plan, sentence=f"{plan.sentence}; {found.sentence}")

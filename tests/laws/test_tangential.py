@@ -51,11 +51,12 @@ def of_limit(plan: Plan) -> float:
 
 @pytest.mark.parametrize("method", KEPT_BY)
 def test_a_straight_line_takes_its_closed_form(method: str) -> None:
-    """L/v + v/a + a/j from rest to rest at the feed v, with a the limit and not what the axes have; without a/j at second order."""
+    """L/v + v/a + a/j from rest to rest at the feed v, with a the limit and not what the axes have; without a/j at second order,
+    where accelerations still rise within steps."""
     length, feed, jerk = 60.0, 80.0, AXIS["jerk"]
     plan = planned(f"G21 F{60 * feed:g}\nG1 X{length:g}\n", machine_of(), method)
     least = length / feed + feed / PUSH + (0.0 if method == "second-order" else PUSH / jerk)
-    assert plan.cycle_time == pytest.approx(least, rel=1e-4)
+    assert plan.cycle_time == pytest.approx(least, rel=2e-4 if method == "second-order" else 1e-4)
     assert of_limit(plan) == pytest.approx(1.0, abs=1e-4)
 
 

@@ -32,6 +32,9 @@ TURN_MAX = np.pi / 2  # of a segment [rad]: its ends and its chord do not oppose
 # Places at which a segment is looked at, and what is added to the largest curvature and third derivative
 # found there [-]: between two of 33 places a cubic's change is below a percent.
 PLACES, BETWEEN = 33, 1.02
+# The same for the fourth derivative, taken from differences of the third: in 2,000 random segments it was up to
+# 1.196 times what these tell [-].
+BETWEEN_FOURTH = 1.25
 # The least curvature that counts [1/mm], so that none is divided by: it bends by 1e-4 mm on a metre.
 BEND_MIN = 1e-9
 # Control points off their chord by less than this fraction of it are on it [-]: the rounding of coordinates.
@@ -65,6 +68,19 @@ class Curves:
         out = np.empty((len(row), 4, self.points.shape[2]))
         _at(self.points, self.weight, row, length, np.asarray(x, float), out)
         return out
+
+    def part(self, rows: Array) -> Curves:
+        """The curves in these rows (n,)."""
+        return Curves(points=self.points[rows], weight=self.weight[rows], twist=self.twist[rows])
+
+    def further_bounds(self, length: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(K,) bounds of |d3p/dx3| [1/mm2] and |d4p/dx4| [1/mm3] on the curves, `length` (K,) [mm] long."""
+        x = (length[:, None] * np.linspace(0.0, 1.0, PLACES)).ravel()
+        row = np.repeat(np.arange(len(self)), PLACES)
+        third = self.at(row, length[row], x)[:, 3].reshape(len(self), PLACES, -1)
+        change = np.linalg.norm(np.diff(third, axis=1), axis=2) * (PLACES - 1) / length[:, None]
+        largest = np.linalg.norm(third, axis=2).max(axis=1, initial=0.0)
+        return BETWEEN * largest, BETWEEN_FOURTH * change.max(axis=1, initial=0.0)
 
 
 class CurveSegments(NamedTuple):

@@ -201,13 +201,13 @@ def _of_line(keeps, r, c, s0, end, known, budgets, work):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def worst_shares(keeps, leg, h, state, jerk, place):
-    """The largest share of a limit, and of the tolerance, in N steps.
+    """The largest share of a limit in N steps, and of the tolerance in each of them (N,).
 
     leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points
     along the leg: where places on arcs are sought from
     """
     N, axes = jerk.shape
-    limit, tube, before = 0.0, 0.0, 0.0
+    limit, before, tube = 0.0, 0.0, np.zeros(N)
     c, budgets = np.empty((4, axes)), np.empty(2)
     work = (
         *(np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)),
@@ -231,10 +231,9 @@ def worst_shares(keeps, leg, h, state, jerk, place):
             budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1])
         end = keeps.legs.length[r] if ends else max(place[i, 2], before)
         if keeps.legs.radius[r] > 0.0:
-            share, before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
+            tube[i], before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
         else:
-            share, before = _of_line(keeps, r, c, before, end, ends, budgets, work)
-        tube = max(tube, share)
+            tube[i], before = _of_line(keeps, r, c, before, end, ends, budgets, work)
     return limit, tube
 
 

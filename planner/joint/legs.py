@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.geometry.curves import curve_point
 
-NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place of an arc, from the last one
+NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place of an arc or a curve, from the last one
 
 
 class LegFormulas(NamedTuple):
@@ -23,11 +24,40 @@ class LegFormulas(NamedTuple):
     e2: FloatArray  # (R, A)
     radius: FloatArray  # (R,)
     rate: FloatArray  # (R,)
+    curve: Array  # (R,) row in the tables of the curves, or -1
+    points: FloatArray  # (K, 4, A)
+    weight: FloatArray  # (K, 2)
+
+
+@njit(cache=True, error_model="numpy")
+def _curve_of(legs, r, x, out):
+    """Point and three derivatives, out (4, A), of leg r, a curve, at the place x."""
+    p, w = legs.points[legs.curve[r]], legs.weight[legs.curve[r]]
+    curve_point((p[0], p[1], p[2], p[3]), (w[0], w[1]), legs.length[r], x, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_on_curve(legs, r, c, x, point, tangent):
+    """`nearest_point` on a curve."""
+    out = np.empty((4, len(c)))
+    for n in range(NEAREST_STEPS + 1):
+        _curve_of(legs, r, x, out)
+        miss, square = 0.0, 0.0
+        for k in range(len(c)):
+            point[k], tangent[k] = out[0, k], out[1, k]
+            miss += (c[k] - point[k]) * tangent[k]
+            square += tangent[k] * tangent[k]
+        if n < NEAREST_STEPS:
+            x = min(max(x + miss / square, 0.0), legs.length[r])
+    return x
 
 
 @njit(cache=True, error_model="numpy")
 def nearest_point(legs, r, c, x, point, tangent):
-    """point (A,) of leg r nearest to c (A,), from the place x on arcs; its tangent (A,), and its place."""
+    """point (A,) of leg r nearest to c (A,), from the place x on arcs and curves; its tangent (A,), and its
+    place."""
+    if legs.curve[r] >= 0:
+        return _nearest_on_curve(legs, r, c, x, point, tangent)
     axes, length = len(c), legs.length[r]
     radius, rate = legs.radius[r], legs.rate[r]
     steps = NEAREST_STEPS if radius > 0.0 else 1
@@ -53,6 +83,11 @@ def nearest_point(legs, r, c, x, point, tangent):
 @njit(cache=True, error_model="numpy")
 def formula_point(legs, r, x, point, tangent, bend):
     """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
+    if legs.curve[r] >= 0:
+        out = np.empty((4, len(point)))
+        _curve_of(legs, r, x, out)
+        point[:], tangent[:], bend[:] = out[0], out[1], out[2]
+        return
     radius, rate = legs.radius[r], legs.rate[r]
     cos, sin = np.cos(rate * x), np.sin(rate * x)
     for k in range(len(point)):

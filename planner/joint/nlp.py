@@ -45,7 +45,7 @@ from planner.base.errors import import_needed
 from planner.joint.guess import Guess
 from planner.joint.motion import steps_of
 from planner.joint.numbers import acceleration_along, step_numbers
-from planner.joint.outcome import BROKE_DOWN, SOLVED, STUCK, TubeSolution
+from planner.joint.outcome import BROKE_DOWN, NO_CURVES, SOLVED, STUCK, TubeSolution
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
 from planner.joint.state_limits import REST, formula
@@ -101,6 +101,8 @@ class TubeNLP:
 
         Raises InputError if casadi is missing.
         """
+        if len(run.curves):
+            return TubeSolution(status=NO_CURVES[0], sentence=NO_CURVES[1], iterations=0, solve_time=0.0)
         iterations, took = 0, 0.0
         for slower in SLOWER:
             found = self.solve_from(run, guess.slower(slower), guess)

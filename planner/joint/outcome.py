@@ -39,6 +39,8 @@ STUCK = (
     Status.ITERATION_LIMIT,
     "the search came to rest at a motion slower than its start; change the tolerance a little, or plan with method optimal",
 )
+# Not tried.
+NO_CURVES = (Status.INFEASIBLE, "this solver takes lines and arcs, not curves; take the solver own")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -31,7 +31,7 @@ from planner.joint.motion import Steps, closed_at_nodes
 from planner.joint.nlp import PULL, SMOOTH
 from planner.joint.outcome import TubeSolution
 from planner.joint.price import columns, step_prices
-from planner.joint.problem import NARROWED, StepWindow, window_of
+from planner.joint.problem import NARROWED, StepWindow, Tighter, window_of
 from planner.joint.run import TubeRun
 from planner.joint.state_limits import state_shares
 
@@ -54,8 +54,9 @@ USUAL, NEARLY = 25.0, 0.9
 QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
-# Normal acceleration and the state's limits are watched in two places of a step only. Where one is exceeded
-# between them, it is lowered by what it was above, and a little more [-], at most so many times.
+# Normal acceleration and the state's limits are watched in two places of a step only, and of the tolerance
+# along a curve the rows know the tangents at nodes. Where one is exceeded it is lowered by what it was above,
+# and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
@@ -255,11 +256,9 @@ class _Search:
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
         takes their place."""
-        normal = np.isfinite(self._keeps.normal[self.guess.leg[lo:hi]]).any()
-        watched = bool(normal or len(self._keeps.state))
         for prox, missed in tries:
-            tight = np.ones(hi - lo)
-            for _ in range(TIGHTENED if watched else 1):
+            tight = Tighter(np.ones(hi - lo), np.ones(hi - lo))
+            for _ in range(TIGHTENED):
                 if self._stopped:
                     return False
                 window = window_of(self.run, self.guess, lo, hi, missed, tight)
@@ -273,14 +272,14 @@ class _Search:
                 if self._taken(lo, hi, window, tight):
                     self.price[lo:hi] = step_prices(window, z)
                     return True
-                if not (tight > 1.0).any():
+                if not tight.any():
                     break
         return False
 
-    def _taken(self, lo: int, hi: int, window: StepWindow, tight: FloatArray) -> bool:
+    def _taken(self, lo: int, hi: int, window: StepWindow, tight: Tighter) -> bool:
         """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster
-        they take their place. Where a limit that is watched in places only is exceeded between them, `tight`
-        (hi - lo,) grows."""
+        they take their place. Where a limit that is watched in places only is exceeded between them, or a
+        curve bends more within a step than its rows know, `tight` grows."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -289,9 +288,14 @@ class _Search:
         found, jerk = closed_at_nodes(nodes, h, window.u[:, :axes] * (window.length / window.second**3))
         place = window.place * window.length
         limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
-        if not (limit <= 1.0 + ROUNDING and tube <= 1.0):
+        if not (limit <= 1.0 + ROUNDING and tube.max() <= 1.0):
             across = watched_shares(self._keeps, leg, h, found, jerk)
-            tight *= np.where(across > 1.0, across * TIGHTER, 1.0)
+            # what passes a short leg at its distance is nearest to one of its ends, and too far in its middle:
+            # no step of such a leg alone is the cause
+            of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
+            np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
+            for one, share in ((tight.limit, across), (tight.room, of_leg[leg])):
+                one *= np.where(share > 1.0, share * TIGHTER, 1.0)
             return False
         if not switches_kept(run, leg, found):
             return False
@@ -304,9 +308,10 @@ class _Search:
 
 def keeps_of(run: TubeRun) -> Keeps:
     """The limits of the run, for the kernel."""
-    names = ("length", "base", "drift", "e1", "e2", "radius", "rate")
+    names = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
+    of_legs = {name: getattr(run, name) for name in names}
     return Keeps(
-        legs=LegFormulas(**{name: getattr(run, name) for name in names}),
+        legs=LegFormulas(**of_legs, points=run.curves.points, weight=run.curves.weight),
         velocity=run.velocity,
         acceleration=run.acceleration,
         jerk=run.jerk,

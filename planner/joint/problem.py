@@ -43,13 +43,24 @@ class StepWindow(NamedTuple):
         return state
 
 
+class Tighter(NamedTuple):
+    """What is kept on N steps with something to spare, as rows do not see all of them [-], >= 1."""
+
+    limit: FloatArray  # (N,) by what the limits of the normal acceleration and of the state are divided
+    room: FloatArray  # (N,) the room of control points
+
+    def any(self) -> bool:
+        """Whether something is spared."""
+        return bool((self.limit > 1.0).any() or (self.room > 1.0).any())
+
+
 def window_of(
-    run: TubeRun, guess: CutMotion, lo: int, hi: int, missed: float, tight: FloatArray | None = None
+    run: TubeRun, guess: CutMotion, lo: int, hi: int, missed: float, tight: Tighter | None = None
 ) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
     missed : by how much rows may be missed at the end [-]
-    tight  : (hi - lo,) by what the limit of the normal acceleration is divided [-], >= 1; None for 1
+    tight  : what limits and room are divided by; None for 1
     """
     part, leg = slice(lo, hi), guess.leg[lo:hi]
     state, h = guess.state[lo : hi + 1], guess.h[part]
@@ -65,6 +76,9 @@ def window_of(
         e2=run.e2,
         radius=run.radius / length,
         rate=run.rate * length,
+        curve=run.curve,
+        points=(run.curves.points - origin) / length,
+        weight=run.curves.weight,
     )
     x = np.concatenate([(state[:, 0] - origin) / length, state[:, 1] / speed, state[:, 2] / acc], axis=1)
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
@@ -87,7 +101,7 @@ def _limits(
     lo: int,
     hi: int,
     units: tuple[float, float],
-    narrow: tuple[float, FloatArray | None],
+    narrow: tuple[float, Tighter | None],
 ) -> StepLimits:
     """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed as in
     `window_of`."""
@@ -107,7 +121,8 @@ def _limits(
     inside = 1.0 - NARROWED * narrow[0]
     state = np.broadcast_to(run.state, (hi - lo, len(run.state))) * inside / acc
     if narrow[1] is not None:
-        normal, state = normal / narrow[1], state / narrow[1][:, None]
+        normal, state = normal / narrow[1].limit, state / narrow[1].limit[:, None]
+        room, room_node = room / narrow[1].room, room_node / narrow[1].room
     axes = np.stack(
         [run.jerk_scale / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed]
     )

@@ -6,7 +6,8 @@ on it both are
 
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
-with radius = 0 for a line, whose drift is its direction. The motion may use eps_ap of every budget eps; what
+with radius = 0 for a line, whose drift is its direction; or it is a segment of a curve of the program, P(x) of
+geometry/curves.py, with drift = 0 and the radius of a circle that bends as much. The motion may use eps_ap of every budget eps; what
 is left is for the chord error of the interpolation period and for the filters that follow (corners/budget.py,
 eq. (18)-(20)): at first with the largest normal acceleration that the axes can give in any direction, then
 with little more than what a motion was found to have on the leg, which becomes its limit there
@@ -17,12 +18,14 @@ meets P(x(t)) at both ends with its velocity has the control points
 
     P(s0),   P(s0) + (s1 - s0) P'(s0),   P(s3) - (s3 - s2) P'(s3),   P(s3)
 
-and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx. So
-these are the points that the control points of a step belong to; on a line they are the places themselves.
+and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx, where
+kappa, kappa rate and kappa rate^2 bound the second, third and fourth derivative of P. So these are the points
+that the control points of a step belong to; on a line they are the places themselves.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -31,19 +34,18 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.base.errors import InputError
 from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
 from planner.feedrate.constraints.limits import Limits
 from planner.geometry.build import feed_groups, path_per_length
+from planner.geometry.curves import Curves
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.geometry.word_feed import ROTARY, goes_by
 from planner.joint.state_limits import bounds_of
 from planner.machine import LINEAR_AXES, Machine
 
-# Fraction of the budget that a step on an arc may use for what the arc is off its own cubic [-], and the
-# largest angle that the arc turns by meanwhile [rad], within which tangents tell where a control point
-# belongs.
+# Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
+# the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
 SHARP = 0.25
 ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
@@ -67,8 +69,10 @@ class TubeRun:
     first                        : (R+1,) leg r holds the toolpath's segments first[r] : first[r+1]
     length                       : (R,) [mm]
     base, drift, e1, e2          : (R, A) the formula in the module's text [mm], [-]
-    radius, rate                 : (R,) [mm], [rad/mm]
+    radius, rate                 : (R,) [mm], [rad/mm]; of curves the rate bounds derivatives (module text)
     curvature                    : (R,) bound of it on the leg [1/mm]
+    curve                        : (R,) row in `curves`, or -1
+    curves                       : over the A axes
     budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
     across_max                   : (R,) largest normal acceleration that the rest of the budget and the
                                    machine allow [mm/s2]; inf where the axes cannot exceed it
@@ -93,6 +97,8 @@ class TubeRun:
     radius: FloatArray
     rate: FloatArray
     curvature: FloatArray
+    curve: Array
+    curves: Curves
     budget: FloatArray
     feed: FloatArray
     across_max: FloatArray
@@ -112,6 +118,7 @@ class TubeRun:
         legs, axes = len(self.length), len(self.axis)
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
+        freeze(self, "curve", np.int64, (legs,))
         for name in ("length", "radius", "rate", "curvature", "budget", "reserved"):
             freeze(self, name, np.float64, (legs,))
         for name in ("feed", "across_max"):
@@ -143,7 +150,8 @@ class TubeRun:
         `ARC_FRACTION` of the budget (module text); inf on lines."""
         with np.errstate(divide="ignore"):
             fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
-            return np.minimum(fourth**0.25, TURN_MAX / np.abs(self.rate))
+            turning = np.where(self.curve < 0, np.abs(self.rate), self.curvature)
+            return np.minimum(fourth**0.25, TURN_MAX / turning)
 
     @property
     def room(self) -> FloatArray:
@@ -181,25 +189,27 @@ class TubeRun:
         """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
-        return self.base[leg] + self.drift[leg] * x[:, None] + self.radius[leg, None] * circle
+        straight = self.base[leg] + self.drift[leg] * x[:, None]
+        return self._on_curves(leg, x, 0, straight + self.radius[leg, None] * circle)
 
     def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
         """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
         turned = (self.rate[leg] * x)[:, None]
         across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
-        return self.drift[leg] + (self.radius * self.rate)[leg, None] * across
+        return self._on_curves(leg, x, 1, self.drift[leg] + (self.radius * self.rate)[leg, None] * across)
+
+    def _on_curves(self, leg: Array, x: FloatArray, order: int, others: FloatArray) -> FloatArray:
+        """The x-derivative of this order of the legs that are curves, the `others` (n, A) of those that are
+        not."""
+        of = np.flatnonzero(self.curve[leg] >= 0)
+        if len(of):
+            others[of] = self.curves.at(self.curve[leg[of]], self.length[leg[of]], x[of])[:, order]
+        return others
 
 
 def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = True) -> Iterator[TubeRun]:
     """The runs between full stops, in order; without limits of the jerk if it is not `jerk_limited`. Raises
-    InputError for splines, and if the machine lacks an axis of the toolpath."""
-    curves = np.flatnonzero(toolpath.curve >= 0)
-    if len(curves):
-        raise InputError(
-            "method tube takes lines and arcs, not splines; plan with method optimal",
-            source=toolpath.source,
-            line=int(toolpath.line[curves[0]]),
-        )
+    InputError if the machine lacks an axis of the toolpath."""
     limits = Limits.of(machine, toolpath.axes)
     linear = np.isin(toolpath.axes, LINEAR_AXES).astype(np.float64)
     edges = _edges(toolpath)
@@ -210,9 +220,11 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
         budgets = budgets_of(toolpath, machine, first)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
         shape = _shapes(toolpath, row, vertex)
+        curved = toolpath.curve[row] >= 0
+        curves = toolpath.curves.part(toolpath.curve[row][curved])
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
-        ).any(axis=0)
+        ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
         held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
         word, counts, differs = _words(toolpath, row)
         yield TubeRun(
@@ -222,6 +234,8 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             counts=counts[moves],
             first=first,
             curvature=toolpath.curvature[row],
+            curve=np.where(curved, np.cumsum(curved) - 1, -1),
+            curves=dataclasses.replace(curves, points=curves.points[:, :, moves]),
             budget=budgets.leg,
             feed=toolpath.feed[row],
             across_max=np.where(held, budgets.across, np.inf),
@@ -315,9 +329,9 @@ def _edges(toolpath: Toolpath) -> Array:
 
 def _shapes(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:
     """The coefficients of the legs that begin with the segments `row`."""
-    arc, arcs = toolpath.arc[row], toolpath.arcs
+    arc, arcs, curve = toolpath.arc[row], toolpath.arcs, np.flatnonzero(toolpath.curve[row] >= 0)
     chord = np.diff(vertex, axis=0)
-    length = np.where(arc < 0, np.linalg.norm(chord, axis=1), toolpath.length[row])
+    length = np.where(toolpath.straight[row], np.linalg.norm(chord, axis=1), toolpath.length[row])
     shape = {
         "length": length,
         "base": vertex[:-1].copy(),
@@ -333,4 +347,9 @@ def _shapes(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, Flo
         *((same, same) for same in ("drift", "e1", "e2", "radius", "rate")),
     ):
         shape[name][curved] = getattr(arcs, source)[arc[curved]]
+    if len(curve):
+        bend = toolpath.curvature[row[curve]]
+        third, fourth = toolpath.curves.part(toolpath.curve[row[curve]]).further_bounds(length[curve])
+        shape["drift"][curve], shape["radius"][curve] = 0.0, 1.0 / bend
+        shape["rate"][curve] = np.maximum(third / bend, np.sqrt(fourth / bend))
     return shape

@@ -73,13 +73,7 @@ def searchable(job: Job) -> bool:
     """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no
     limits of the user, no range in step with the spindle; and whether the path leaves it anything to find."""
     machine, toolpath = job.real
-    return (
-        machine.fir is None
-        and not machine.own
-        and not (toolpath.curve >= 0).any()
-        and not toolpath.held.any()
-        and not toolpath.exact.all()
-    )
+    return machine.fir is None and not machine.own and not toolpath.held.any() and not toolpath.exact.all()
 
 
 def joint_plan(

@@ -12,13 +12,19 @@ from planner.geometry.build import toolpath_from_program
 from planner.joint import run as run_module
 from planner.joint.checks import bend_of
 from planner.joint.guess import Guess
+from planner.joint.legs import formula_point, nearest_point
 from planner.joint.motion import closed, integrated
 from planner.joint.nlp import TubeNLP
+from planner.joint.own import keeps_of
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.nc.reader import parse_program
 
 MACHINE = problems.machine()
 ARCS = parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n")
+# a cubic that turns both ways, and a rational one
+CURVES = parse_program(
+    "G21 G17 G90 F6000\nG1 X4\nG5 X9 Y4 I3 J0 P1 Q-2\nG5.2 P1 L3\nX10 Y7\nX14 Y8 P2\nX15 Y4 P0.7\nG5.3\nM2\n"
+)
 
 
 def only_run(program) -> TubeRun:
@@ -34,15 +40,49 @@ def test_cutting_a_line_changes_no_leg():
     assert list(whole.axis) == [0, 1]  # z stands still
 
 
-def test_a_run_is_the_programmed_path():
-    toolpath = toolpath_from_program(ARCS, MACHINE)
-    run = only_run(ARCS)
+@pytest.mark.parametrize("program", [ARCS, CURVES], ids=["arcs", "curves"])
+def test_a_run_is_the_programmed_path(program):
+    toolpath = toolpath_from_program(program, MACHINE)
+    run = only_run(program)
     legs = np.arange(len(run))
-    np.testing.assert_allclose(run.points(legs, np.zeros(3)), toolpath.start, atol=1e-9)
-    np.testing.assert_allclose(run.points(legs, run.length), toolpath.end, atol=1e-9)
+    np.testing.assert_allclose(run.points(legs, np.zeros(len(run))), toolpath.start[:, run.axis], atol=1e-9)
+    np.testing.assert_allclose(run.points(legs, run.length), toolpath.end[:, run.axis], atol=1e-9)
     step = 1e-6
     slope = (run.points(legs, run.length / 2 + step) - run.points(legs, run.length / 2 - step)) / (2 * step)
     np.testing.assert_allclose(run.tangents(legs, run.length / 2), slope, atol=1e-8)
+
+
+@pytest.mark.parametrize("program", [ARCS, CURVES], ids=["arcs", "curves"])
+def test_kernels_see_the_legs_of_the_run(program):
+    """Points and tangents as the run has them, their bends from differences, and the nearest place of a point beside the leg."""
+    run = only_run(program)
+    legs, axes = keeps_of(run).legs, len(run.axis)
+    for r in range(len(run)):
+        x, step = 0.4 * run.length[r], 1e-5 * run.length[r]
+        point, tangent, bend = (np.empty(axes) for _ in range(3))
+        formula_point(legs, r, x, point, tangent, bend)
+        rows = np.full(2, r)
+        np.testing.assert_allclose(point, run.points(rows[:1], np.array([x]))[0], atol=1e-12)
+        np.testing.assert_allclose(tangent, run.tangents(rows[:1], np.array([x]))[0], atol=1e-12)
+        ahead, behind = run.tangents(rows, np.array([x + step, x - step]))
+        np.testing.assert_allclose(bend, (ahead - behind) / (2.0 * step), atol=1e-5)
+        beside = point + 0.02 * np.array([-tangent[1], tangent[0], *np.zeros(axes - 2)])
+        found = nearest_point(legs, r, beside, 0.45 * run.length[r], point, tangent)
+        assert found == pytest.approx(x, abs=2e-4 * run.length[r])
+
+
+def test_further_derivatives_of_curves_are_within_their_bounds():
+    """kappa rate and kappa rate^2 of a leg, by differences of its second derivative."""
+    run = only_run(CURVES)
+    curves = np.flatnonzero(run.curve >= 0)
+    assert len(curves) > 3
+    for r in curves:
+        x = np.linspace(0.0, run.length[r], 2001)
+        second = run.curves.at(np.full(2001, run.curve[r]), np.full(2001, run.length[r]), x)[:, 2]
+        third = np.diff(second, axis=0) / x[1]
+        fourth = np.diff(third, axis=0) / x[1]
+        assert np.linalg.norm(third, axis=1).max() <= run.curvature[r] * run.rate[r]
+        assert np.linalg.norm(fourth, axis=1).max() <= run.curvature[r] * run.rate[r] ** 2
 
 
 @pytest.mark.slow
@@ -50,9 +90,9 @@ def test_a_run_is_the_programmed_path():
 @settings(max_examples=200, deadline=None)
 def test_a_leg_is_off_its_own_cubic_by_no_more_than_the_bound(places, t):
     """The cubic that meets the leg at both ends with its velocity, along any places that do not go back."""
-    run = only_run(ARCS)
     weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
-    for leg in (0, 1, 2):
+    runs = (only_run(ARCS), only_run(CURVES))
+    for run, leg in ((one, leg) for one in runs for leg in range(len(one))):
         s = np.sort(places) * min(run.step_max[leg], run.length[leg])
         rows = np.full(4, leg)
         ends, tangents = run.points(rows[:2], s[[0, 3]]), run.tangents(rows[:2], s[[0, 3]])
@@ -62,9 +102,10 @@ def test_a_leg_is_off_its_own_cubic_by_no_more_than_the_bound(places, t):
         assert off <= bend_of(run.curvature[leg], run.rate[leg], s) + 1e-12 * run.length[leg]
 
 
-def test_an_even_step_of_the_largest_length_is_off_by_its_fraction_at_most():
-    run = only_run(ARCS)
-    for leg in (1, 2):
+@pytest.mark.parametrize("program", [ARCS, CURVES], ids=["arcs", "curves"])
+def test_an_even_step_of_the_largest_length_is_off_by_its_fraction_at_most(program):
+    run = only_run(program)
+    for leg in range(1, len(run)):
         even = run.step_max[leg] * np.arange(4) / 3
         off = bend_of(run.curvature[leg], run.rate[leg], even)
         assert off <= run_module.ARC_FRACTION * run.budget[leg] * (1 + 1e-9)

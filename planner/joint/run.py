@@ -25,7 +25,6 @@ that the control points of a step belong to; on a line they are the places thems
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -38,9 +37,9 @@ from planner.corners.budget import allocate, error_rate, normal_anywhere, normal
 from planner.feedrate.constraints.limits import Limits
 from planner.geometry.build import feed_groups, path_per_length
 from planner.geometry.curves import Curves
-from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.geometry.word_feed import ROTARY, goes_by
+from planner.joint.leg_shapes import edges_of, shapes_of
 from planner.joint.state_limits import bounds_of
 from planner.machine import LINEAR_AXES, Machine
 
@@ -212,14 +211,14 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
     InputError if the machine lacks an axis of the toolpath."""
     limits = Limits.of(machine, toolpath.axes)
     linear = np.isin(toolpath.axes, LINEAR_AXES).astype(np.float64)
-    edges = _edges(toolpath)
+    edges = edges_of(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
     for begin, end in pairwise(stops):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
         budgets = budgets_of(toolpath, machine, first)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
-        shape = _shapes(toolpath, row, vertex)
+        shape = shapes_of(toolpath, row, vertex)
         curved = toolpath.curve[row] >= 0
         curves = toolpath.curves.part(toolpath.curve[row][curved])
         moves = (
@@ -235,7 +234,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             first=first,
             curvature=toolpath.curvature[row],
             curve=np.where(curved, np.cumsum(curved) - 1, -1),
-            curves=dataclasses.replace(curves, points=curves.points[:, :, moves]),
+            curves=replace(curves, points=curves.points[:, :, moves]),
             budget=budgets.leg,
             feed=toolpath.feed[row],
             across_max=np.where(held, budgets.across, np.inf),
@@ -315,41 +314,3 @@ def with_reserve(run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: F
         reserved=budgets.reserved,
         across_max=np.minimum(run.across_max, budgets.across),
     )
-
-
-def _edges(toolpath: Toolpath) -> Array:
-    """Joints between legs: those of geometry/legs.py, and where feed or budget, the larger one of its
-    joints', change on a line."""
-    budget = np.maximum(toolpath.tolerance[:-1], toolpath.tolerance[1:])
-    edge = np.zeros(len(toolpath) + 1, dtype=bool)
-    edge[legs_of(toolpath).first] = True
-    edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) | (np.diff(budget) != 0)
-    return np.flatnonzero(edge)
-
-
-def _shapes(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:
-    """The coefficients of the legs that begin with the segments `row`."""
-    arc, arcs, curve = toolpath.arc[row], toolpath.arcs, np.flatnonzero(toolpath.curve[row] >= 0)
-    chord = np.diff(vertex, axis=0)
-    length = np.where(toolpath.straight[row], np.linalg.norm(chord, axis=1), toolpath.length[row])
-    shape = {
-        "length": length,
-        "base": vertex[:-1].copy(),
-        "drift": chord / length[:, None],
-        "e1": np.zeros_like(chord),
-        "e2": np.zeros_like(chord),
-        "radius": np.zeros(len(row)),
-        "rate": np.zeros(len(row)),
-    }
-    curved = arc >= 0
-    for name, source in (
-        ("base", "center"),
-        *((same, same) for same in ("drift", "e1", "e2", "radius", "rate")),
-    ):
-        shape[name][curved] = getattr(arcs, source)[arc[curved]]
-    if len(curve):
-        bend = toolpath.curvature[row[curve]]
-        third, fourth = toolpath.curves.part(toolpath.curve[row[curve]]).further_bounds(length[curve])
-        shape["drift"][curve], shape["radius"][curve] = 0.0, 1.0 / bend
-        shape["rate"][curve] = np.maximum(third / bend, np.sqrt(fourth / bend))
-    return shape

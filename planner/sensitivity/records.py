@@ -34,8 +34,9 @@ class CornerTable:
     def __post_init__(self) -> None:
         corners = len(self.line)
         freeze(self, "line", np.int32, (corners,))
-        for name in ("theta", "d_in", "d_out", "tol_ap", "kappa_max", "feed_closed_form", "feed_planned"):
-            freeze(self, name, np.float64, (corners,))
+        freeze(
+            self, "theta d_in d_out tol_ap kappa_max feed_closed_form feed_planned", np.float64, (corners,)
+        )
 
     def __len__(self) -> int:
         return len(self.line)
@@ -96,8 +97,7 @@ class DearCorners:
         corners = len(self.line)
         freeze(self, "line", np.int32, (corners,))
         freeze(self, "position", np.float64, (corners, None))
-        for name in ("theta", "price", "saved"):
-            freeze(self, name, np.float64, (corners,))
+        freeze(self, "theta price saved", np.float64, (corners,))
 
     def __len__(self) -> int:
         return len(self.line)
@@ -119,8 +119,7 @@ class PlacePrices:
 
     def __post_init__(self) -> None:
         segments = len(self.feed)
-        freeze(self, "feed", np.float64, (segments,))
-        freeze(self, "limits", np.float64, (segments,))
+        freeze(self, "feed limits", np.float64, (segments,))
         if self.tolerance is not None:
             freeze(self, "tolerance", np.float64, (segments + 1,))
 

@@ -54,8 +54,7 @@ class Ringing:
     after: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("during", "after"):
-            freeze(self, name, np.float64, (len(self.axes),))
+        freeze(self, "during after", np.float64, (len(self.axes),))
 
     def summary(self) -> dict[str, Any]:
         """A row of `summary.json`'s `ringing`."""

@@ -47,24 +47,15 @@ ROOM_LEAST = 0.1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Violations:
-    """Where the filtered motion leaves the tolerance.
+    """Where the filtered motion leaves the tolerance."""
 
-    time      : (n,) time behind the filters [s]
-    ratio     : (n,) error over tolerance [-]
-    path      : (n,) what the ratio is without filters, by the path alone [-]
-    vertex    : (n,) index of the vertex that is missed, -1 for places off the contour
-    near      : (N+1,) error over tolerance at every vertex [-]
-    near_time : (N+1,) when the filtered motion is nearest to the vertex [s]
-    worst     : (N,) largest error over tolerance of the contour on every piece [-]
-    """
-
-    time: FloatArray
-    ratio: FloatArray
-    path: FloatArray
-    vertex: Array
-    near: FloatArray
-    near_time: FloatArray
-    worst: FloatArray
+    time: FloatArray  # (n,) time behind the filters [s]
+    ratio: FloatArray  # (n,) error over tolerance [-]
+    path: FloatArray  # (n,) what the ratio is without filters, by the path alone [-]
+    vertex: Array  # (n,) index of the vertex that is missed, -1 for places off the contour
+    near: FloatArray  # (N+1,) error over tolerance at every vertex [-]
+    near_time: FloatArray  # (N+1,) when the filtered motion is nearest to the vertex [s]
+    worst: FloatArray  # (N,) largest error over tolerance of the contour on every piece [-]
 
     @property
     def less(self) -> FloatArray:

@@ -27,19 +27,14 @@ TimedT = TypeVar("TimedT", Motion, AxisMotion)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionRuns:
-    """G runs of a motion between its standstills.
+    """G runs of a motion between its standstills."""
 
-    first : (G,) index of the first piece of the run
-    last  : (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the
-            number of pieces
-    begin : (G,) [s]
-    end   : (G,) [s]
-    """
-
-    first: Array
+    first: Array  # (G,) index of the first piece of the run
+    # (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the number of
+    # pieces
     last: Array
-    begin: FloatArray
-    end: FloatArray
+    begin: FloatArray  # (G,) [s]
+    end: FloatArray  # (G,) [s]
 
     def __len__(self) -> int:
         return len(self.first)

@@ -37,22 +37,14 @@ Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions
 
 class Errors(NamedTuple):
     """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of
-    places.
+    places."""
 
-    time      : (n,) of places where the contour leaves the tolerance [s]
-    ratio     : (n,) there
-    piece     : (n,) and the piece of the path that they are at
-    near      : (N+1,) of every vertex
-    near_time : (N+1,) when the motion is nearest to it [s]
-    worst     : (N,) the largest of the contour on each piece
-    """
-
-    time: FloatArray
-    ratio: FloatArray
-    piece: Array
-    near: FloatArray
-    near_time: FloatArray
-    worst: FloatArray
+    time: FloatArray  # (n,) of places where the contour leaves the tolerance [s]
+    ratio: FloatArray  # (n,) there
+    piece: Array  # (n,) and the piece of the path that they are at
+    near: FloatArray  # (N+1,) of every vertex
+    near_time: FloatArray  # (N+1,) when the motion is nearest to it [s]
+    worst: FloatArray  # (N,) the largest of the contour on each piece
 
     @property
     def over(self) -> bool:
@@ -61,22 +53,14 @@ class Errors(NamedTuple):
 
 
 class _Pieces(NamedTuple):
-    """N pieces of a chain of K links.
+    """N pieces of a chain of K links."""
 
-    of     : (K,) the piece of each link
-    first  : (N+1,) the first link of each piece; last, K
-    leg    : (K,) leg of a link that is a chord of an arc or curve, -1 for a line
-    x      : (K,) the leg's parameter where the link begins [mm]
-    step   : (K,) by how much it grows along the link [mm]
-    length : (K,) range of the leg's parameter [mm]
-    """
-
-    of: Array
-    first: Array
-    leg: Array
-    x: FloatArray
-    step: FloatArray
-    length: FloatArray
+    of: Array  # (K,) the piece of each link
+    first: Array  # (N+1,) the first link of each piece; last, K
+    leg: Array  # (K,) leg of a link that is a chord of an arc or curve, -1 for a line
+    x: FloatArray  # (K,) the leg's parameter where the link begins [mm]
+    step: FloatArray  # (K,) by how much it grows along the link [mm]
+    length: FloatArray  # (K,) range of the leg's parameter [mm]
 
 
 class PathErrors:

@@ -19,22 +19,16 @@ from planner.motion.axis_motion import AxisMotion
 
 @dataclass(frozen=True, eq=False)
 class FoundRun:
-    """How the search along a run ended.
-
-    steps : None where the start stays
-    place : (N+1,) of the nodes along the run [mm]
-    times : (N+1,) of the nodes in the motion of the start [s]
-    kept  : (N,) steps that stand for the motion of the start; None for none
-    price : (N, 3 A + 5) what the limits of each step cost (price.py) [s]; None where the solver does not tell
-    """
+    """How the search along a run ended."""
 
     run: TubeRun
     status: Status
     sentence: str
-    steps: Steps | None = None
-    place: FloatArray | None = None
-    times: FloatArray | None = None
-    kept: Array | None = None
+    steps: Steps | None = None  # None where the start stays
+    place: FloatArray | None = None  # (N+1,) of the nodes along the run [mm]
+    times: FloatArray | None = None  # (N+1,) of the nodes in the motion of the start [s]
+    kept: Array | None = None  # (N,) steps that stand for the motion of the start; None for none
+    # (N, 3 A + 5) what the limits of each step cost (price.py) [s]; None where the solver does not tell
     price: FloatArray | None = None
 
     @property

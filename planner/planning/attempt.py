@@ -15,31 +15,20 @@ from planner.planning.optimal.on_path import OnPath
 
 @dataclass(frozen=True, kw_only=True)
 class Tried:
-    """The outcome of the attempts so far.
+    """The outcome of the attempts so far."""
 
-    best  : the fastest plan; None before there is one
-    path  : the time-optimal motion on a path, and in time with its limits kept between grid points, not
-            delivered yet; None before
-    joint : whether the best is of the joint search
-    steps : of constant jerk, that the joint search has
-    left  : whether the joint search has anything to gain
-    """
-
-    best: Plan | None = None
+    best: Plan | None = None  # the fastest plan; None before there is one
+    # the time-optimal motion on a path, and in time with its limits kept between grid points, not delivered
+    # yet; None before
     path: tuple[OnPath, Motion] | None = None
-    joint: bool = False
-    steps: int = 0
-    left: bool = True
+    joint: bool = False  # whether the best is of the joint search
+    steps: int = 0  # of constant jerk, that the joint search has
+    left: bool = True  # whether the joint search has anything to gain
 
 
 class Attempt(NamedTuple):
-    """One way to a motion.
+    """One way to a motion."""
 
-    name    : as the trace has it
-    applies : whether it is made, after what was tried before
-    make    : what is there after it
-    """
-
-    name: str
-    applies: Callable[[Job, Settings, Tried], bool]
-    make: Callable[[Job, Settings, Tried], Tried]
+    name: str  # as the trace has it
+    applies: Callable[[Job, Settings, Tried], bool]  # whether it is made, after what was tried before
+    make: Callable[[Job, Settings, Tried], Tried]  # what is there after it

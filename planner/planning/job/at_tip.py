@@ -25,20 +25,15 @@ from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """The verifier's view of delivered setpoints.
+    """The verifier's view of delivered setpoints."""
 
-    program, toolpath, machine : as `verify` has them
-    given       : which columns were delivered, and with how many digits
-    not_limited : quantities that are reported and not judged
-    progress    : called now and then with the fraction done (0 to 1)
-    """
-
+    # program, toolpath and machine: as `verify` has them
     program: Program
     toolpath: Toolpath
     machine: Machine
-    given: Given = WHOLE
-    not_limited: tuple[str, ...] = ()
-    progress: Callable[[float], None] | None = None
+    given: Given = WHOLE  # which columns were delivered, and with how many digits
+    not_limited: tuple[str, ...] = ()  # quantities that are reported and not judged
+    progress: Callable[[float], None] | None = None  # called now and then with the fraction done (0 to 1)
 
 
 def chain_of(program: Program, machine: Machine) -> Chain | None:

@@ -36,18 +36,12 @@ _WAITS = {0: "a person", 1: "a person", 60: "a person", 109: "a temperature", 11
 
 @dataclass(frozen=True, kw_only=True)
 class Beside:
-    """One kind of things that happen while the axes stand still.
+    """One kind of things that happen while the axes stand still."""
 
-    what    : its name, in the singular: "tool change", "spindle start", "M8"
-    count   : how often
-    each    : how long it takes [s]; None where that is not known
-    because : why it is not known
-    """
-
-    what: str
-    count: int
-    each: float | None
-    because: str = ""
+    what: str  # its name, in the singular: "tool change", "spindle start", "M8"
+    count: int  # how often
+    each: float | None  # how long it takes [s]; None where that is not known
+    because: str = ""  # why it is not known
 
     @property
     def seconds(self) -> float:

@@ -47,23 +47,18 @@ BOLDER = 2.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
-    """A program on its way to a plan.
+    """A program on its way to a plan."""
 
-    program   : the blocks as they were read
-    machine   : limits, interpolation period, filters
-    toolpath  : the path that is planned: the exact programmed path with its tolerances, or with smaller ones
-                (`with_share`, delivery/periods.py)
-    stages    : the clock
-    judged    : machine and toolpath by which the motion is judged, if it is planned with others; else None
-    most      : what a plan takes that there is already [s]: a motion that takes longer is of no use, and need
-                not be delivered
-    """
-
-    program: Program
-    machine: Machine
+    program: Program  # the blocks as they were read
+    machine: Machine  # limits, interpolation period, filters
+    # the path that is planned: the exact programmed path with its tolerances, or with smaller ones
+    # (`with_share`, delivery/periods.py)
     toolpath: Toolpath
-    stages: Stages
+    stages: Stages  # the clock
+    # machine and toolpath by which the motion is judged, if it is planned with others; else None
     judged: tuple[Machine, Toolpath] | None = None
+    # what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be
+    # delivered
     most: float = np.inf
 
     @property

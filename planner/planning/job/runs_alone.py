@@ -20,18 +20,13 @@ ALONE_MOST, VERDICTS = 100, 3
 
 
 class Alone(NamedTuple):
-    """A motion that passes.
-
-    begin : (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples
-            [s]
-    plans : of the runs that are planned by themselves, by their number
-    notes : what these gave up
-    """
+    """A motion that passes."""
 
     delivered: Delivered
+    # (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples [s]
     begin: FloatArray
-    plans: dict[int, Plan]
-    notes: tuple[str, ...]
+    plans: dict[int, Plan]  # of the runs that are planned by themselves, by their number
+    notes: tuple[str, ...]  # what these gave up
 
 
 def with_runs_alone(

@@ -22,22 +22,16 @@ Fact = int | float | str | bool
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One thing that was done or tried.
+    """One thing that was done or tried."""
 
-    at     : computing time of this process since the job began, at the end of the step [s]
-    name   : what it was: "solve", "reshape", "tighten", ...
-    found  : cycle time of what it found [s]; NaN where nothing was found, None where a step has no time
-    before : cycle time of the best until then [s], which `found` competes with; None where nothing competes
-    kept   : whether it took the place of the best; None where nothing competes
-    facts  : numbers and words about it, by name
-    """
-
-    at: float
-    name: str
+    at: float  # computing time of this process since the job began, at the end of the step [s]
+    name: str  # what it was: "solve", "reshape", "tighten", ...
+    # cycle time of what it found [s]; NaN where nothing was found, None where a step has no time
     found: float | None = None
+    # cycle time of the best until then [s], which `found` competes with; None where nothing competes
     before: float | None = None
-    kept: bool | None = None
-    facts: dict[str, Fact] = field(default_factory=dict)
+    kept: bool | None = None  # whether it took the place of the best; None where nothing competes
+    facts: dict[str, Fact] = field(default_factory=dict)  # numbers and words about it, by name
 
     @property
     def gain(self) -> float | None:

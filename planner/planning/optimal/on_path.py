@@ -20,22 +20,15 @@ from planner.smoothing.spline_path import SplineShape
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OnPath:
-    """A smooth path and the time-optimal motion on it.
+    """A smooth path and the time-optimal motion on it."""
 
-    path     : rounded corners or splines
-    samples  : its grid
-    problem  : the feedrate problem on the grid
-    solution : the motion, or the status of a failure
-    shape    : what the path's splines are made of, if it has some that may be reshaped
-    notes    : sentences on what was given up
-    """
-
-    path: SmoothPath
-    samples: PathSamples
-    problem: FeedrateProblem
-    solution: FeedrateSolution
+    path: SmoothPath  # rounded corners or splines
+    samples: PathSamples  # its grid
+    problem: FeedrateProblem  # the feedrate problem on the grid
+    solution: FeedrateSolution  # the motion, or the status of a failure
+    # what the path's splines are made of, if it has some that may be reshaped
     shape: SplineShape | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # sentences on what was given up
 
     def faster_than(self, other: OnPath) -> bool:
         """True if this motion was found and takes less time than another that was found."""

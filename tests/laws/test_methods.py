@@ -153,15 +153,18 @@ def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds)
 @settings(max_examples=30)
 def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed):
-    """Where it is run through and the tolerance, not the feed, makes it as fast as it is; exactly 0 where it is stopped at."""
+    """At most, where it is run through; exactly 0 where it is stopped at. With more tolerance alone it is missed by more, or the feed
+    makes it as fast as it is."""
     limits = machine(seed, dt=1e-4)
     made = plan(corner_job(theta, axes, seed), limits, method="kinematic")
     missed, bow = made.verdict.vertex_error_mm, 1e4 * limits.dt**2 / 8
     assert missed <= limits.tolerance
-    if not len(made.rounded):
+    if made.sentence.startswith("0 corners"):
         assert missed <= bow
-    elif made.rounded.limited_by[0] == "tolerance":
-        assert missed >= limits.tolerance * (1 - 2e-3) - bow
+    elif missed < limits.tolerance * (1 - 2e-3) - bow:
+        wider = limits.model_copy(update={"tolerance": 1.5 * limits.tolerance})
+        again = plan(corner_job(theta, axes, seed), wider, method="kinematic")
+        assert again.trajectory.cycle_time == pytest.approx(made.trajectory.cycle_time, rel=1e-6)
 
 
 @pytest.mark.slow

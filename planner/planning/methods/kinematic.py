@@ -33,7 +33,6 @@ from planner.baselines.lookahead.look_ahead import look_ahead
 from planner.baselines.lookahead.ramps import JointKind
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners import kinematic as corner
-from planner.corners.budget import error_rate, normal_at_corners, normal_within_budget
 from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
@@ -44,10 +43,8 @@ from planner.machine import Machine
 from planner.motion.axis_motion import AxisMotion
 from planner.nc.program import PathControl
 from planner.planning.job.job import Job
-from planner.planning.job.made import Tables
 from planner.planning.job.plan import Plan
 from planner.planning.page import CLOSED_FORM_WAYS, Method
-from planner.sensitivity.records import CornerTable
 
 # Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough
 # for corners that fill their chords: those leave the vertex by 2/3 to 1 of the sagitta.
@@ -79,8 +76,6 @@ class KinematicMethod(Method):
             chain = self._chain(job.toolpath, machine, exact)
             motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
         made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)
-        with job.stage("report"):
-            rounded = _corner_table(chain, job.machine)
         return job.plan(
             made,
             method="kinematic",
@@ -89,7 +84,6 @@ class KinematicMethod(Method):
             status=Status.OPTIMAL,
             sentence=_sentence(chain),
             grid_points=len(chain.path) + 1,
-            tables=Tables(rounded=rounded),
             notes=_curve_notes(job.toolpath, exact),
         )
 
@@ -110,34 +104,20 @@ class KinematicMethod(Method):
         lines = parted_by_feed(chorded(toolpath, CHORD_FRACTION, whole))
         path = legs_of(lines)
         legs = leg_limits(path, lines, machine)
-        free = corner_passages(path, lines, legs, machine, self.start_stop)
-        fitting = [fitted(way, legs) for way in free]
-        passage, time = look_ahead(legs, fitting)
-        return _Chain(
-            lines=lines, path=path, legs=legs, free=free, fitting=fitting, passage=passage, time=time
-        )
+        ways = corner_passages(path, lines, legs, machine, self.start_stop)
+        passage, time = look_ahead(legs, [fitted(way, legs) for way in ways])
+        return _Chain(lines=lines, path=path, legs=legs, passage=passage, time=time)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Chain:
-    """A program as a chain of n legs with n+1 joints, and how the look-ahead passes them.
+    """A program as a chain of n legs with n+1 joints, and how the look-ahead passes them."""
 
-    lines   : the toolpath with its arcs as chords
-    path    : its legs
-    legs    : (n,) records of what they allow (baselines/lookahead/ramps.py)
-    free    : (n+1,) records each, the candidates by themselves
-    fitting : the candidates that fit on their legs
-    passage : (n+1,) what was chosen
-    time    : (n+1,) when each joint's corner is over, standstills not counted [s]
-    """
-
-    lines: Toolpath
+    lines: Toolpath  # with its arcs as chords
     path: Legs
-    legs: np.recarray
-    free: list[np.recarray]
-    fitting: list[np.recarray]
-    passage: np.recarray
-    time: FloatArray
+    legs: np.recarray  # (n,) records of what they allow (baselines/lookahead/ramps.py)
+    passage: np.recarray  # (n+1,) records of what was chosen at the joints
+    time: FloatArray  # (n+1,) when each joint's corner is over, standstills not counted [s]
 
     @property
     def turns(self) -> Array:
@@ -202,46 +182,6 @@ def _motion(chain: _Chain, axes: tuple[str, ...], radius: float) -> AxisMotion:
         line=chain.lines.line[pieces.segment],
         end=float(end[-1]),
     )
-
-
-def _corner_table(chain: _Chain, machine: Machine) -> CornerTable:
-    """The corners that are run through, at their apexes."""
-    kind, V, p, q = (getattr(chain.passage, name) for name in ("kind", "V", "p", "q"))
-    k = np.flatnonzero((kind == JointKind.ZERO) | (kind == JointKind.ENTRY))
-    lines, at, u = chain.lines, chain.path.first[k], chain.path.table["direction"]
-    V, p, q, zero = V[k], p[k], q[k], kind[k] == JointKind.ZERO
-    theta, tol = lines.theta[at], lines.tolerance[at]
-    s, c = np.sin(theta / 2), np.cos(theta / 2)
-    T1, _ = corner.phase_times(V, p, q)
-    length = np.where(zero, corner.approach(V, p, q), corner.entry_length(V, p, q))
-    middle = np.where(zero, corner.middle(V, p, q), length / 8)
-    normal = np.where(zero, 2 * s * V / T1, s * corner.entry_acceleration(V, p, q))
-    speed = c * V * np.where(zero, 1.0, 0.5)
-    reachable = normal_at_corners(machine, lines.axes, u[k - 1], u[k])
-    largest = normal_within_budget(tol, 2 * s * middle, reachable, error_rate(machine))
-    return CornerTable(
-        line=lines.line[at - 1],
-        theta=theta,
-        d_in=length,
-        d_out=length,
-        tol_ap=2 * s * middle,
-        kappa_max=normal / speed**2,
-        feed_closed_form=speed * np.sqrt(largest / normal),
-        feed_planned=speed,
-        limited_by=_limited_by(chain, k),
-    )
-
-
-def _limited_by(chain: _Chain, k: Array) -> Array:
-    """The limit that holds each of the corners k."""
-    V, kind = chain.passage.V[k], chain.passage.kind[k]
-    said = np.full(len(k), "look-ahead", dtype=object)
-    for free, fitting in zip(chain.free, chain.fitting, strict=True):
-        mine = free.kind[k] == kind
-        said[mine & (fitting.V[k] == V)] = "leg length"
-        said[mine & (free.V[k] == V)] = "tolerance"
-    said[np.minimum(chain.legs.v[k - 1], chain.legs.v[k]) == V] = "feed"
-    return said.astype(str)
 
 
 def _sentence(chain: _Chain) -> str:

@@ -43,7 +43,6 @@ def test_it_is_verified_within_eps_and_faster_than_stopping(planned):
     assert verdict.contour_error_mm <= 0.05
     assert verdict.vertex_error_mm <= 0.05
     assert planned.trajectory.cycle_time < planned.stop_time
-    assert planned.rounded.worst_ratio() <= 1 + 1e-9
 
 
 def test_some_limit_is_reached(planned):
@@ -256,37 +255,11 @@ def test_settings_that_make_no_sense_are_refused(settings_):
         KinematicMethod(**settings_)
 
 
-def test_it_has_a_name_and_reports_its_corners():
+def test_it_has_a_name_and_counts_its_corners():
     made = plan(JOBS["pentagon"], MACHINE, method="kinematic")
     assert made.method == "kinematic"
     assert made.corner == "kinematic"
-    corners = made.rounded
-    assert len(corners) == 4
-    np.testing.assert_allclose(np.rad2deg(corners.theta), 72.0)
-    assert set(corners.limited_by) <= {"tolerance", "leg length", "look-ahead", "feed"}
-    # at the apex the motion really has the speed of the table
-    t = made.trajectory
-    for k in range(4):
-        vertex = made.toolpath.end[k]
-        near = np.linalg.norm(t.position - vertex, axis=1).argmin()
-        assert np.linalg.norm(t.velocity[near]) == pytest.approx(corners.feed_planned[k], rel=0.05)
-
-
-@pytest.mark.parametrize(("normal", "dt"), [(None, 1e-4), (1500.0, 1e-4), (None, 4e-3)])
-def test_the_closed_form_is_that_of_the_motion_s_own_curvature(normal, dt):
-    """sqrt(X/kappa), X = min(A, (eps - eps_ap)/(dt^2/8)), with kappa and eps_ap measured on the motion at its nearest point."""
-    machine = problems.machine(normal_acceleration=normal, dt=dt)
-    made = kinematic(JOBS["pentagon"], machine)
-    found, n = made.corners, made.toolpath.tangent_start[1:] - made.toolpath.tangent_end[:-1]
-    assert len(made.rounded) == len(found) == 4
-    most = np.minimum(
-        np.abs(n) @ machine.limits("acceleration", made.toolpath.axes) / np.linalg.norm(n, axis=1),
-        normal or np.inf,
-    )
-    kappa = found.chord_error / (dt**2 / 8) / found.feed_planned**2
-    expected = np.sqrt(np.minimum(most, (0.05 - found.miss) / (dt**2 / 8)) / kappa)
-    np.testing.assert_allclose(made.rounded.feed_closed_form, expected, rtol=1e-4)
-    np.testing.assert_allclose(made.rounded.feed_planned, found.feed_planned, rtol=1e-5)
+    assert made.sentence.startswith("4 corners are run through")
 
 
 def test_samples_on_both_sides_of_a_stop_do_not_cut_its_vertex():

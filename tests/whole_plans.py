@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.corners.blend import CORNER_DTYPE, corner_point
 from planner.corners.elements import to_arc_length
 from planner.corners.own import PolynomialCorner
@@ -82,6 +83,32 @@ def solve(
         problem=problem,
         solution=solution,
         law=law_of_solution(samples, solution),
+    )
+
+
+class Apexes(NamedTuple):
+    """Corners that are rounded one by one, at their apexes: what eq. (19) says of their very shape, and a profile there."""
+
+    joint: Array
+    index: Array
+    theta: FloatArray
+    d_in: FloatArray
+    tol_ap: FloatArray
+    kappa: FloatArray
+    closed_form: FloatArray
+    planned: FloatArray
+
+
+def apexes(samples: PathSamples, feed: FloatArray) -> Apexes:
+    """The corners of a path on a grid of P points, passed at `feed` (P,) [mm/s]."""
+    middle = (samples.element < 0) & (samples.w0 == 0.5)
+    middle[samples.piece[1:] - 1] = False  # they repeat what is said of the interval before
+    index = np.flatnonzero(middle)
+    path, joint = samples.path, ~samples.element[index]
+    kappa = np.linalg.norm(samples.d2_right[index], axis=1)
+    closed = np.sqrt(path.normal_max[joint] / kappa)
+    return Apexes(
+        joint, index, path.theta[joint], path.d_in[joint], path.tol_ap[joint], kappa, closed, feed[index]
     )
 
 

@@ -16,37 +16,6 @@ PRICES_SHOWN = 4  # of a price list, in a line
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CornerTable:
-    """One row for each rounded corner, in the order of the path."""
-
-    line: Array  # (C,) NC line of the block that ends at the corner
-    theta: FloatArray  # (C,) turning angle [rad]
-    # d_in and d_out: (C,) tangent lengths before and after the vertex [mm]
-    d_in: FloatArray
-    d_out: FloatArray
-    tol_ap: FloatArray  # (C,) part of the tolerance that the rounding uses, eps_ap [mm]
-    kappa_max: FloatArray  # (C,) curvature at the apex [1/mm]
-    # (C,) speed by error allocation, eq. 19 with the curvature of this corner [mm/s]
-    feed_closed_form: FloatArray
-    feed_planned: FloatArray  # (C,) planned speed at the apex [mm/s]
-    limited_by: Array  # (C,) name of the constraint that is closest to its limit there
-
-    def __post_init__(self) -> None:
-        corners = len(self.line)
-        freeze(self, "line", np.int32, (corners,))
-        freeze(
-            self, "theta d_in d_out tol_ap kappa_max feed_closed_form feed_planned", np.float64, (corners,)
-        )
-
-    def __len__(self) -> int:
-        return len(self.line)
-
-    def worst_ratio(self) -> float:
-        """Largest planned over closed-form speed; 0 without corners."""
-        return float((self.feed_planned / self.feed_closed_form).max(initial=0.0))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
     """The profile at the grid points of the solver, and the limits that are active at each of them
     (sensitivity/activity.py).

@@ -31,19 +31,11 @@ STEPS = 4  # in which a grid interval is sampled: peaks are then good to the fou
 # Limits along blocks that differ by less than this fraction are the same [-]: coordinates rounded to 1e-9 of
 # a block's length.
 SAME = 1e-9
-QUANTITIES = ("acceleration", "jerk")
 
 
-class CornerSpeeds(NamedTuple):
-    """The largest constant speeds in the corners of a path of R legs."""
-
-    speed: FloatArray  # (R+1,) [mm/s]; inf where there is no corner
-    limited_by: Array  # (R+1,) name of the limit that holds it
-
-
-def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
-    """The largest speed at which each corner of a sampled path can be run through from end to end (module
-    text)."""
+def constant_speeds(samples: PathSamples, machine: Machine) -> FloatArray:
+    """(R+1,) the largest speed at which each corner of a sampled path can be run through from end to end
+    (module text) [mm/s]; inf where there is no corner."""
     axes = samples.path.toolpath.axes
     limits = np.array([machine.limits("acceleration", axes), machine.limits("jerk", axes)])
     problem = feedrate_problem(samples, machine.with_own(()))
@@ -51,25 +43,14 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> CornerSpeeds:
     at = interval[samples.element[interval] < 0]
     joint = ~samples.element[at]
     bends = np.zeros((len(at), 2))
-    which = np.zeros((len(at), 2), np.int64)
     on = ElementIntervals(*samples.table, samples.element[at], samples.w0[at], samples.w1[at])
-    _bends(on, limits, bends, which)
-    ends = np.where(problem.feed_sq_max[at] <= problem.feed_sq_max[at + 1], at, at + 1)
+    _bends(on, limits, bends)
+    feed_sq = np.minimum(problem.feed_sq_max[at], problem.feed_sq_max[at + 1])
     with np.errstate(divide="ignore"):
-        bounds = np.stack(
-            [np.sqrt(problem.feed_sq_max[ends]), bends[:, 0] ** -0.5, bends[:, 1] ** (-1.0 / 3.0)]
-        )
-    names = np.array(problem.bound_names + tuple(f"{q}.{axis}" for q in QUANTITIES for axis in axes))
-    first = len(problem.bound_names)
-    name = np.stack([problem.feed_sq_bound[ends], first + which[:, 0], first + len(axes) + which[:, 1]])
-    tightest = bounds.argmin(axis=0)
-    bound, name = (np.take_along_axis(rows, tightest[None], axis=0)[0] for rows in (bounds, name))
-
-    speed, limited_by = np.full(len(samples.path.d), np.inf), np.zeros(len(samples.path.d), np.int64)
-    np.minimum.at(speed, joint, bound)
-    lowest = bound == speed[joint]
-    limited_by[joint[lowest]] = name[lowest]
-    return CornerSpeeds(speed, names[limited_by])
+        bounds = np.sqrt(feed_sq), bends[:, 0] ** -0.5, bends[:, 1] ** (-1.0 / 3.0)
+    speed = np.full(len(samples.path.d), np.inf)
+    np.minimum.at(speed, joint, np.min(bounds, axis=0))
+    return speed
 
 
 class CornerChain(NamedTuple):
@@ -135,9 +116,8 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
 
 
 @njit(cache=True, error_model="numpy")
-def _bends(on, limits, bends, which):
-    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2), and their axes k into
-    which (n, 2).
+def _bends(on, limits, bends):
+    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2).
 
     on     : `ElementIntervals`
     limits : (2, A) accelerations and jerks of the axes
@@ -161,6 +141,4 @@ def _bends(on, limits, bends, which):
                     largest = max(largest, abs(g[p]))
                     if 0 < p < STEPS:
                         second = max(second, abs(g[p - 1] - 2.0 * g[p] + g[p + 1]))
-                ratio = (largest + second / 8.0) / limits[q, k]
-                if ratio > bends[i, q]:
-                    bends[i, q], which[i, q] = ratio, k
+                bends[i, q] = max(bends[i, q], (largest + second / 8.0) / limits[q, k])

@@ -257,7 +257,6 @@ class Job:
             sentence=sentence,
             trajectory=trajectory,
             verdict=verdict,
-            rounded=tables.rounded,
             grid=tables.grid,
             stop_time=self.stop_time,
             grid_points=grid_points,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 from planner.planning.optimal.on_path import OnPath
-from planner.sensitivity.records import CornerTable, GridHistory, PriceList
+from planner.sensitivity.records import GridHistory, PriceList
 from planner.verifier import Verdict
 
 
@@ -53,7 +53,6 @@ class Making(NamedTuple):
 class Tables:
     """The tables of a plan besides the motion, as far as it can: fields of `Plan`."""
 
-    rounded: CornerTable | None = None
     grid: GridHistory | None = None
     prices: PriceList | None = None
     priced: OnPath | None = None

@@ -15,7 +15,7 @@ from planner.nc.program import Program
 from planner.planning.job.beside import Beside, beside_motion
 from planner.planning.job.made import Delivered, Making
 from planner.planning.job.shown import Shown
-from planner.sensitivity.records import CornerTable, GridHistory, PriceList
+from planner.sensitivity.records import GridHistory, PriceList
 from planner.verifier import CornerCheck, Verdict
 
 
@@ -33,7 +33,6 @@ class Plan(Shown):
                           solved
     joints              : of a program with the tool centre point on: the same motion as setpoints of the
                           joints; `trajectory` is that of the tip
-    rounded             : the corners that are rounded one by one, each with its closed-form speed, or None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
     making              : of a plan on its way what only planning needs; None in a finished one, and unless
@@ -54,7 +53,6 @@ class Plan(Shown):
     sentence: str
     trajectory: Trajectory | None
     verdict: Verdict | None
-    rounded: CornerTable | None
     grid: GridHistory | None
     stop_time: float
     grid_points: int
@@ -112,7 +110,7 @@ class Plan(Shown):
 
     def without_motion(self, why: str) -> Plan:
         """The plan without its motion, which is not delivered."""
-        gone = dict.fromkeys(("trajectory", "verdict", "rounded", "grid", "prices", "making"))
+        gone = dict.fromkeys(("trajectory", "verdict", "grid", "prices", "making"))
         return replace(self, status=Status.INFEASIBLE, sentence=why, **gone)  # type: ignore[arg-type]
 
     @property

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.baselines.lookahead.constant_speed_corners import CornerSpeeds, constant_speeds, corner_chain
+from planner.baselines.lookahead.constant_speed_corners import constant_speeds, corner_chain
 from planner.baselines.lookahead.look_ahead import look_ahead, moves, swept
 from planner.baselines.lookahead.ramps import JointKind
 from planner.corners.bezier import BezierCorner
@@ -33,13 +33,10 @@ from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.motion.timing import Motion, law_of_moves
 from planner.planning.job.job import Job
-from planner.planning.job.made import Tables
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.notes import exact_note
 from planner.planning.optimal.tighten import slowed
 from planner.planning.page import CLOSED_FORM_WAYS, Method
-from planner.sensitivity.closed_form import corner_apexes, corners_at
-from planner.sensitivity.records import CornerTable
 
 # The fraction of every leg that its corners leave free, to change the speed on it [-]: with none all corners
 # are as slow as the first.
@@ -74,28 +71,26 @@ class BezierMethod(Method):
             path = round_corners(job.toolpath, shares, self.corner, blend_tangents=True, free=FREE_FRACTION)
             samples = sample_path(path, shares)
         with job.stage("solve"):
-            limits = constant_speeds(samples, shares)
-            chain = corner_chain(samples, machine, limits.speed)
+            speed = constant_speeds(samples, shares)
+            chain = corner_chain(samples, machine, speed)
             chosen, _ = look_ahead(chain.legs, [chain.passage])
             stops = chain.joint[(chain.joint >= 0) & (chosen.kind == JointKind.STOP)]
         with job.stage("geometry"):
             path = _stopped(path, stops)
             samples = sample_path(path, shares) if len(stops) else samples
         with job.stage("solve"):
-            motion = slowed(_motion(samples, machine, limits.speed), job.toolpath, machine)
+            passed = len(np.unique(samples.element[samples.element < 0]))
+            motion = slowed(_motion(samples, machine, speed), job.toolpath, machine)
         motion = job.behind_filters(motion)
         made = job.deliver(motion, as_it_is=not self.allocate)
-        with job.stage("report"):
-            rounded = _corner_table(motion, limits)
         return job.plan(
             made,
             method="bezier",
             corner=self.corner.name,
             solver="look-ahead",
             status=Status.OPTIMAL,
-            sentence=f"{len(corner_apexes(samples))} corners are run through, {len(stops)} are faster as full stops",
+            sentence=f"{passed} corners are run through, {len(stops)} are faster as full stops",
             grid_points=len(samples),
-            tables=Tables(rounded=rounded),
             notes=exact_note(job.toolpath, exact_stops(job.toolpath)),
         )
 
@@ -117,13 +112,3 @@ def _motion(samples: PathSamples, machine: Machine, speed: FloatArray) -> Motion
     duration, jerk = moves(passage, chain.legs)
     law = law_of_moves(samples, chain.run, chain.begin, passage.V[:-1], duration, jerk)
     return Motion(samples=samples, law=law)
-
-
-def _corner_table(motion: Motion, limits: CornerSpeeds) -> CornerTable:
-    """The corners that are run through, beside their closed form."""
-    samples, law = motion.samples, motion.law
-    apex = corner_apexes(samples)
-    joint = ~samples.element[apex]
-    speed = law.feed[np.searchsorted(law.s, samples.s[apex], side="right") - 1]
-    free = speed < limits.speed[joint] * (1.0 - 1e-9)
-    return corners_at(samples, apex, speed, np.where(free, "look_ahead", limits.limited_by[joint]))

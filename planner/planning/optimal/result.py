@@ -16,7 +16,6 @@ from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
-from planner.sensitivity.closed_form import corner_table
 from planner.sensitivity.path_prices import SitePrices, path_prices
 from planner.sensitivity.records import PriceList
 
@@ -29,14 +28,13 @@ def plan_of_solution(
     tables: Tables = NO_TABLES,
 ) -> Plan:
     """The plan of a solution and what was delivered of it, None unless solved."""
-    rounded = grid = None
+    grid = None
     notes: tuple[str, ...] = ()
     if made is not None:
         delivered = made.motion
         if isinstance(delivered, ShapedMotion):
             delivered = delivered.motion  # what the solution is of
         with job.stage("report"):
-            rounded = corner_table(best.samples, best.problem, best.solution)
             grid = history(best.problem, best.solution, *times_of_pieces(delivered))
         notes = (*path_notes(job.toolpath, best), *best.notes)
     return job.plan(
@@ -47,7 +45,7 @@ def plan_of_solution(
         status=best.solution.status,
         sentence=best.solution.sentence,
         grid_points=len(best.samples),
-        tables=dataclasses.replace(tables, rounded=rounded, grid=grid),
+        tables=dataclasses.replace(tables, grid=grid),
         notes=notes,
     )
 

@@ -73,7 +73,6 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         trajectory=trajectory,
         joints=None if chain is None else motion,
         verdict=found.verdict,
-        rounded=None,
         grid=None,
         stop_time=math.inf if stop_time is None else stop_time,
         grid_points=summary["grid_points"],

@@ -1,16 +1,9 @@
 """Statements to Python source, compiled once: a loop of a million turns runs as Python's own code.
 
-Structured statements and jumps become the same thing: basic blocks, which end by saying which block is next,
-
-    while True:
-        if pc < 2:
-            if pc < 1: ... block 0 ...
-            else:      ... block 1 ...
-        else: ...
-
-found by halving, so that a jump among a thousand blocks takes ten comparisons, and loops may be nested as
-deep as one likes (Python allows 20). A loop asks its condition at the end of its turn, in the block of its
-body: a turn of a simple loop is one block.
+Structured statements and jumps become the same thing: basic blocks, functions inside that of their
+procedure, which return the number of the block that is next. So loops may be nested as deep as one likes
+(Python allows 20). A loop asks its condition at the end of its turn, in the block of its body: a turn of a
+simple loop is one block.
 
 A line of the Python source belongs to a statement, so that an error of Python's arithmetic is told as the
 statement's.
@@ -83,7 +76,7 @@ def _stays(statement: tree.Statement, read: set[tree.Parameter]) -> bool:
 TURNS_AT_ONCE = SIZES.turns_at_once
 # M codes that end the program: what is pending is executed, to see whether the program goes on.
 ENDS = (2.0, 30.0)
-_HEAD = "P=run.numbered;G=run.shared;S=run.rows.pending.append;V=run.rows.values.extend;R=run.get;A=run.ask;T=run.tick;n=0;pc=0"
+_HEAD = "P=run.numbered;G=run.shared;S=run.rows.pending.append;V=run.rows.values.extend;R=run.get;A=run.ask;T=run.tick"
 
 
 def whole(value: float | None) -> int:
@@ -137,9 +130,9 @@ class _Function:
     def __init__(self, procedure: tree.Procedure, language: tree.Language, rows: AppendedRows):
         self.procedure, self.language, self.rows = procedure, language, rows
         self.say = Expressions(language)
-        self.blocks = BasicBlocks(procedure.place)
+        self.blocks = BasicBlocks()
         self.loops: list[tuple[str, int, int]] = []  # name, label of the next turn, label after the loop
-        self.counters = 0
+        self.counters = 0  # of repeated loops, which count in L; L[0] is the value of the procedure
         self._seen = 0  # of `numbers`
 
     def source(self, name: str) -> list[tuple[str, tree.SourcePlace]]:
@@ -148,8 +141,8 @@ class _Function:
         labels = (s for s in tree.statements_in(self.procedure.body) if isinstance(s, tree.Label))
         self.blocks.numbers += [(label.number, self.blocks.label()) for label in labels]
         self._body(self.procedure.body)
-        self.blocks.put("run.turns+=n;return None", place)
-        return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *self.blocks.source()]
+        lines = self.blocks.source(place)
+        return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *lines, (" return L.get(0)", place)]
 
     # --- statements
     # -------------------------------------------------------------------------------------------------------
@@ -161,7 +154,7 @@ class _Function:
     def _plain_rows(self, plain: tree.PlainRows) -> None:
         self.blocks.put(f"S({self.rows.add_entry(plain.first, plain.last)})", plain.place)
         if plain.may_end:
-            self.blocks.put("run.turns+=n;n=0;run.flush()", plain.place)
+            self.blocks.put("run.flush()", plain.place)
 
     def _line(self, line: tree.Line) -> None:
         words, given = [], []
@@ -182,7 +175,7 @@ class _Function:
         for (target, _), value in zip(line.assignments, values, strict=True):
             self.blocks.put(self._assign(target, value, line.place), line.place)
         if any(letter == ord("M") and number in (None, *ENDS) for letter, _, number in words):
-            self.blocks.put("run.turns+=n;n=0;run.flush()", line.place)
+            self.blocks.put("run.flush()", line.place)
 
     def _assign(self, target: tree.Parameter, value: str, place: tree.SourcePlace) -> str:
         if isinstance(target, tree.Named):
@@ -211,7 +204,7 @@ class _Function:
         turn, again, after = self.blocks.label(), self.blocks.label(), self.blocks.label()
         if loop.kind == "repeat":
             self.counters += 1
-            left = f"r{self.counters}"
+            left = f"L[{self.counters}]"
             self.blocks.put(f"{left}=turns_of({self.say.value(loop.condition)})", loop.place)
             condition = f"{left}>0"
         else:
@@ -224,8 +217,7 @@ class _Function:
         self.loops.pop()
         if any(isinstance(s, tree.Continue) and s.loop == loop.name for s in tree.statements_in(loop.body)):
             self.blocks.here(again)
-        self.blocks.put("n+=1", loop.place)
-        self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", loop.place)
+        self._tick(loop.place)
         if loop.kind == "repeat":
             self.blocks.put(f"{left}-=1", loop.place)
         elif never_ends(loop, self.language):
@@ -246,16 +238,20 @@ class _Function:
         self._seen += 1
 
     def _goto(self, goto: tree.Goto) -> None:
-        if isinstance(goto.target, tree.Number):
-            self._tick(goto.place)
-            self.blocks.go(goto.place, self._target(goto.place, int(goto.target.value)))
-            return
         self._tick(goto.place)
-        self.blocks.jump(self.say.value(goto.target), goto.place)
+        if isinstance(goto.target, tree.Number):
+            self.blocks.go(goto.place, self._target(goto.place, int(goto.target.value)))
+        else:
+            self._jump(self.say.value(goto.target), goto.place)
+
+    def _jump(self, number: str, place: tree.SourcePlace) -> None:
+        """To the label of the program whose number that text gives."""
+        table = "".join(f"{known}:@{label}@," for known, label in reversed(self.blocks.numbers))
+        self.blocks.end(f"run.label({{{table}}},{number})", place)
 
     def _tick(self, place: tree.SourcePlace) -> None:
-        self.blocks.put("n+=1", place)
-        self.blocks.put(f"if n>{TURNS_AT_ONCE}:n=T(n)", place)
+        self.blocks.put("run.turns+=1", place)
+        self.blocks.put(f"if not run.turns%{TURNS_AT_ONCE}:T()", place)
 
     def _target(self, place: tree.SourcePlace, number: int) -> int:
         """The label of that number: the next one, or else the first of the procedure."""
@@ -281,15 +277,15 @@ class _Function:
             to, on = self.blocks.label(), self.blocks.label()
             self.blocks.go(call.place, to, "run.resume is not None", on)
             self.blocks.here(to)
-            self.blocks.jump("run.resumed()", call.place)
+            self._jump("run.resumed()", call.place)
             self.blocks.here(on)
 
     def _return(self, statement: tree.Return) -> None:
         if statement.label is not None:
             self.blocks.put(f"run.resume={self.say.value(statement.label)}", statement.place)
-        value = "None" if statement.value is None else self.say.value(statement.value)
-        self.blocks.put(f"run.turns+=n;return {value}", statement.place)
-        self.blocks.leave(statement.place)
+        if statement.value is not None:
+            self.blocks.put(f"L[0]={self.say.value(statement.value)}", statement.place)
+        self.blocks.end("-1", statement.place)
 
     def _message(self, message: tree.Message) -> None:
         pieces = []

@@ -4,8 +4,8 @@ other."""
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from planner.nc.language import tree
 
@@ -85,43 +85,19 @@ ARITHMETIC: dict[tuple[str, int], str] = {
 }
 
 
-@dataclass
-class _End:
-    """How a basic block goes on: to `label`, or to `otherwise` if the condition does not hold; None leaves
-    the function. With `computed` it goes to the label of the program whose number that text gives.
-    """
-
-    place: tree.SourcePlace
-    label: int | None
-    condition: str = ""
-    otherwise: int = 0
-    computed: str = ""
-
-
-@dataclass
-class _Block:
-    lines: list[tuple[str, tree.SourcePlace]] = field(default_factory=list)
-    end: _End | None = None
-
-
 class BasicBlocks:
-    """The basic blocks of one function, while they are written.
+    """The basic blocks of one procedure, while they are written: lines of Python, of which the last one says
+    which block is next, -1 for none."""
 
-    place    : of what the source stands for, where a line has no place of its own
-    block_of : label to block
-    numbers  : labels of the program in their order: number, label
-    """
-
-    def __init__(self, place: tree.SourcePlace) -> None:
-        self.place = place
-        self.blocks = [_Block()]
-        self.block_of: dict[int, int] = {}
+    def __init__(self) -> None:
+        self.blocks: list[list[tuple[str, tree.SourcePlace]]] = [[]]
+        self.block_of: dict[int, int] = {}  # by label
+        self.numbers: list[tuple[int, int]] = []  # labels of the program in their order: number, label
         self.labels = 0
-        self.numbers: list[tuple[int, int]] = []
 
     def put(self, text: str, place: tree.SourcePlace) -> None:
         """Add a line to the block that is being written."""
-        self.blocks[-1].lines.append((text, place))
+        self.blocks[-1].append((text, place))
 
     def label(self) -> int:
         """A new label, whose place is said by `here`."""
@@ -130,62 +106,32 @@ class BasicBlocks:
 
     def here(self, label: int) -> None:
         """The label is the place that is reached now."""
-        if self.blocks[-1].lines or self.blocks[-1].end:
-            self.blocks.append(_Block())
+        if self.blocks[-1]:
+            self.end(f"{len(self.blocks)}", self.blocks[-1][-1][1])
         self.block_of[label] = len(self.blocks) - 1
 
     def go(self, place: tree.SourcePlace, label: int, condition: str = "", otherwise: int = 0) -> None:
         """End the block: go on at the label, or at `otherwise` if the condition does not hold."""
-        self._leave(_End(place, label, condition, otherwise))
+        self.end(f"@{label}@ if {condition} else @{otherwise}@" if condition else f"@{label}@", place)
 
-    def jump(self, number: str, place: tree.SourcePlace) -> None:
-        """Go to the label of the program whose number that text gives."""
-        self._leave(_End(place, None, computed=number))
+    def end(self, following: str, place: tree.SourcePlace) -> None:
+        """End the block, and go on at the one that this text gives."""
+        self.put(f"return {following}", place)
+        self.blocks.append([])
 
-    def leave(self, place: tree.SourcePlace) -> None:
-        """Leave the function."""
-        self._leave(_End(place, None))
-
-    def _leave(self, end: _End) -> None:
-        self.blocks[-1].end = end
-        self.blocks.append(_Block())
-
-    def source(self) -> list[tuple[str, tree.SourcePlace]]:
-        """Lines of Python with their places; the last block leaves the function."""
-        self.blocks[-1].end = _End(self.place, None)
-        if len(self.blocks) == 1:
-            return [(" " + text, at) for text, at in self.blocks[0].lines]
-        lines = [(" while True:", self.place)]
-        self._choose(0, len(self.blocks), "  ", lines)
-        return lines
-
-    def _choose(self, low: int, high: int, indent: str, lines: list[tuple[str, tree.SourcePlace]]) -> None:
-        """Add the source that finds block `pc` among the blocks `low` to `high` - 1 by halving."""
-        if high - low > 1:
-            middle = (low + high) // 2
-            lines.append((f"{indent}if pc<{middle}:", self.place))
-            self._choose(low, middle, indent + " ", lines)
-            lines.append((f"{indent}else:", self.place))
-            self._choose(middle, high, indent + " ", lines)
-            return
-        block = self.blocks[low]
-        lines.extend((indent + text, place) for text, place in block.lines)
-        end = block.end
-        if end is None:
-            lines.append((f"{indent}pc={low + 1}", self.place))
-        elif end.computed:
-            table = {number: self.block_of[label] for number, label in reversed(self.numbers)}
-            lines.append((f"{indent}pc=run.label({table!r},{end.computed})", end.place))
-        elif end.label is not None:
-            to = self.block_of[end.label]
-            if end.condition:
-                lines.append(
-                    (f"{indent}pc={to} if {end.condition} else {self.block_of[end.otherwise]}", end.place)
-                )
-            else:
-                lines.append((f"{indent}pc={to}", end.place))
-        elif not block.lines:
-            lines.append((f"{indent}pass", self.place))
+    def source(self, place: tree.SourcePlace) -> list[tuple[str, tree.SourcePlace]]:
+        """Lines of Python with their places, each block a function, and how these are run; `place` is that of
+        what no statement stands for."""
+        self.end("-1", place)
+        lines = []
+        for k, block in enumerate(self.blocks[:-1]):
+            lines.append((f" def b{k}():", place))
+            lines += [
+                (re.sub("@([0-9]+)@", lambda named: str(self.block_of[int(named[1])]), f"  {text}"), at)
+                for text, at in block
+            ]
+        names = "".join(f"b{k}," for k in range(len(self.blocks) - 1))
+        return [*lines, (f" b=({names});pc=0", place), (" while pc>=0:pc=b[pc]()", place)]
 
 
 class Expressions:

@@ -143,9 +143,8 @@ class ProgramRun:
         self.tee(words)
         self.interpreter.execute(words)
 
-    def tick(self, turns: int) -> int:
-        """Count turns of a loop and look at the limits; returns 0."""
-        self.turns += turns
+    def tick(self) -> None:
+        """Look at the limits."""
         if self.turns > TURNS_MAX:
             raise Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
@@ -161,7 +160,6 @@ class ProgramRun:
                 raise Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
         if self.executed + pending > ROWS_MAX:
             raise Endless(f"{ROWS_MAX:,} lines executed")
-        return 0
 
     def goes_on(self) -> None:
         """A loop that cannot end goes on. Raises ValueError."""
@@ -190,7 +188,7 @@ class ProgramRun:
             self.turns += 1
             self.calls[str(name)] += 1
             if not self.turns & 127 or len(self.rows.pending) > self._at_once:
-                self.tick(0)
+                self.tick()
             if arguments is None:
                 value = function(self, {})
             else:
@@ -274,12 +272,12 @@ class ProgramRun:
         state = self.interpreter, self.travel, self.shared, self.numbered
         making = Making(*state, SourcePlace(*place), self._frame, self._execute_made)
         making.take(self.makers[maker](making, dict(given)))
-        self.tick(0)
+        self.tick()
         self.flush()
 
     def _execute_made(self, rows: list[TravelRow]) -> None:
         self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
-        self.tick(0)
+        self.tick()
 
     def label(self, blocks: dict[int, int], number: float) -> int:
         """Where a computed jump leads."""

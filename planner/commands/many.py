@@ -136,17 +136,7 @@ class _Task:
     def run(self) -> Done:
         """Start the process, wait for it, and read what it says."""
         path = os.pathsep.join(os.path.abspath(place) for place in sys.path)
-        command = [
-            sys.executable,
-            "-P",
-            "-c",
-            CHILD,
-            "plan",
-            *self._options,
-            "--json",
-            "-q",
-            "--",
-        ]
+        command = [sys.executable, "-P", "-c", CHILD, "plan", *self._options, "--json", "-q", "--"]
         errors: list[str] = []
         with subprocess.Popen(
             [*command, str(self.job)],

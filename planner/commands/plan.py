@@ -74,8 +74,7 @@ def plan_command(
         bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18 to 20")
     ] = False,
     verbose: Annotated[
-        bool,
-        typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step"),
+        bool, typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step")
     ] = False,
     trace: Annotated[
         Path | None,

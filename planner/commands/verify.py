@@ -17,13 +17,7 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    JsonOption,
-    QuietOption,
-    ToleranceOption,
-    takes_reading,
-)
+from planner.commands.options import DEFAULT_MACHINE, JsonOption, QuietOption, ToleranceOption, takes_reading
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, show
 from planner.nc.reading import AS_USUAL, Reading

@@ -63,7 +63,6 @@ def ratio_min(limits: FloatArray, change: FloatArray) -> FloatArray:
 
 
 # ---- zero entry acceleration
-# -----------------------------------------------------------------------------------------------------
 
 
 def phase_times(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -114,7 +113,6 @@ def speed_from_approach(length: FloatArray, alpha: FloatArray, eta: FloatArray) 
 
 
 # ---- entry deceleration
-# ----------------------------------------------------------------------------------------------------------
 
 
 def entry_limits(
@@ -152,7 +150,6 @@ def entry_speed_from_length(d: FloatArray, a: FloatArray, J: FloatArray) -> Floa
 
 
 # ---- as geometry alone
-# -----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

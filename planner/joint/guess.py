@@ -104,12 +104,7 @@ class Guess:
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
 
 
-def guess_from(
-    run: TubeRun,
-    motion: Trajectory,
-    vertex_time: FloatArray,
-    cut: Cut = DEFAULT_CUT,
-) -> Guess:
+def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut = DEFAULT_CUT) -> Guess:
     """Cut a motion along a run of R legs into steps.
 
     motion      : along this run alone, at rest at both ends

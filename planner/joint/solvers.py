@@ -24,11 +24,7 @@ class TubeSolver(Protocol):
         ...
 
 
-SOLVERS: dict[str, TubeSolver] = {
-    "own": TubeOwn(),
-    "ipopt": TubeNLP(),
-    "fatrop": TubeNLP(solver="fatrop"),
-}
+SOLVERS: dict[str, TubeSolver] = {"own": TubeOwn(), "ipopt": TubeNLP(), "fatrop": TubeNLP(solver="fatrop")}
 
 
 def tube_solver(solver: str | TubeSolver) -> TubeSolver:

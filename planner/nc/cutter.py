@@ -155,7 +155,6 @@ class Cutter:
             self._open.fixed, self._open.row = True, -1
 
     # --- corners
-    # ------------------------------------------------------------------------------------------------------------
 
     def _corner(self, corner: complex, side: OffsetMove, kind: Kind, line: int) -> bool:
         """Join the open move to the next at a programmed corner; True for an inner one."""
@@ -214,7 +213,6 @@ class Cutter:
             raise CutterFault(_GOUGE)
 
     # --- blocks
-    # -------------------------------------------------------------------------------------------------------------
 
     def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, table = self._state, self._table

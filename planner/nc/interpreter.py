@@ -276,7 +276,6 @@ class Interpreter:
         return stop in (20, 300)
 
     # --- modes
-    # ------------------------------------------------------------------------------------------------------------------
 
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
@@ -307,7 +306,6 @@ class Interpreter:
         self.table.keep_origin(state)
 
     # --- what moves
-    # ---------------------------------------------------------------------------------------------------------
 
     def _one_shot(self, block: Block) -> None:
         code = block.g.get("one-shot")

@@ -124,11 +124,7 @@ class FileSays:
                 tolerance_taken,
                 "-m or --tolerance is given",
             ),
-            (
-                settings and f"program read with {settings}",
-                reading_taken,
-                "the command line has its own",
-            ),
+            (settings and f"program read with {settings}", reading_taken, "the command line has its own"),
         ):
             if what:
                 said.append(f"{what} ({'taken' if taken else f'not taken, {instead}'})")

@@ -192,8 +192,7 @@ def _numbers(source: str, name: str, column: Any) -> Array:
     column = np.asarray(column)
     if column.ndim != 1 or column.dtype.kind not in "fiub":
         raise InputError(
-            f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed",
-            source=source,
+            f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed", source=source
         )
     most = NUMBER_MAX if name.strip().lower() in ("line", "block") else VALUE_MAX
     bad = np.flatnonzero(~(np.abs(column.astype(np.float64)) <= most))

@@ -59,7 +59,6 @@ class Apart:
         return allowed
 
     # ---- the motion from the path
-    # ------------------------------------------------------------------------------------
 
     def contour_error(self) -> float | None:
         """Largest distance of the motion from the path [mm]."""
@@ -86,7 +85,6 @@ class Apart:
         )
 
     # ---- the vertices from the motion
-    # --------------------------------------------------------------------------------
 
     def near(self, reading: Observed) -> FloatArray:
         """(N+1,) distance of each vertex from the motion [mm]; NaN where it is not known."""

@@ -56,7 +56,6 @@ def excesses(
 
 
 # ---- limits and columns
-# ----------------------------------------------------------------------------------------------
 
 
 def limit_checks(
@@ -74,12 +73,7 @@ def limit_checks(
 
 
 def check_of(
-    worst: Worst,
-    row: int,
-    toolpath: Toolpath,
-    line: int,
-    not_limited: tuple[str, ...],
-    note: str = "",
+    worst: Worst, row: int, toolpath: Toolpath, line: int, not_limited: tuple[str, ...], note: str = ""
 ) -> LimitCheck:
     """The worst of one quantity, rotary axes in degrees; `note` says of which reading it is."""
     name, unit = worst.names[row]
@@ -133,7 +127,6 @@ def largest_chord_error(readings: list[Observed]) -> float:
 
 
 # ---- ends, order, stops
-# -----------------------------------------------------------------------------------------------
 
 
 def end_error(

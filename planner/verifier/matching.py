@@ -91,13 +91,7 @@ def new_match(pieces: ProgramPieces) -> Match:
     track["low"] = passed["near"] = passed["stop_ratio"] = np.inf
     tally = np.zeros(8, dtype=np.int64)
     tally[LOST_AFTER] = tally[STUCK_AT] = NOT_LOST
-    return Match(
-        track=track,
-        passed=passed,
-        tally=tally,
-        place=np.zeros((3, axes)),
-        worst=np.zeros(6),
-    )
+    return Match(track=track, passed=passed, tally=tally, place=np.zeros((3, axes)), worst=np.zeros(6))
 
 
 class Located(NamedTuple):

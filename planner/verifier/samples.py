@@ -200,10 +200,7 @@ def rest_faults(delivered: Delivered, readings: list[Observed], limits: Limits) 
     acceleration = limits.per_axis[1] * np.maximum(1.0, measured(readings, ACCELERATION))
     jerk = limits.per_axis[2] * np.maximum(1.0, measured(readings, JERK))
     said = []
-    for name, at, beside, advice in (
-        ("start", 0, 1, ""),
-        ("end", -1, -2, ": are the last samples missing?"),
-    ):
+    for name, at, beside, advice in (("start", 0, 1, ""), ("end", -1, -2, ": are the last samples missing?")):
         h = abs(float(t[at] - t[beside])) + given.end_rounding + 2.0 * given.time_rounding
         furthest = acceleration * h * h / 2.0
         if limits.jerk_limited:

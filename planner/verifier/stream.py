@@ -71,13 +71,7 @@ class Watch:
     """
 
     def __init__(
-        self,
-        pieces: ProgramPieces,
-        limits: Limits,
-        *,
-        parts: int,
-        cubic: bool = False,
-        note: str = "",
+        self, pieces: ProgramPieces, limits: Limits, *, parts: int, cubic: bool = False, note: str = ""
     ):
         axes = pieces.vertex.shape[1]
         self.seen = Observed(match=new_match(pieces), worst=Worst(rows_of(limits), axes), note=note)

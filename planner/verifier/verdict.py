@@ -191,10 +191,7 @@ class Verdict:
             }
         )
         if self.linear_error_mm is not None:
-            behind |= {
-                "linear_error_mm": self.linear_error_mm,
-                "angle_error_deg": self.angle_error_deg,
-            }
+            behind |= {"linear_error_mm": self.linear_error_mm, "angle_error_deg": self.angle_error_deg}
         if self.threads:
             worst = max(self.threads, key=lambda thread: thread.ratio)
             behind["thread_error_mm"] = worst.error_mm

@@ -98,7 +98,6 @@ def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]
 
 
 # ---- speeds that fit
-# -------------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True, error_model="numpy")
@@ -185,7 +184,6 @@ def _sweep(ways, legs):
 
 
 # ---- the fastest choice
-# ----------------------------------------------------------------------------------------------------------
 
 
 @njit(cache=True, error_model="numpy")

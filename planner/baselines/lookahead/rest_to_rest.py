@@ -58,13 +58,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     budget = toolpath.along[curved] / error_rate(machine)
     across = np.minimum(half * a_all, np.minimum(budget, limits.normal))
     v[curved] = np.min(
-        [
-            v_all,
-            np.sqrt(across / kappa),
-            np.cbrt(half * j_all / (2 * twist)),
-            toolpath.feed[curved],
-        ],
-        axis=0,
+        [v_all, np.sqrt(across / kappa), np.cbrt(half * j_all / (2 * twist)), toolpath.feed[curved]], axis=0
     )
     a[curved], j[curved] = np.minimum(half * a_all, limits.tangential), half * j_all / 2
     product = np.full(len(v), np.inf)  # bound of v a_s [mm2/s3]

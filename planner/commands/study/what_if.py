@@ -62,9 +62,7 @@ class WhatIf:
 
 
 def what_if(
-    job: StudiedJob,
-    settings: Sequence[Setting],
-    progress: Callable[[str, str, float], None] | None = None,
+    job: StudiedJob, settings: Sequence[Setting], progress: Callable[[str, str, float], None] | None = None
 ) -> list[WhatIf]:
     """Plan a job as it is, with each setting alone, and with all of them if there is more than one.
 

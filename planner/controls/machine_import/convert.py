@@ -39,12 +39,7 @@ DERIVATIVES = (*NEEDED, "jerk")
 DT = 0.001  # [s], where the control does not say: setpoints of offline plans
 
 # In the order in which a text is tried: Klipper's and LinuxCNC's sections are told apart by their names.
-CONTROLS: dict[str, ModuleType] = {
-    "linuxcnc": linuxcnc,
-    "klipper": klipper,
-    "marlin": marlin,
-    "grbl": grbl,
-}
+CONTROLS: dict[str, ModuleType] = {"linuxcnc": linuxcnc, "klipper": klipper, "marlin": marlin, "grbl": grbl}
 
 
 @dataclass(frozen=True)

@@ -105,11 +105,7 @@ def _settings(
 
 
 def _notes(
-    given: Settings,
-    reprap: bool,
-    printing: Sourced | None,
-    travelling: Sourced | None,
-    travel: Settings,
+    given: Settings, reprap: bool, printing: Sourced | None, travelling: Sourced | None, travel: Settings
 ) -> list[str]:
     said = ["M203 is in mm/min: M566 and M584 are commands of RepRapFirmware"] if reprap else []
     if printing and travelling and printing.value != travelling.value:

@@ -154,7 +154,6 @@ def _solve_piece(
         return too_few(intervals)
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1
-    # --------------------------------------------
     h_guess = guess.duration[here][:-1] / SLOWER
     lasts = np.isfinite(h_guess)  # not where the guess stands still at both ends of a tiny interval
     slow = ds / np.sqrt(
@@ -165,16 +164,13 @@ def _solve_piece(
     speed, acc, jerk = length / second, length / second**2, length / second**3
 
     # ---- variables: state (v, a, j_left) and control (j, h) of each point; the last has no control
-    # ----------------------------
     w = ca.MX.sym("w", 5 * points - 2)
     stages = ca.reshape(ca.vertcat(w, ca.DM.zeros(2)), 5, points)
 
     # ---- objective
-    # ------------------------------------------------------------------------------------------------------------
     total = ca.sum2(stages[4, :])
 
     # ---- dynamics and constraints of one stage; its numbers are parameters
-    # ----------------------------------------------------
     v, a, j_left, j, h, ds_i, cap_i = (
         ca.SX.sym(name) for name in ("v", "a", "j_left", "j", "h", "ds", "cap")
     )
@@ -187,7 +183,6 @@ def _solve_piece(
     stage = ca.Function("stage", [ca.vertcat(v, a, j_left, j, h), numbers], [following, ca.vertcat(*rows)])
 
     # ---- constraints of all stages, in stage order; the last one has no interval
-    # ----------------------------------------------
     feed_max = np.sqrt(problem.feed_sq_limit[here])
     cap = (feed_max[:-1] + feed_max[1:]) / 2  # of v + a h/2
     data = _stage_numbers(problem, here, ds / length, cap / speed, speed, acc, jerk)
@@ -201,7 +196,6 @@ def _solve_piece(
     lower[:, 4] = 0.0
 
     # ---- boundary
-    # -------------------------------------------------------------------------------------------------------------
     for end, v_there in ((0, v_start), (-1, v_end)):
         lower[end, 0] = upper[end, 0] = v_there / speed
         if v_there == 0.0:
@@ -209,7 +203,6 @@ def _solve_piece(
     lower[0, 2] = upper[0, 2] = 0.0  # nothing to the left of the first point
 
     # ---- initial guess: the second-order optimum, slower; its acceleration made continuous
-    # ------------------------------------
     start = np.zeros((points, 5))
     start[:, 0] = np.sqrt(guess.feed_sq[here]) * SLOWER / speed
     u = guess.acc_s[here][:-1] * SLOWER**2 / acc
@@ -218,7 +211,6 @@ def _solve_piece(
     start[:-1, 3] = start[1:, 2] = np.diff(start[:, 1]) / start[:-1, 4]
 
     # ---- solve
-    # ----------------------------------------------------------------------------------------------------------------
     program = {"x": w, "f": total, "g": constraints}
     solver = ca.nlpsol(
         "solver", settings.solver, program, _options(settings, points, row_max == 0.0, 4 * axes + 2)
@@ -239,7 +231,6 @@ def _solve_piece(
         return Found(status=status, sentence=sentence, iterations=iterations)
 
     # ---- unpack
-    # ---------------------------------------------------------------------------------------------------------------
     found = np.append(result["x"], [0.0, 0.0]).reshape(points, 5)
     v, h = found[:, 0], found[:, 4]
     profile = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]

@@ -86,10 +86,7 @@ VIOLATION_MAX = 1e-6
 FEASIBILITY = 1e-8
 CONVEX_TOL = 1e-8  # relative tolerance of optimality of each convex problem [-]
 
-CONVERGED = (
-    Status.OPTIMAL,
-    "time-optimal for the limits with jerk, in the path domain, to first order",
-)
+CONVERGED = (Status.OPTIMAL, "time-optimal for the limits with jerk, in the path domain, to first order")
 STOPPED = (
     Status.ACCEPTABLE,
     "keeps all limits with jerk, but more passes would make it faster; raise max_passes",
@@ -154,18 +151,15 @@ def _solve_piece(
         return too_few(n)
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1
-    # --------------------------------------------
     length, second = ds.mean(), guess.duration[here][:-1].mean()
     speed, acc = length / second, length / second**2
     ds = ds / length
 
     # ---- variables: x and u at the points; the profile X at which the tangents touch is a parameter
-    # ---------------------------
     x, u, last = ca.MX.sym("x", n + 1), ca.MX.sym("u", n + 1), ca.MX.sym("last", n + 1)
     inner = slice(1, n - 1)  # the intervals, or their left ends, that do not touch rest
 
     # ---- objective: the time, by Gauss's rule; exact on the first and the last interval
-    # ---------------------------------------
     shape = IntervalShape.of(problem.s[here])
     gain = u[1:] - u[:-1]
     times = ca.vertcat(3.0 * ds[0] / ca.sqrt(x[1]), ca.MX(n - 2, 1), 3.0 * ds[-1] / ca.sqrt(x[n - 1]))
@@ -174,7 +168,6 @@ def _solve_piece(
         times[inner] += weight * ds[inner] / ca.sqrt(between[inner])
 
     # ---- dynamics
-    # -------------------------------------------------------------------------------------------------------------
     gap = x[1:] - x[:-1] - 2.0 * ds * (u[:-1] + shape.mean * gain)
 
     # ---- constraints: the feed between the points, then acceleration and tangents of the jerk at both ends
@@ -202,7 +195,6 @@ def _solve_piece(
             row_max += [np.full(n, 1.0), np.full(n - 2, 1.5), np.full(n - 2, np.inf)]
 
     # ---- boundary: rest, and what the jerk of the first and last interval allows next to it
-    # -----------------------------------
     free = np.full(n + 1, np.inf)
     lower, upper = np.concatenate([np.zeros(n + 1), -free]), np.concatenate([cap, free])
     beside = (1, *beside_rest(problem, here.start, 1)), (n - 1, *beside_rest(problem, here.stop - 1, -1))
@@ -216,7 +208,6 @@ def _solve_piece(
     profile = np.concatenate([guess.feed_sq[here] / speed**2, np.zeros(n + 1)])
 
     # ---- solve, pass by pass; nlpsol returns numbers whatever happened: only its statistics tell
-    # -------------------------------
     bounds = {
         "lbx": lower,
         "ubx": upper,
@@ -230,7 +221,6 @@ def _solve_piece(
         return Found(status=passed.status, sentence=passed.sentence, iterations=passed.iterations)
 
     # ---- unpack
-    # ---------------------------------------------------------------------------------------------------------------
     lam_x, lam_g = passed.result["lam_x"], passed.result["lam_g"]
     profile = np.clip(passed.result["x"], lower, upper)
     x_found, u_found = profile[: n + 1] * speed**2, profile[n + 1 :] * acc

@@ -15,13 +15,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
-from planner.corners.elements import (
-    ElementTable,
-    element_length,
-    element_point,
-    is_straight,
-    to_arc_length,
-)
+from planner.corners.elements import ElementTable, element_length, element_point, is_straight, to_arc_length
 from planner.feedrate.sampling.rows import PathLimits, grown, set_row
 
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].

@@ -238,11 +238,7 @@ def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray])
 
 
 def _between(
-    bound: FloatArray,
-    middle: FloatArray,
-    cap: FloatArray | None,
-    cap_middle: FloatArray | None,
-    at: Array,
+    bound: FloatArray, middle: FloatArray, cap: FloatArray | None, cap_middle: FloatArray | None, at: Array
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A bound (P,) made to hold between the points, by how much it was short in the middles (n,), and by how
     much it changes.

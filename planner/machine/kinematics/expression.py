@@ -87,11 +87,7 @@ def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
         for _ in range(4):
             rows.append(casadi.substitute(row, t, 0.0))
             row = casadi.jacobian(row, t)
-    return Expression(
-        letters,
-        value,
-        casadi.Function("jets", [casadi.vec(taylor)], [casadi.vertcat(*rows)]),
-    )
+    return Expression(letters, value, casadi.Function("jets", [casadi.vec(taylor)], [casadi.vertcat(*rows)]))
 
 
 def _constant(value: Any, like: FloatArray) -> FloatArray:

@@ -111,7 +111,6 @@ class _Run:
         self.speed, self.speed_of_pen = math.inf, dict[int, float]()
 
     # --- what is said about it
-    # ------------------------------------------------------------------------------------------------
 
     def report(self, at: int, end: int, message: str) -> None:
         self.reports.append((at, end, message))
@@ -163,7 +162,6 @@ class _Run:
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
     # --- instructions
-    # -----------------------------------------------------------------------------------------------------------
 
     def execute(self, it: Instruction) -> None:
         try:
@@ -289,7 +287,6 @@ class _Run:
             self.speed, self.speed_of_pen = speed, {}
 
     # --- what the pen does
-    # --------------------------------------------------------------------------------------------------------
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
         """Where user coordinates lead [mm]."""

@@ -145,7 +145,6 @@ class _Function:
         return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *lines, (" return L.get(0)", place)]
 
     # --- statements
-    # -------------------------------------------------------------------------------------------------------
 
     def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:

@@ -81,7 +81,6 @@ class RowsThrough(Coordinates):
         return self._offset is not None or self._approach is not None
 
     # --- rows
-    # -----------------------------------------------------------------------------------------------------------------
 
     def through(self, words: Words) -> Iterator[Words]:
         """The rows to execute instead, in pieces; each is executed before the next is asked for. Raises
@@ -238,7 +237,6 @@ class RowsThrough(Coordinates):
         out += [self._in_units(one) for one in rows]
 
     # --- inside
-    # -------------------------------------------------------------------------------------------------------------
 
     def _no_corner(self) -> None:
         waits = self._corner or self._coming

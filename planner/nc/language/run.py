@@ -123,7 +123,6 @@ class ProgramRun:
             self.functions.setdefault(name, function)
 
     # --- what the compiled program calls
-    # ------------------------------------------------------------------------------------
 
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
@@ -292,7 +291,6 @@ class ProgramRun:
         return label
 
     # --- inside
-    # -------------------------------------------------------------------------------------------------------------
 
     def _number(self, index: float) -> int:
         number = whole(index)

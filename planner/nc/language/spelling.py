@@ -130,7 +130,6 @@ class LineReader(ExpressionReader):
         return name
 
     # --- values
-    # -------------------------------------------------------------------------------------------------------------
 
     def number(self) -> float | None:
         """The number that comes next, without a sign, or None."""
@@ -210,7 +209,6 @@ class LineReader(ExpressionReader):
         self.at += len(operator)
 
     # --- words
-    # --------------------------------------------------------------------------------------------------------------
 
     def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
         """All words and assignments up to the end of the line; lengths written without a point are multiplied

@@ -51,7 +51,6 @@ class SystemVariables:
         )
 
     # --- the state, as numbers
-    # ----------------------------------------------------------------------------------------------
 
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
@@ -129,7 +128,6 @@ class SystemVariables:
 
 
 # --- LinuxCNC
-# -------------------------------------------------------------------------------------------------------------------
 
 
 def _motion_mode(motion: int) -> float:
@@ -251,7 +249,6 @@ class LinuxcncVariables(SystemVariables):
 
 
 # --- Fanuc
-# ----------------------------------------------------------------------------------------------------------------------
 
 
 class FanucVariables(SystemVariables):

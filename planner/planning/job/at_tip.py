@@ -89,11 +89,7 @@ def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
     began = time.perf_counter()
     joints = joint_setpoints(plan.trajectory, chain)
     found = verify_joints(
-        joints,
-        plan.toolpath,
-        machine,
-        tool_length=chain.length,
-        not_limited=_not_limited(plan.verdict),
+        joints, plan.toolpath, machine, tool_length=chain.length, not_limited=_not_limited(plan.verdict)
     )
     spent = plan.timings.get("verify", 0.0) + time.perf_counter() - began
     return dataclasses.replace(

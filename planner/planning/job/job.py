@@ -199,13 +199,7 @@ class Job:
                 judged = trajectory
         with self.stage("verify") as progress:
             verdict = verify(
-                judged,
-                toolpath,
-                machine,
-                motion=whole,
-                seed=seed,
-                not_limited=not_limited,
-                progress=progress,
+                judged, toolpath, machine, motion=whole, seed=seed, not_limited=not_limited, progress=progress
             )
         runs = places.runs()
         if runs is None:

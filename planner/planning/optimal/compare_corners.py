@@ -69,12 +69,7 @@ def corner_bounds(
 
 
 def with_corners(
-    rounded: SmoothPath,
-    best: OnPath,
-    corners: CornerBounds,
-    job: Job,
-    order: Order,
-    grids: Grids,
+    rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order, grids: Grids
 ) -> tuple[OnPath, Array]:
     """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which
     that was too much to find out.

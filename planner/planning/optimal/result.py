@@ -21,11 +21,7 @@ from planner.sensitivity.records import PriceList
 
 
 def plan_of_solution(
-    job: Job,
-    best: OnPath,
-    made: Delivered | None,
-    settings: Settings,
-    tables: Tables = NO_TABLES,
+    job: Job, best: OnPath, made: Delivered | None, settings: Settings, tables: Tables = NO_TABLES
 ) -> Plan:
     """The plan of a solution and what was delivered of it, None unless solved."""
     grid = None

@@ -25,15 +25,7 @@ from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
 from planner.planning.job.at_tip import joints_of
 from planner.report.export import check_places, write_plan
-from planner.report.figure import (
-    COLOURS,
-    FEED,
-    QUANTITIES,
-    MotionColumns,
-    Panel,
-    profile_panels,
-    three,
-)
+from planner.report.figure import COLOURS, FEED, QUANTITIES, MotionColumns, Panel, profile_panels, three
 from planner.report.html.data import Samples, programmed_path, samples_of
 from planner.report.html.page import REPORT, path_picture, report_page
 from planner.report.planned import source_text
@@ -124,10 +116,7 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
     word = WordFeed(plan.toolpath)
     table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory, joints, word.of))
     table.attrs["units"] = units(
-        trajectory.axes,
-        extruder=plan.toolpath.extrusion is not None,
-        tip=joints is not None,
-        feed=word.units,
+        trajectory.axes, extruder=plan.toolpath.extrusion is not None, tip=joints is not None, feed=word.units
     )
     return table
 

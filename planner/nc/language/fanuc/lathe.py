@@ -83,7 +83,6 @@ class LatheParser(LatheWords):
         return procedures
 
     # --- profiles
-    # -----------------------------------------------------------------------------------------------------------
 
     def _line(self, line: SourceLine) -> None:
         match = _NUMBER.match(line.text.replace(" ", ""))
@@ -104,7 +103,6 @@ class LatheParser(LatheWords):
             self.body.append(Label(line.place, _AFTER + number))
 
     # --- cycles
-    # -------------------------------------------------------------------------------------------------------------
 
     def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"

@@ -81,7 +81,6 @@ class LatheCycles:
         return []
 
     # --- the profile
-    # --------------------------------------------------------------------------------------------------------
 
     def _begin(self, making: Making, given: Given) -> Iterable[Row]:
         """The blocks that follow are read aside."""
@@ -122,7 +121,6 @@ class LatheCycles:
         return complex(position[2], position[0])
 
     # --- cycles
-    # -------------------------------------------------------------------------------------------------------------
 
     def _removal(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
         contour, unit = self._contour(), self._unit
@@ -208,7 +206,6 @@ class LatheCycles:
         return complex(given["Z"] * unit if "Z" in given else start.real, x)
 
     # --- rows
-    # ---------------------------------------------------------------------------------------------------------------
 
     @property
     def _unit(self) -> float:

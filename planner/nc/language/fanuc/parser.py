@@ -94,7 +94,6 @@ class FanucParser(FanucControl):
             self.procedures.append(tree.Procedure(name, procedure.body[at].place, procedure.body[at:]))
 
     # --- lines
-    # ----------------------------------------------------------------------------------------------------------------
 
     def _plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement: labels that are used stand between them, and G66 calls after those that
@@ -165,7 +164,6 @@ class FanucParser(FanucControl):
                 self.body.append(tree.Message(line.place, (text,)))
 
     # --- IF, WHILE, GOTO
-    # ------------------------------------------------------------------------------------------------------
 
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         if keyword == "GOTO":
@@ -201,14 +199,8 @@ class FanucParser(FanucControl):
         self.body.append(tree.If(line.place, ((condition, body),), []))
 
     # --- words and calls
-    # ------------------------------------------------------------------------------------------------------
 
-    def _words(
-        self,
-        words: tree.Words,
-        assignments: tree.Assignments,
-        line: SourceLine,
-    ) -> None:
+    def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = [word.code for word in words]
         called = next((code for code in _CALLS if code in codes), None)
         if called is not None:

@@ -102,7 +102,6 @@ class HeidenhainParser(Definitions):
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
     # --- labels
-    # -----------------------------------------------------------------------------------------------------------------
 
     def _find_labels(self) -> None:
         for k, block in enumerate(self.blocks):
@@ -126,7 +125,6 @@ class HeidenhainParser(Definitions):
         return len(self.blocks)
 
     # --- blocks
-    # -----------------------------------------------------------------------------------------------------------------
 
     def _body(self, first: int, last: int, called: bool = False) -> Rows:
         """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known
@@ -176,7 +174,6 @@ class HeidenhainParser(Definitions):
         return [called, units, looked_up(block)]
 
     # --- moves
-    # ------------------------------------------------------------------------------------------------------------------
 
     def _ends(self, block: Block, given: Items) -> dict[str, tree.Expression]:
         if given.polar:
@@ -254,7 +251,6 @@ class HeidenhainParser(Definitions):
         return [tree.assign(block.place, *named, (PLANE, tree.Number(float(normal))))]
 
     # --- cycles
-    # -----------------------------------------------------------------------------------------------------------------
 
     def _cycle_call(self, block: Block) -> Rows:
         if not block.take(r"\s*POS\b"):

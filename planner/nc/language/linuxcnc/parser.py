@@ -211,7 +211,6 @@ class LinuxcncParser:
                 self.body.append(tree.Message(line.place, _pieces(text) if expanded else (text,)))
 
     # --- codes that are control flow
-    # ------------------------------------------------------------------------------------------
 
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
         """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
@@ -241,7 +240,6 @@ class LinuxcncParser:
         return True
 
     # --- O words
-    # ----------------------------------------------------------------------------------------------------------------
 
     def _o_word(self, reader: LineReader, line: SourceLine) -> None:
         reader.at += 1

@@ -118,7 +118,6 @@ class SiemensParser(BlockWords):
             self.absolute = bool(modes[-1] == 90)
 
     # --- lines
-    # ------------------------------------------------------------------------------------------------------------------
 
     def _line(self, line: SourceLine) -> None:
         text = _without_comment(line.text)

@@ -151,7 +151,7 @@ def modelled(control: str) -> Callable[[Program, Machine, float | None], float]:
 
 def _law(stops: Plan, line: Polyline, control: str) -> float:
     feed = np.where(line.rapid, np.inf, line.feed)
-    law = models.control_of(control)
+    law = models.CONTROLS[control]
     return models.predicted_time(
         line.points, feed, standing(stops, line), stops.machine, stops.toolpath.axes, law
     )

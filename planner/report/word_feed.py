@@ -170,12 +170,6 @@ def runs_of_feed(highest: FloatArray, duration: FloatArray, least: float) -> Arr
     return run
 
 
-def block_times(trajectory: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(M,) planned time on each segment [s], dwells not included. With the dwells they add up to the cycle
-    time."""
-    return planned_blocks(trajectory, toolpath).duration
-
-
 def planned_blocks(trajectory: Trajectory, toolpath: Toolpath) -> PlannedBlocks:
     """Times and highest feeds of the blocks of a path, see `BlockWatch`."""
     watch = BlockWatch(toolpath)

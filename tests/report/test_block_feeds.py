@@ -17,7 +17,7 @@ from planner.nc.writer import retimed
 from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.stop import StopMethod
-from planner.report.word_feed import RUN_PERIODS, SPREAD, block_feeds, block_times, runs_of_feed
+from planner.report.word_feed import RUN_PERIODS, SPREAD, block_feeds, planned_blocks, runs_of_feed
 
 MACHINE = load_machine("mill")
 PROGRAM = """G21 G90 G17
@@ -42,7 +42,7 @@ def test_blocks_from_rest_to_rest_take_the_closed_form_s_time() -> None:
     """Within one period at each of the two joints; dwells belong to no block."""
     made = StopMethod().plan(parse_program(PROGRAM, MACHINE), MACHINE)
     expected = rest_to_rest_times(made.toolpath.length, *block_limits(made.toolpath, MACHINE))
-    got = block_times(made.trajectory, made.toolpath)
+    got = planned_blocks(made.trajectory, made.toolpath).duration
     np.testing.assert_allclose(got, expected, rtol=0, atol=2 * MACHINE.dt)
     assert got.sum() + made.toolpath.dwell.sum() == pytest.approx(made.trajectory.cycle_time, rel=1e-12)
 
@@ -78,7 +78,7 @@ def test_blocks_of_a_run_share_their_feed() -> None:
     feeds, got = feeds_of(made), made.trajectory
     first = np.flatnonzero(np.diff(feeds, prepend=0.0))
     assert 2 <= len(first) <= 12
-    lasting = np.add.reduceat(block_times(got, made.toolpath), first)
+    lasting = np.add.reduceat(planned_blocks(got, made.toolpath).duration, first)
     assert (lasting[:-1] >= RUN_PERIODS * MACHINE.dt * (1.0 - 1e-9)).all()
     for begin, end in pairwise([*first, len(feeds)]):
         highest = got.feed[(got.block >= begin) & (got.block < end)].max()
@@ -105,7 +105,7 @@ def test_a_block_without_a_sample_is_not_held_up() -> None:
     """Blocks of 1 um between full stops last less than a period: no sample says how fast they are."""
     text = "G21 G61.1 F3000\n" + "".join(f"G1 X{k / 1000:.3f}\n" for k in range(1, 6))
     made = StopMethod().plan(parse_program(text, MACHINE), MACHINE.model_copy(update={"dt": 0.02}))
-    mean = made.toolpath.length / block_times(made.trajectory, made.toolpath)
+    mean = made.toolpath.length / planned_blocks(made.trajectory, made.toolpath).duration
     assert (feeds_of(made) >= 2.0 * mean.min()).all()
 
 

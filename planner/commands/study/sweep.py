@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 
 from planner.base.errors import InputError, NotSolvedError, import_needed
 from planner.base.threads import threads
-from planner.commands.study.points import FAILED, FIGURE, PASSED, TABLE, SweepFolder, planned_point
+from planner.commands.study.points import FAILED, FIGURE, TABLE, SweepFolder, planned_point
 from planner.commands.study.settings import Setting, StudiedJob, Varied, grid_of
 from planner.report.plots import STYLE
 from planner.report.replace import replacing_file
@@ -74,13 +74,6 @@ def sweep(
             if progress is not None:
                 progress(len(rows), len(points), reused)
     return Sweep(varied=tuple(varied), rows=tuple(rows[point] for point in points), reused=reused)
-
-
-def times_of(done: Sweep) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Cycle times, an array with one axis for each varied setting [s]; NaN where no motion passed."""
-    shape = tuple(len(one.values) for one in done.varied)
-    times = [row.get("cycle_time_s") if row["outcome"] == PASSED else None for row in done.rows]
-    return np.array(times, dtype=np.float64).reshape(shape)
 
 
 Point = tuple[Setting, ...]

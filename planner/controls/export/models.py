@@ -44,7 +44,6 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.base.names import known_name
 from planner.machine import Machine
 
 ControlName = Literal["grbl", "klipper", "marlin"]
@@ -80,11 +79,6 @@ CONTROLS: dict[str, Control] = {
     "klipper": Control(name="klipper", square_corner=5.0),
     "marlin": Control(name="marlin", deviation=0.013, blocks=15, block_time=0.0026),
 }
-
-
-def control_of(name: str) -> Control:
-    """The control of a name. Raises InputError for another name."""
-    return CONTROLS[known_name("control", name, CONTROLS)]
 
 
 def as_set(control: Control, machine: Machine) -> Control:

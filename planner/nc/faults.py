@@ -81,15 +81,11 @@ class Notes(NamedTuple):
 
 class Findings:
     """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or
-    time, and other notes.
-
-    strict : such assumptions are faults
-    faults : of the chunks so far, in the order of their words; a line that is executed many times is named
-             once
-    """
+    time, and other notes."""
 
     def __init__(self, *, strict: bool = False) -> None:
-        self.strict = strict
+        self.strict = strict  # such assumptions are faults
+        # of the chunks so far, in the order of their words; a line that is executed many times is named once
         self.faults: list[tuple[Words, int, str]] = []
         self._reports: list[tuple[int, str]] = []  # of the chunk that is being read
         self._said: set[tuple[int, str]] = set()

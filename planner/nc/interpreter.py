@@ -59,11 +59,6 @@ class Interpreter:
 
     Between two chunks `state`, `setup` and `table` say where the program stands: what parameters of a program
     ask for.
-
-    open_arcs : every arc that does not close
-    by_word : rows that were executed word by word, not by the compiled loop
-    ended : M2, M30 or a second % was executed; later chunks are not
-    two_axes : the program has X and Z and no Y, and was not found to be one for a lathe
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
@@ -84,12 +79,12 @@ class Interpreter:
         self.mover = Mover(state, table, self.ignored, self.setup.feed_default, self.findings)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
-        self.open_arcs: list[OpenArc] = []
+        self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
         self._limits = LimitsInForce()
-        self.ended = False
-        self.two_axes = False
-        self.by_word = 0
+        self.ended = False  # M2, M30 or a second % was executed; later chunks are not
+        self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
+        self.by_word = 0  # rows that were executed word by word, not by the compiled loop
         self._timed = False  # a feed is in inverse time
         self._words: Words | None = None  # of the last chunk
         self._begun = False

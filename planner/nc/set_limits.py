@@ -39,13 +39,10 @@ FEED = "feed"  # what VELOCITY bounds beside the axes
 
 
 class LimitsInForce:
-    """The limits in force, and of those that were so on a move the lowest.
-
-    factors : by which F counts from a line on, as M220 sets them
-    """
+    """The limits in force, and of those that were so on a move the lowest."""
 
     def __init__(self) -> None:
-        self.factors: list[tuple[int, float]] = []
+        self.factors: list[tuple[int, float]] = []  # by which F counts from a line on, as M220 sets them
         self._now: dict[tuple[str, str], float] = {}
         self._seen: list[dict[tuple[str, str], float]] = []  # on moves
         self._blocks = 0  # that were looked at

@@ -53,19 +53,16 @@ if TYPE_CHECKING:
 
 
 class WordFeed:
-    """The feed of F words on a toolpath.
-
-    mixed : whether the programs' feed is another one than that along the path in all axes
-    units : of it
-    """
+    """The feed of F words on a toolpath."""
 
     def __init__(self, toolpath: Toolpath):
         self._toolpath = toolpath
         self._groups = feed_groups(toolpath.axes)
+        # whether the programs' feed is another one than that along the path in all axes
         self.mixed = bool((self._groups > 0).any())
         self._goes_by = goes_by(toolpath) if self.mixed else np.zeros(0, dtype=np.int64)
         turns = bool((self._goes_by == ROTARY).any())
-        self.units = "mm/s, deg/s where rotary axes move alone" if turns else "mm/s"
+        self.units = "mm/s, deg/s where rotary axes move alone" if turns else "mm/s"  # of it
 
     def of(self, trajectory: Trajectory) -> FloatArray:
         """(T,) feed of samples, by what F goes by in their blocks."""

@@ -35,16 +35,12 @@ class _Tables:
 
 
 class AppendedRows:
-    """Rows that were appended and not yet executed.
-
-    pending : entries in their order, by number
-    values  : computed values of their words, in their order
-    frames  : (entries pending when the frame changed, frame), ascending
-    """
+    """Rows that were appended and not yet executed."""
 
     def __init__(self) -> None:
-        self.pending: list[int] = []
-        self.values: list[float | None] = []
+        self.pending: list[int] = []  # entries in their order, by number
+        self.values: list[float | None] = []  # computed values of their words, in their order
+        # (entries pending when the frame changed, frame), ascending
         self.frames: list[tuple[int, int]] = [(0, 0)]
         self.data = b""
         self.files: list[tuple[int, str]] = []

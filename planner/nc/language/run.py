@@ -45,24 +45,17 @@ class Ended(Exception):
 
 
 class ProgramRun:
-    """One run of a compiled program.
-
-    numbered : values of the numbered parameters, by number
-    shared   : values of the named parameters that all calls share
-    makers   : of the rows of `tree.MadeRows`
-    leave_profile : gives up a profile that a cycle of a lathe has not read to its end, and says where that
-                    stands
-    resume   : the label where the caller of a procedure goes on, or None
-    """
+    """One run of a compiled program."""
 
     def __init__(
         self, interpreter: Interpreter, rows: AppendedRows, language: Language, system: SystemVariables
     ):
         self.interpreter, self.rows, self.language, self.system = interpreter, rows, language, system
+        # values of the numbered parameters, by number
         self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
-        self.shared: dict[str, float] = {}
+        self.shared: dict[str, float] = {}  # values of the named parameters that all calls share
         self.turns = 0
-        self.resume: float | None = None
+        self.resume: float | None = None  # the label where the caller of a procedure goes on, or None
         self.units: dict[str, Compiled] = {}  # by the marker of their source
         self.functions: dict[str, Callable[..., float | None]] = {}
         self.frames = [Frame(name="", source=interpreter.source, line=0, caller=-1)]
@@ -79,7 +72,8 @@ class ProgramRun:
         self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
-        self.makers: Mapping[str, Maker] = {}
+        self.makers: Mapping[str, Maker] = {}  # of the rows of `tree.MadeRows`
+        # gives up a profile that a cycle of a lathe has not read to its end, and says where that stands
         self.leave_profile: Callable[[], SourcePlace | None] = lambda: None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)

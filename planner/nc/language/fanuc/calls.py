@@ -41,14 +41,11 @@ _ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE
 
 
 class FanucControl:
-    """The statements so far, and the loops that are open.
-
-    body : where the next statement goes
-    open : of each loop, the outermost first: its DO number, place, condition, and the body around it
-    """
+    """The statements so far, and the loops that are open."""
 
     def __init__(self) -> None:
-        self.body: list[tree.Statement] = []
+        self.body: list[tree.Statement] = []  # where the next statement goes
+        # of each loop, the outermost first: its DO number, place, condition, and the body around it
         self.open: list[tuple[int, tree.SourcePlace, tree.Expression, list[tree.Statement]]] = []
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:

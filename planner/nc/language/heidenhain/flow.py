@@ -16,23 +16,15 @@ NAMED = 100_000  # number of the first label, and of the first tool, with a name
 
 
 class Flow:
-    """Statements that decide the order of the blocks.
-
-    blocks  : of the program
-    names   : numbers of labels that have names
-    known   : label to its block
-    called  : labels that are called as subprograms
-    repeats : how many sections are repeated
-    file    : number of the file
-    """
+    """Statements that decide the order of the blocks."""
 
     def __init__(self) -> None:
-        self.blocks: Sequence[Block] = ()
-        self.names: dict[str, int] = {}
-        self.known: dict[int, int] = {}
-        self.called: set[int] = set()
-        self.repeats = 0
-        self.file = 0
+        self.blocks: Sequence[Block] = ()  # of the program
+        self.names: dict[str, int] = {}  # numbers of labels that have names
+        self.known: dict[int, int] = {}  # label to its block
+        self.called: set[int] = set()  # labels that are called as subprograms
+        self.repeats = 0  # how many sections are repeated
+        self.file = 0  # number of the file
 
     def _label(self, block: Block) -> int:
         match = block.take(r'\s*(?:(\d+)|"([^"]*)")')

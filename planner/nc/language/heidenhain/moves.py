@@ -60,16 +60,12 @@ _PLANE_CODES = {0: 19.0, 1: 18.0}
 
 
 class Moves:
-    """Rows of path functions.
-
-    feed_scale : what F is multiplied with: 1, or 0.1 in inch programs, where F is in tenths of an inch per
-                 minute
-    tilted     : there may be poles in other planes than X/Y
-    """
+    """Rows of path functions."""
 
     def __init__(self, feed_scale: float):
+        # what F is multiplied with: 1, or 0.1 in inch programs, where F is in tenths of an inch per minute
         self.feed_scale = feed_scale
-        self.tilted = False
+        self.tilted = False  # there may be poles in other planes than X/Y
         self.automatic: Expression | None = None  # F of the tool call
 
     def feed_words(self, block: Block, given: Items) -> Words:

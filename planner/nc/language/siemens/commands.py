@@ -82,24 +82,16 @@ _NAMES_MAX = 32  # parameters of a subprogram
 
 
 class Commands(SiemensControl):
-    """Settings by commands.
-
-    names    : of the variables
-    absolute : G90 is in force
-    unit     : mm per unit of the program
-    cycle    : of MCALL, which follows every row that moves
-    compensates : the file has G41 or G42
-    at_tip   : the machine has kinematics
-    """
+    """Settings by commands."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.names: set[str] = set()
-        self.absolute = True
-        self.unit = 1.0
-        self.cycle: list[tree.Statement] | None = None
-        self.compensates = False
-        self.at_tip = False
+        self.names: set[str] = set()  # of the variables
+        self.absolute = True  # G90 is in force
+        self.unit = 1.0  # mm per unit of the program
+        self.cycle: list[tree.Statement] | None = None  # of MCALL, which follows every row that moves
+        self.compensates = False  # the file has G41 or G42
+        self.at_tip = False  # the machine has kinematics
 
     def _cycle(self, reader: LineTokens, name: str) -> None:
         place = reader.place

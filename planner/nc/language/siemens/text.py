@@ -148,22 +148,17 @@ _NESTED_MAX = 100  # loops and branches in each other
 
 
 class SiemensControl:
-    """The statements so far, and those that are open.
-
-    main, body : statements of the program, and where the next one goes
-    open       : control statements whose end has not come, the outermost first
-    labels     : their numbers in the tree, by name
-    lines      : the statements of lines with labels
-    counters   : how many sections are repeated by their labels
-    """
+    """The statements so far, and those that are open."""
 
     def __init__(self) -> None:
+        # main and body: statements of the program, and where the next one goes
         self.main: list[tree.Statement] = []
         self.body = self.main
+        # control statements whose end has not come, the outermost first
         self.open: list[tree.OpenStatement] = []
-        self.labels: dict[str, int] = {}
-        self.counters = 0
-        self.lines: dict[str, list[tree.Statement]] = {}
+        self.labels: dict[str, int] = {}  # their numbers in the tree, by name
+        self.counters = 0  # how many sections are repeated by their labels
+        self.lines: dict[str, list[tree.Statement]] = {}  # the statements of lines with labels
 
     def _label(self, name: str, place: tree.SourcePlace) -> None:
         self.body.append(tree.Label(place, self._number_of(name)))

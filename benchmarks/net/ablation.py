@@ -48,7 +48,7 @@ def _no_attempt(name: str) -> Switch:
             (attempts, "ALONE"),
             (attempts, "ON_PATH"),
             (optimal, "ATTEMPTS"),
-            (second_order, "ON_PATH"),
+            (second_order, "ATTEMPTS"),
         ):
             kept = tuple(NONE if one.name == name else one for one in getattr(owner, listed))
             setattr(owner, listed, kept)

@@ -54,10 +54,9 @@ from planner.smoothing.sites import (
     sites_between,
     with_radius,
 )
-from planner.smoothing.windows import TIGHTENED, in_ranges, in_shares, next_window
+from planner.smoothing.windows import TIGHTENED, Reach, in_ranges, in_shares, next_window
 
-WINDOW = SIZES.improved_window
-OVERLAP = SIZES.improved_overlap
+WINDOWS = Reach(SIZES.improved_window, SIZES.improved_overlap)
 RANGE = SIZES.improved_range
 SPANS_SHARED = SIZES.improved_shared
 ITERATIONS = 40  # per window; 10 to 25 are the rule
@@ -79,6 +78,8 @@ class StepAim(NamedTuple):
     pull: FloatArray  # (Q,) towards what is there; inf for runs that stay
     gap: float  # of the convex problem, share of the time [-]
     again: int  # times at most in windows around sites that are tightened
+    windows: Reach
+    tightened: Reach  # of windows around sites that are tightened
 
 
 class Improved(NamedTuple):
@@ -105,6 +106,8 @@ class CombinedRun(NamedTuple):
     pull: float
     gap: float  # share of a window's time [-]
     again: int  # times at most in windows around sites that are tightened
+    windows: Reach
+    tightened: Reach  # of windows around sites that are tightened
 
 
 @njit(cache=True, error_model="numpy")
@@ -186,11 +189,11 @@ def improve_range(run, radius, begin, end, y):
     the iterations."""
     lo, total = begin, 0
     while True:
-        hi = end if end - lo <= WINDOW + OVERLAP else lo + WINDOW
+        hi = end if end - lo <= run.windows.window + run.windows.overlap else lo + run.windows.window
         total += _improve_window(run, radius, lo, hi, y)
         if hi == end:
             return total
-        lo = hi - OVERLAP
+        lo = hi - run.windows.overlap
 
 
 @njit(cache=True, error_model="numpy")
@@ -207,7 +210,7 @@ def _tighten(run, radius, y):
                 radius[j] *= TIGHTENED / certificate.site[j]
         done, site = 0, 0
         while True:
-            lo, hi, site = next_window(1, done, site, 0, n, run.sites.span, certificate.site)
+            lo, hi, site = next_window(1, done, site, 0, n, run.sites.span, certificate.site, run.tightened)
             if lo == n:
                 break
             total += _improve_window(run, radius, lo, hi, y)
@@ -231,7 +234,8 @@ def _begin(q, corridor, splines, runs, used, motion, limits, aim):
     free = _free(len(own), len(moving), (runs.fixed_first[q], runs.fixed_last[q]))
     pulled = limits.pulled[moving]
     run = CombinedRun(
-        run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, aim.pull[q], aim.gap, aim.again
+        run_corridor(corridor, q), knots, sites, whole, moving, own, places, free, pulled, aim.pull[q], aim.gap, aim.again,
+        aim.windows, aim.tightened,
     )  # fmt: skip
     return run, sites.radius.copy(), np.zeros((len(own), len(moving) + 1))
 
@@ -267,7 +271,7 @@ def _improve_long(
     def work(begin: int, beyond: int) -> None:
         iterations.append(improve_range(run, radius, begin, beyond, y))
 
-    in_ranges(0, len(y), RANGE, WINDOW, work)
+    in_ranges(0, len(y), RANGE, WINDOWS.window, work)
     _finish(q, run, radius, y, sum(iterations), splines, found)
 
 

@@ -40,7 +40,8 @@ from planner.smoothing.sites import (
 )
 from planner.smoothing.windows import (
     AGAIN,
-    WINDOW,
+    REACH,
+    Reach,
     in_ranges,
     in_shares,
     next_window,
@@ -72,6 +73,7 @@ class Goal(NamedTuple):
     gap: FloatArray  # (Q,) in the units of H
     relative: float
     axis_weights: FloatArray  # (A,) of the squared third derivatives
+    reach: Reach
 
 
 class Relaxed(NamedTuple):
@@ -126,7 +128,7 @@ def relax_range(run, goal, gap, begin, end, control, multiplier):
     multipliers (J,) of their sites. Reads `DEGREE` control points more on both sides."""
     done = begin
     while done < end:
-        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier)
+        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier, goal.reach)
         window = window_of(run, lo, hi)
         moved, prices = _relaxed_window(window, run, control, run.sites.radius, goal, gap)
         control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
@@ -150,13 +152,17 @@ def _relax_run(run, start, prices, goal, gap, only_outside):
     for attempt in range(int(only_outside), ROUNDS):
         done, site = run.fixed_first, 0
         while True:
-            lo, hi, site = next_window(attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site)
+            lo, hi, site = next_window(
+                attempt, done, site, run.fixed_first, end, run.sites.span, ratio_site, goal.reach
+            )
             if lo == end:
                 break
             window = window_of(run, lo, hi)
             if attempt > 0:
                 sites = with_radius(run.sites, radius)
-                closer, smaller = tighten_window(window, sites, control, run.middle, ratio_site)
+                closer, smaller = tighten_window(
+                    window, sites, control, run.middle, ratio_site, goal.reach.overlap
+                )
                 control[lo:hi], radius[window.site : window.site_end] = closer, smaller
             moved, prices = _relaxed_window(window, run, control, radius, goal, gap)
             control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
@@ -235,7 +241,7 @@ def _relax_long(
     def work(begin: int, beyond: int) -> None:
         relax_range(run, goal, gap, begin, beyond, control, prices)
 
-    in_ranges(int(run.fixed_first), len(control) - int(run.fixed_last), RANGE, WINDOW, work)
+    in_ranges(int(run.fixed_first), len(control) - int(run.fixed_last), RANGE, REACH.window, work)
     _finish(q, run, control, prices, splines, goal, True, found)
 
 

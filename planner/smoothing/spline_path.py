@@ -21,6 +21,7 @@ from planner.smoothing.initial import lay
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
 from planner.smoothing.sites import Splines, run_control, run_knots
+from planner.smoothing.windows import REACH
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
@@ -70,7 +71,7 @@ def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None =
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
     H, nothing = third_derivative_bands(splines, weights), np.zeros(len(of_run))
-    goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights)
+    goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights, REACH)
     left = np.full(splines.span_first[-1], np.inf)
     same = None if known is None else _same_runs(runs, known)
     if same is not None:

@@ -26,7 +26,7 @@ from planner.smoothing.initial import greville_control
 from planner.smoothing.relax import Relaxed, relax
 from planner.smoothing.sites import site_distance, used_share, with_radius
 from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
-from planner.smoothing.windows import OVERLAP, WIDER, ControlWindow, tighten_window
+from planner.smoothing.windows import REACH, WIDER, ControlWindow, tighten_window
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -284,12 +284,12 @@ def test_tightening_leaves_every_site_inside_and_widens_those_that_the_taper_pus
     used, ratio = given.copy(), np.ones(len(given))
     worst = int(np.argmax(distances() / given))
     ratio[worst] = 1.01
-    lo = max(sites.span[worst] - OVERLAP, 0)
-    hi = min(sites.span[worst] + OVERLAP + DEGREE + 1, len(control))
+    lo = max(sites.span[worst] - REACH.overlap, 0)
+    hi = min(sites.span[worst] + REACH.overlap + DEGREE + 1, len(control))
     first, last = np.searchsorted(sites.span, [lo - DEGREE, hi])
     window = ControlWindow(lo, hi, first, last)
     control[lo:hi], used[first:last] = tighten_window(
-        window, with_radius(sites, given), control, middle, ratio
+        window, with_radius(sites, given), control, middle, ratio, REACH.overlap
     )
     assert (distances() < used).all()
     wider = used > given

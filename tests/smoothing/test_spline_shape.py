@@ -18,6 +18,7 @@ from planner.smoothing.basis import DEGREE, derivatives, knots_at
 from planner.smoothing.forms import third_derivative_energy
 from planner.smoothing.sites import run_control, run_knots
 from planner.smoothing.spline_path import CUSP, spline_shape, turns_little
+from planner.smoothing.windows import REACH
 
 MACHINE = problems.machine()
 
@@ -128,5 +129,5 @@ def test_knots_of_a_run_laid_in_ranges_are_as_dense(long_run, monkeypatch):
 
 
 def test_ranges_are_further_apart_than_their_gaps_are_wide():
-    for module in (relax_module, combined_module):
-        assert module.RANGE > module.WINDOW + 2 * DEGREE
+    for module, reach in ((relax_module, REACH), (combined_module, combined_module.WINDOWS)):
+        assert reach.window + 2 * DEGREE < module.RANGE

@@ -35,10 +35,11 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution
 from planner.planning.optimal.on_path import OnPath
 from planner.smoothing.basis import DEGREE, ORDER
-from planner.smoothing.combined import MotionLimits, StepAim, improve
+from planner.smoothing.combined import WINDOWS, MotionLimits, StepAim, improve
 from planner.smoothing.forms import SplineMotion, add_motion_bands, motion_bands
 from planner.smoothing.relax import USED, Goal, relax
 from planner.smoothing.spline_path import SplineShape, cusps
+from planner.smoothing.windows import REACH
 
 BOUND = 0.98  # of what bounds the square of the feed: from there on it does [-]
 PRICED = SIZES.prices_at_once
@@ -107,14 +108,14 @@ def reshape(planned: OnPath, pull: FloatArray, gap: float) -> tuple[SplineShape,
         shape.used,
         motion,
         MotionLimits(limits, scale[:axes].copy(), _bounds(planned, on)),
-        StepAim(pull, gap, AGAIN),
+        StepAim(pull, gap, AGAIN, WINDOWS, REACH),
     )
     # where the curve leaves the tolerance between its sites, the nearest one that does not
     new = splines._replace(control=step.control)
     inside, _ = _motion(planned, _inside)
     _, Q = motion_bands(splines, inside, np.stack([problem.acceleration[:axes], scale[:axes]]))
     one = np.ones(len(splines.fits))
-    goal = Goal(np.zeros_like(Q), Q, one, GAP * run_times(planned), 0.0, np.ones(axes))
+    goal = Goal(np.zeros_like(Q), Q, one, GAP * run_times(planned), 0.0, np.ones(axes), REACH)
     kept = relax(shape.corridor, new, shape.runs, step.used, shape.left, goal, only_outside=True)
     splines = splines._replace(control=kept.control)
     used = np.minimum(kept.used, USED * splines.sites.radius)
@@ -137,7 +138,9 @@ def corridor_prices(planned: OnPath) -> FloatArray:
     """dT/d(tolerance) at every site (J,) [s/mm]: the multipliers of the corridor in a round from the present
     shape."""
     shape, (H, Q) = _shape(planned), price_bands(planned)
-    goal = Goal(H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)))
+    goal = Goal(
+        H, Q, np.full(len(shape.splines.fits), FORCE), GAP * run_times(planned), 0.0, np.ones(len(H)), REACH
+    )
     relaxed = relax(shape.corridor, shape.splines, shape.runs, shape.used, shape.left, goal)
     return np.asarray(-relaxed.multiplier / relaxed.used, dtype=np.float64)
 

@@ -115,5 +115,5 @@ def test_a_centre_of_zero_along_the_axis_is_none() -> None:
 
 
 def test_a_loop_that_only_switches_something_ends_with_a_sentence() -> None:
-    with pytest.raises(InputError, match="this loop never ends"):
+    with pytest.raises(InputError, match="lines executed without a move"):
         parse_program("o1 while [1]\nM9\no1 endwhile")

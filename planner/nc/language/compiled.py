@@ -8,69 +8,19 @@ simple loop is one block.
 A line of the Python source belongs to a statement, so that an error of Python's arithmetic is told as the
 statement's.
 
-Loops that cannot end are told from their text (`never_ends`): nothing that they do changes their condition,
-and nothing leaves them. All others are bounded while they run (run.py).
+Loops are bounded while they run (run.py).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from planner.base.sizes import SIZES
 from planner.nc.language import tree
 from planner.nc.language.expressions import FUNCTIONS, BasicBlocks, Expressions
 from planner.nc.language.rows import AppendedRows
-
-_LEAVES = (tree.Break, tree.Call, tree.Goto, tree.Return)  # a called subprogram may change anything
-_ENDS = (2.0, 30.0)  # M codes
-
-
-def never_ends(loop: tree.Loop, language: tree.Language) -> bool:
-    """True if the loop goes on for ever once its condition holds after a turn."""
-    if loop.kind == "repeat":
-        return False
-    read = list(_parameters(loop.condition))
-    if any(not _is_kept(parameter, language) for parameter in read):
-        return False
-    return all(_stays(statement, set(read)) for statement in tree.statements_in(loop.body))
-
-
-def _parameters(expression: tree.Expression) -> Iterator[tree.Parameter]:
-    """Parameters that an expression reads."""
-    if isinstance(expression, tree.Operation):
-        for operand in expression.operands:
-            yield from _parameters(operand)
-    elif isinstance(expression, tree.Exists):
-        yield expression.parameter
-    elif not isinstance(expression, tree.Number):
-        yield expression
-
-
-def _is_kept(parameter: tree.Parameter, language: tree.Language) -> bool:
-    """True if only assignments that name the parameter change it."""
-    if isinstance(parameter, tree.Named):
-        return not (
-            parameter.shared
-            and (parameter.name in language.system_names or parameter.name.startswith("_value"))
-        )
-    return isinstance(parameter.index, tree.Number) and parameter.index.value not in language.system_numbers
-
-
-def _stays(statement: tree.Statement, read: set[tree.Parameter]) -> bool:
-    """True if a statement leaves the parameters as they are, and the loop going on."""
-    if isinstance(statement, _LEAVES) or (isinstance(statement, tree.PlainRows) and statement.may_end):
-        return False
-    if not isinstance(statement, tree.Line):
-        return True
-    for word in statement.words:
-        if word.letter == "M" and not (isinstance(word.value, tree.Number) and word.value.value not in _ENDS):
-            return False
-    targets = [target for target, _ in statement.assignments]
-    computed = any(isinstance(t, tree.Numbered) and not isinstance(t.index, tree.Number) for t in targets)
-    return not computed and not read & set(targets)
-
 
 # Turns of loops between two looks at the limits and at the length of what is pending.
 TURNS_AT_ONCE = SIZES.turns_at_once
@@ -219,8 +169,6 @@ class _Function:
         self._tick(loop.place)
         if loop.kind == "repeat":
             self.blocks.put(f"{left}-=1", loop.place)
-        elif never_ends(loop, self.language):
-            self.blocks.put(f"if {condition}:run.goes_on()", loop.place)
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 

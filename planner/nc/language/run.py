@@ -154,10 +154,6 @@ class ProgramRun:
         if self.executed + pending > ROWS_MAX:
             raise Endless(f"{ROWS_MAX:,} lines executed")
 
-    def goes_on(self) -> None:
-        """A loop that cannot end goes on. Raises ValueError."""
-        raise ValueError("this loop never ends: nothing in it changes its condition, and nothing leaves it")
-
     def call(
         self,
         place: tuple[int, int, int],

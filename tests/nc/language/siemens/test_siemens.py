@@ -201,7 +201,7 @@ def test_exact_stops_and_units() -> None:
         ("X=(1", r"\) is expected"),
         ("X=R1000", "R0 to R999"),
         ("G4 S3", "write G4 F"),
-        ("LOOP\nENDLOOP", "this loop never ends"),
+        ("LOOP\nENDLOOP", "stopped after 10,000 turns of loops"),
     ],
 )
 def test_what_is_not_read_is_refused_with_its_place(

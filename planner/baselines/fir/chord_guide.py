@@ -106,12 +106,12 @@ def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
 
 
 def guide_of_path(
-    samples: PathSamples, machine: Machine, own: tuple[float, float] | None = None
+    samples: PathSamples, machine: Machine, profile_filters: tuple[float, float] | None = None
 ) -> ChordGuide:
     """The chords of a smooth path, cut beside lower feeds too (`cut_beside_slower`).
 
     samples : the path on a grid
-    own     : lengths of the two filters [s]; None to choose them
+    profile_filters : lengths of the two filters [s]; None to choose them
     """
     path, segment = samples.path, samples.segment
     toolpath = path.toolpath
@@ -139,7 +139,7 @@ def guide_of_path(
     speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
     made = ChordGuide(
         axes=axes,
-        own=own,
+        profile_filters=profile_filters,
         first=np.append(0, np.cumsum(moving)[first[1:] - 1]),
         dwell=toolpath.dwell[path.legs.first[samples.stop]],
         point=np.vstack([start[:, 0], end[-1:, 0]]),

@@ -90,7 +90,7 @@ class ChordSpeeds(SpeedPlan):
         made : the motion of this plan
         n    : rounds before this one; from `PATIENCE` on everything gets slower
         """
-        guide, given = self.guide, self.guide.own is not None
+        guide, given = self.guide, self.guide.profile_filters is not None
         over = np.stack([made.largest(made.seen.acceleration), made.largest(made.seen.jerk)], axis=1)
         wrong = made.wrong
         everything = wrong & ((over > 1.0).any(axis=1) if given else n >= PATIENCE)
@@ -132,7 +132,7 @@ def first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSpe
     """First speeds up to `top` (S,) and the filters for them."""
     acceleration = machine.limits("acceleration", guide.axes)
     most, margin = np.minimum(guide.feed, top[guide.run]), np.ones((guide.runs, 2))
-    if guide.own is not None:
+    if guide.profile_filters is not None:
         T1, T2 = guide.given_filters()
         v = first_speeds(guide, most, acceleration, T1, T2)
     else:

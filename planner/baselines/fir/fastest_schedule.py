@@ -46,7 +46,7 @@ def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
 
 def _settled(guide: LegGuide, machine: Machine) -> Schedule:
     """The fastest schedule of every run, each margin with the speed that promises to be the fastest."""
-    margins = MARGINS if guide.own is None else MARGINS[:1]
+    margins = MARGINS if guide.profile_filters is None else MARGINS[:1]
     return fastest_of((_promising(guide, machine, margin) for margin in margins), machine)
 
 
@@ -72,7 +72,7 @@ def filters_for(
 
     speed : (S,) [mm/s]
     """
-    if guide.own is not None:
+    if guide.profile_filters is not None:
         return guide.given_filters()
     V = np.minimum(guide.feed, speed[guide.run])
     T1 = guide.largest(V / guide.a_max)
@@ -100,7 +100,7 @@ def plain_plan(guide: LegGuide, machine: Machine) -> Schedule:
     """Paper 000's rules and nothing else: T1 = V/A, T2 = A/J, full speed, and eq. 15 at every corner."""
     a, j = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
     V = guide.largest(guide.feed)
-    T1, T2 = lengths_from_limits(V, a, j) if guide.own is None else guide.given_filters()
+    T1, T2 = lengths_from_limits(V, a, j) if guide.profile_filters is None else guide.given_filters()
     before, after, at = guide.feed[:-1], guide.feed[1:], guide.run[1:]
     overlap = np.zeros(len(guide) + 1)
     overlap[1:-1] = overlap_time(

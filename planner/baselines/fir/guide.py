@@ -56,7 +56,7 @@ class Guide(ABC):
 
     axes: tuple[str, ...]  # axis letters
     # lengths of the two filters that every run has [s]; None to choose them
-    own: tuple[float, float] | None = None
+    profile_filters: tuple[float, float] | None = None
     first: Array  # (S+1,) first joint of each run, and the last joint of all
     dwell: FloatArray  # (S+1,) standstill before the first run and after each [s]
     point: FloatArray  # (R+1, A) the joints [mm]
@@ -105,8 +105,8 @@ class Guide(ABC):
         return np.add.reduceat(value, self.first[:-1])
 
     def given_filters(self) -> tuple[FloatArray, FloatArray]:
-        """T1 >= T2 (S,) [s]: the filters `own` for every run."""
-        T2, T1 = sorted(self.own or (0.0, 0.0))
+        """T1 >= T2 (S,) [s]: the `profile_filters` for every run."""
+        T2, T1 = sorted(self.profile_filters or (0.0, 0.0))
         return np.full(self.runs, T1), np.full(self.runs, T2)
 
 
@@ -137,10 +137,12 @@ class LegGuide(Guide):
         return dataclasses.replace(self, first=first, dwell=dwell, sin_half=sin_half)
 
 
-def guide_of_legs(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | None = None) -> LegGuide:
+def guide_of_legs(
+    toolpath: Toolpath, machine: Machine, profile_filters: tuple[float, float] | None = None
+) -> LegGuide:
     """The legs of a toolpath.
 
-    own : lengths of the two filters of every run [s]; None to choose them
+    profile_filters : lengths of the two filters of every run [s]; None to choose them
     """
     lines = chorded(toolpath, CHORD_FRACTION, np.zeros(len(toolpath), bool))
     legs = legs_of(parted_by_feed(lines))
@@ -175,5 +177,5 @@ def guide_of_legs(toolpath: Toolpath, machine: Machine, own: tuple[float, float]
         sin_half=sin_half,
         first=first,
         dwell=lines.dwell[at[first]],
-        own=own,
+        profile_filters=profile_filters,
     )

@@ -105,7 +105,11 @@ class FirSplineMethod(Method):
         29)."""
         acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
         T1, T2 = guide.largest(guide.feed) / acceleration, acceleration / jerk
-        T1, T2 = (np.maximum(T1, T2), np.minimum(T1, T2)) if guide.own is None else guide.given_filters()
+        T1, T2 = (
+            (np.maximum(T1, T2), np.minimum(T1, T2))
+            if guide.profile_filters is None
+            else guide.given_filters()
+        )
         v = v_sc(guide, T1, T2, self.phase_lag)
         return ChordSpeeds(guide=guide, v=v, T1=T1, T2=T2, margin=np.ones((guide.runs, 2)))
 

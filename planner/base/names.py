@@ -81,6 +81,7 @@ METHOD_ALIASES = {"toppra": SECOND_ORDER}
 SOLVERS = tuple(dict.fromkeys(solver for method in METHODS.values() for solver in method.solvers))
 # Settings of `planner.plan` that only methods of `shapes` use.
 OF_SHAPES = ("geometry", "corner", "effort", "rounds", "shaped")
+OF_SEARCH = {"smooth": (OPTIMAL,)}  # and those of the joint search, with the methods that have them
 
 
 def method_name(name: str) -> str:
@@ -113,6 +114,8 @@ def users_of(setting: str) -> tuple[str, ...]:
     """Names of the methods that use a setting of `planner.plan`."""
     if setting == "solver":
         return tuple(name for name, method in METHODS.items() if method.solvers)
+    if setting in OF_SEARCH:
+        return OF_SEARCH[setting]
     assert setting in OF_SHAPES
     return tuple(name for name, method in METHODS.items() if method.shapes)
 

@@ -305,6 +305,16 @@ _PLANNING: dict[str, tuple[Any, Any]] = {
             help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
         ),
     ),
+    "smooth": (
+        float | None,
+        typer.Option(
+            "--smooth",
+            min=0.0,
+            metavar="WEIGHT",
+            help="weight of the jerk against the time: 0.03 for a smoother motion, 0.3 for a much slower one (default: 0, jerk small "
+            f"where it costs no time; {' and '.join(names.users_of('smooth'))})",
+        ),
+    ),
 }
 
 

@@ -1,11 +1,12 @@
 """The free optimum inside the tolerance near a motion, by a primal-dual interior-point method with slacks
 (Mehrotra 1992).
 
-    minimise    sum of h + pull sum ((h - guess)/guess)^2 + smooth sum h (jerk/limit)^2, h as it was guessed
+    minimise    sum of h + pull sum ((h - guess)/guess)^2 + sum h (smooth (jerk/limit)^2 + centre (d/room)^2/2)
     subject to  the kinematics (recursion.py) and g <= 0 for every row (rows.py), with slacks s and multipliers z
 
-from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. Kinematics
-and rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
+from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. The h of
+the last sum is as it was guessed, and d the distance of the node from its leg (numbers.py). Kinematics and
+rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds.
 
@@ -24,7 +25,7 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.joint.curvature import Barrier
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
-from planner.joint.rows import VECTORS, Linear, put_rows, slopes
+from planner.joint.rows import TUBE_NODE, VECTORS, Linear, put_rows, slopes
 from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
@@ -53,7 +54,6 @@ class Tuning(NamedTuple):
     pull: float  # weight of ((h - guess)/guess)^2, against a mean step's time
     prox: float  # the same of the change in one iteration
     gap: float  # complementarity at the end, share of the time
-    smooth: float  # weight of (jerk/limit)^2 of every axis, against a step's time
     # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off:
     # limits are narrowed by more than that (problem.py). Slacks of the others follow no more closely than the
     # tangents that are kept.
@@ -154,6 +154,11 @@ def solve_window(legs, limits, x, u, place, tuning, at):
     time = u[:, axes].sum()
     rows = _start(on, lin.g, time, tuning, slacks)
     settled, prox, before, close, still = False, tuning.prox, time, 0, 0
+    # what the node's distance from its leg costs acts on it as a multiplier of its row does
+    centred, tube = np.zeros(many), 8 * axes + TUBE_NODE
+    for i in range(N):
+        if on[i, tube]:
+            centred[i, tube] = limits.centre[i] * limits.h[i]
     for iteration in range(ITERATIONS):
         at[0] = iteration
         products, missed, broken = 0.0, 0.0, 0.0
@@ -174,9 +179,10 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         if settled:
             prox = min(prox * FREEZE, FROZEN)
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF:
-                return True, iteration, z
+                # what holds a node off its leg against the pull does so for the time, like the row itself
+                return True, iteration, z + centred * (1.0 + 2.0 * lin.g)
         if not products <= LOST * time or not factor_steps(
-            x, u, legs, limits, lin, Barrier(z, ratio), (tuning.pull + prox, tuning.smooth), factor
+            x, u, legs, limits, lin, Barrier(z + centred, ratio), tuning.pull + prox, factor
         ):
             return False, iteration, z
         second[:] = 0.0
@@ -188,8 +194,8 @@ def solve_window(legs, limits, x, u, place, tuning, at):
             for i in range(N):
                 for r in range(R):
                     if on[i, r]:
-                        q[i, r] = (aim - second[i, r] + z[i, r] * missing[i, r]) / s[i, r]
-            forces(limits, lin, q, tuning.pull, tuning.smooth, u, w)
+                        q[i, r] = centred[i, r] + (aim - second[i, r] + z[i, r] * missing[i, r]) / s[i, r]
+            forces(limits, lin, q, tuning.pull, u, w)
             newton_step(x, u, gap, w, end, factor, NewtonStep(dx, du, after))
             slopes(limits, lin, dx, du, slope)
             _directions(on, slacks, slope, aim, second)

@@ -27,10 +27,10 @@ and the place sum B_k s_k never goes back: motion and path are within the budget
 which is what the tolerance asks for: in order, every vertex reached, both sides.
 
 Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and
-ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and a weak one of every
-jerk to 0, `SMOOTH`. It is not convex and has no certificate: what is found is the best near the guess. All
-quantities are in units in which the mean step of the guess has length 1 and duration 1, so that scaling a job
-scales its plan.
+ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and weak ones of
+every jerk to 0 and of nodes to their legs (numbers.py). It is not convex and has no certificate: what is
+found is the best near the guess. All quantities are in units in which the mean step of the guess has length 1
+and duration 1, so that scaling a job scales its plan.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ import numpy as np
 from planner.base.errors import import_needed
 from planner.joint.guess import Guess
 from planner.joint.motion import steps_of
-from planner.joint.numbers import acceleration_along, step_numbers
+from planner.joint.numbers import CENTRE, acceleration_along, jerk_weights, step_numbers
 from planner.joint.outcome import BROKE_DOWN, NO_CURVES, SOLVED, STUCK, TubeSolution
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
@@ -53,9 +53,6 @@ from planner.joint.state_limits import REST, formula
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: without it windows take more iterations, or do not
 # converge; a larger one costs time.
 PULL = 1e-4
-# Weight of the squares of all jerks, as shares of their limits, against the time [-]: where jerk saves next
-# to nothing there is little of it, instead of as much as there may be.
-SMOOTH = 3e-4
 # Steps may become this much longer or shorter than they were guessed [-].
 LONGER = 4.0
 # The guess is slowed down by these factors in turn until one leads to an optimum [-]: at the guess itself the
@@ -68,6 +65,7 @@ WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
 # It may also come to rest far from any optimum: what is slower than the guess by more than this fraction [-]
 # does not count.
 NOT_SLOWER = 1e-4
+NODE_ROW = 2  # of the rows of a step: of the tolerance of the node at its end
 # By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt
 # needs room there.
 RELAXED = 1e-6
@@ -147,7 +145,8 @@ class TubeNLP:
         h_all = step[axes, :]
         merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
         used = step[:axes, :] / ca.repmat(ca.DM(j_max), 1, steps)
-        merit += SMOOTH * ca.sum2(ca.sum1(used**2) * ca.DM(h_guess).T)
+        weight = jerk_weights(run, leg, guess.state[:, 1], 0.0)
+        merit += ca.sum2(ca.sum1(used**2) * ca.DM(weight * h_guess).T)
 
         # ---- dynamics of one step
         # -------------------------------------------------------------------------------------------
@@ -243,6 +242,7 @@ class TubeNLP:
             node, step, ca.DM(np.column_stack([data, mean_step[1:] / length, *moving, words]).T)
         )
         constraints = ca.vec(ca.vertcat(after - reached, limited))
+        merit += CENTRE / 2.0 * ca.sum2(limited[NODE_ROW, :] * ca.DM(h_guess).T)
         low, high = (np.concatenate([np.full(row[0].numel(), row[k]) for row in rows]) for k in (1, 2))
         row_min, row_max = (np.tile(np.append(np.zeros(states), bound), steps) for bound in (low, high))
 

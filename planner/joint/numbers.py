@@ -4,12 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.joint.guess import Guess
 from planner.joint.run import TubeRun
 
 # The tolerance is narrowed by this fraction [-], so that rounding stays inside it.
 ROUNDING = 1e-4
+# Weights of what the motion does for no time, against the time [-]: of the squares of all jerks, as shares of
+# their limits, on steps that run at the programmed feed and on all others; and of half the square of how far
+# nodes are from their leg, as a share of the tolerance. So jerk is small, and positions are near the path,
+# where time does not depend on them; elsewhere these cost less than 1e-4 of the time, on the mean.
+SMOOTH_AT_FEED, SMOOTH, CENTRE = 1e-2, 3e-4, 1e-3
+# A step whose ends are as fast as this share of the feed runs at it [-].
+AT_FEED = 0.98
+
+
+def jerk_weights(run: TubeRun, leg: Array, velocity: FloatArray, least: float) -> FloatArray:
+    """(N,) weights of the jerks of steps [-]. Where the feed holds the motion less jerk costs no time, on
+    ramps it does.
+
+    leg      : (N,) of the steps
+    velocity : (N+1, A) of the nodes [mm/s]
+    least    : weight of any step at least [-]
+    """
+    speed = np.linalg.norm(velocity, axis=1)
+    held = np.minimum(speed[:-1], speed[1:]) >= AT_FEED * run.feed[leg]
+    return np.maximum(np.where(held, SMOOTH_AT_FEED, SMOOTH), least)
 
 
 def step_numbers(

@@ -28,7 +28,7 @@ from planner.joint.guess import Guess
 from planner.joint.interior_point import Tuning, solve_window
 from planner.joint.legs import LegFormulas
 from planner.joint.motion import Steps, closed_at_nodes
-from planner.joint.nlp import PULL, SMOOTH
+from planner.joint.nlp import PULL
 from planner.joint.outcome import TubeSolution
 from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, Tighter, window_of
@@ -74,6 +74,8 @@ class TubeOwn:
                need not keep the limits and no part of it is kept: windows may end slower than it, and the
                search ends at the first one that fails
     progress : called with the share of the steps that are done [-]
+    smooth   : weight of the jerk against the time at least [-] (numbers.py); above 0 what is found may be
+               slower than the guess
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
                where it does not fall, ends a little faster in more iterations
     """
@@ -81,6 +83,7 @@ class TubeOwn:
     gap: float = 1e-5
     divide: bool = True
     progress: Callable[[float], None] | None = None
+    smooth: float = 0.0
     least: float = 1.0
     legs_max: ClassVar[float] = np.inf
 
@@ -261,8 +264,8 @@ class _Search:
             for _ in range(TIGHTENED):
                 if self._stopped:
                     return False
-                window = window_of(self.run, self.guess, lo, hi, missed, tight)
-                tuning = Tuning(PULL, prox, self.settings.gap, SMOOTH, missed, self.settings.least, *START)
+                window = window_of(self.run, self.guess, lo, hi, missed, tight, self.settings.smooth)
+                tuning = Tuning(PULL, prox, self.settings.gap, missed, self.settings.least, *START)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
                 )
@@ -299,7 +302,7 @@ class _Search:
             return False
         if not switches_kept(run, leg, found):
             return False
-        if not self.settings.divide or h.sum() < guess.h[lo:hi].sum():
+        if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = place + run.offset[leg][:, None]
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False

@@ -12,7 +12,7 @@ from planner.joint import rows
 from planner.joint.guess import CutMotion
 from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER, LONGER_WATCHED
-from planner.joint.numbers import ROUNDING, pace
+from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
 from planner.joint.rows import StepLimits
 from planner.joint.run import TubeRun
 from planner.joint.state_limits import ROWS, WORD_ROWS
@@ -55,12 +55,19 @@ class Tighter(NamedTuple):
 
 
 def window_of(
-    run: TubeRun, guess: CutMotion, lo: int, hi: int, missed: float, tight: Tighter | None = None
+    run: TubeRun,
+    guess: CutMotion,
+    lo: int,
+    hi: int,
+    missed: float,
+    tight: Tighter | None = None,
+    smooth: float = 0.0,
 ) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
     missed : by how much rows may be missed at the end [-]
     tight  : what limits and room are divided by; None for 1
+    smooth : weight of the jerk against the time at least [-] (numbers.py)
     """
     part, leg = slice(lo, hi), guess.leg[lo:hi]
     state, h = guess.state[lo : hi + 1], guess.h[part]
@@ -85,7 +92,7 @@ def window_of(
     place = (guess.place[part, :3] - run.offset[leg][:, None]) / length
     return StepWindow(
         legs=legs,
-        limits=_limits(run, guess, lo, hi, (second, length), (missed, tight)),
+        limits=_limits(run, guess, lo, hi, (second, length), (missed, tight), smooth),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -102,9 +109,10 @@ def _limits(
     hi: int,
     units: tuple[float, float],
     narrow: tuple[float, Tighter | None],
+    smooth: float,
 ) -> StepLimits:
-    """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed as in
-    `window_of`."""
+    """The limits of the steps lo .. hi - 1, in the units of time [s] and length [mm]; narrowed and
+    smooth as in `window_of`."""
     second, length = units
     speed, acc, jerk = length / second, length / second**2, length / second**3
     leg = guess.leg[lo:hi]
@@ -161,6 +169,8 @@ def _limits(
         h_max=h * longer,
         h_min=h / LONGER,
         switch=np.where(at_vertex, run.switch[leg], 0.0),
+        smooth=jerk_weights(run, leg, guess.state[lo : hi + 1, 1], smooth),
+        centre=np.full(hi - lo, CENTRE),
         aside=NARROWED * narrow[0],
     )
 

@@ -67,10 +67,9 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
-    """The recursion into `factor`, with a barrier (curvature.py) and the weights of (dh/limits.h)^2 and of
-    limits.h (j/limit)^2. False where it breaks down."""
-    pull, smooth = weights
+def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
+    """The recursion into `factor`, with a barrier (curvature.py) and the weight of (dh/limits.h)^2. False
+    where it breaks down."""
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     size, R = S + C, lin.g.shape[1]
@@ -89,7 +88,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
             add_state_curvature(W, limits, i, x[i], u[i], barrier.z[i, 8 * axes + STATE_ROWS :])
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
         for k in range(axes):
-            W[S + k, S + k] += 2.0 * smooth * limits.h[i] / limits.box[0, k] ** 2
+            W[S + k, S + k] += 2.0 * limits.smooth[i] * limits.h[i] / limits.box[0, k] ** 2
         step_of_h(x[i], u[i], axes, by_h)
         # P is symmetric: (P A)' = A'P
         _times_transposed(own, h, axes, PA)  # A'P, (S, S)
@@ -164,7 +163,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, weights, factor):
 
 
 @njit(cache=True, error_model="numpy")
-def forces(limits, lin, q, pull, smooth, u, w):
+def forces(limits, lin, q, pull, u, w):
     """w (N, 4 A + 1) = the gradient of time, pull and smoothness, and the sum of q (N, R) grad g."""
     N, axes = len(w), lin.n.shape[2]
     R, more = lin.g.shape[1], 8 * axes
@@ -175,7 +174,7 @@ def forces(limits, lin, q, pull, smooth, u, w):
         w[i] = 0.0
         own = 1.0 + 2.0 * pull * (u[i, axes] - limits.h[i]) / limits.h[i] ** 2
         for k in range(axes):
-            w[i, 3 * axes + k] = 2.0 * smooth * limits.h[i] * u[i, k] / limits.box[0, k] ** 2
+            w[i, 3 * axes + k] = 2.0 * limits.smooth[i] * limits.h[i] * u[i, k] / limits.box[0, k] ** 2
         for r in range(R):
             if not limits.on[i, r]:
                 continue

@@ -90,6 +90,8 @@ class StepLimits(NamedTuple):
     h_max: FloatArray  # (N,)
     h_min: FloatArray  # (N,)
     switch: FloatArray  # (N,) at a vertex 1 where the feed falls, -1 where it rises; else 0
+    smooth: FloatArray  # (N,) weight of (jerk/limit)^2 of every axis, against the step's time
+    centre: FloatArray  # (N,) weight of the row of the node's tolerance, against the step's time
     aside: float  # how far inside its bound the row of that has to be [-]
 
 

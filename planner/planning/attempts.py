@@ -42,6 +42,10 @@ KINEMATIC_MOST = SIZES.rivals_planned  # blocks; of more `kinematic` is planned 
 
 
 def _searched(job: Job, settings: Settings, tried: Tried) -> bool:
+    return is_searched(job, settings)
+
+
+def is_searched(job: Job, settings: Settings) -> bool:
     """Whether the joint search knows all limits of the job, and the effort is for so many steps."""
     if not settings.joint:
         return False
@@ -67,6 +71,8 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
     """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended
     from the first ones, and where the path doubles back."""
+    if tried.joint and settings.effort.search.smooth:  # what is faster is not what is asked for
+        return False
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
     return small and (tried.best is None or (tried.steps <= CHEAP and _doubles_back(job)))
 
@@ -106,7 +112,7 @@ def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
 def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bool:
     """Whether nothing passes, full stops take less time, which is known before, or there is only the motion
     on a path of a job that is not long."""
-    if settings.corner != AUTO:
+    if settings.corner != AUTO or (tried.joint and settings.effort.search.smooth):
         return False
     stops_sooner = job.line_stop_time < counted_time(tried.best)
     return stops_sooner or (not tried.joint and len(job.toolpath) <= KINEMATIC_MOST)

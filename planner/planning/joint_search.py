@@ -158,13 +158,13 @@ class InTwo(NamedTuple):
 def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
     """The solver as the effort has it; where the start `stays`, windows that fail are divided."""
     if not search.finer:
-        return TubeOwn(search.gap, divide=stays, progress=report)
+        return TubeOwn(search.gap, divide=stays, progress=report, smooth=search.smooth)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
     shares = [partial(_of_whole, report, *part) for part in pairwise((ends / ends[-1]).tolist())]
     return InTwo(
-        TubeOwn(search.gap, divide=False, progress=shares[0]),
+        TubeOwn(search.gap, divide=False, progress=shares[0], smooth=search.smooth),
         tuple(
-            (cut, TubeOwn(gap, divide=stays, progress=share))
+            (cut, TubeOwn(gap, divide=stays, progress=share, smooth=search.smooth))
             for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
         ),
     )
@@ -249,7 +249,9 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun,
         wider = start.with_reserve(run, guess.leg, found)
         finer = divided(wider, guess.leg, found, cut)
         again = searched_again(wider, found, finer, own)
-        if again is not None and again.steps is not None and again.steps.h.sum() <= found.steps.h.sum():
+        if again is None or again.steps is None:
+            continue
+        if own.smooth or again.steps.h.sum() <= found.steps.h.sum():
             run, guess, found = wider, finer.guess, again
     return run, guess, found
 

@@ -113,9 +113,9 @@ def test_the_recursion_solves_the_system_of_all_steps():
         np.zeros((steps, controls, controls)),
         np.zeros((steps + 1, states, states)),
     )
-    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), (0.5, 0.1), factor)
+    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), 0.5, factor)
     w, gap = np.zeros((steps, states + controls)), np.zeros((steps, states))
-    forces(limits, lin, q, 0.5, 0.1, u, w)
+    forces(limits, lin, q, 0.5, u, w)
     gaps(x, u, gap)
     gap += 1e-3 * rng.normal(size=gap.shape)
 
@@ -190,7 +190,8 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
     assert (whole.windows, parts.windows) == (1, 3)  # two, and the join
     assert parts.steps is not None
     assert whole.steps is not None
-    assert parts.steps.h.sum() == pytest.approx(whole.steps.h.sum(), rel=2e-4)
+    # what runs at the feed, where jerk weighs more, is told by the start, and of joins by what the windows have found
+    assert parts.steps.h.sum() == pytest.approx(whole.steps.h.sum(), rel=5e-4)
     for name, tiny in (("position", 1e-9), ("velocity", 1e-8), ("acceleration", 1e-6)):  # joins do not jump
         found = parts.steps
         state = np.stack([found.position, found.velocity, found.acceleration], axis=1)

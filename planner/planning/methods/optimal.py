@@ -6,13 +6,14 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
-from planner.planning.attempts import ATTEMPTS
+from planner.planning.attempts import ATTEMPTS, is_searched
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import EFFORTS, Settings
@@ -23,6 +24,7 @@ from planner.planning.page import Method, best_of
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature,
 # is slower.
 SIGMA2 = 0.94
+NOT_SMOOTHER = "geometry and feed were not searched together, and smooth has no effect"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +39,9 @@ class OptimalMethod(Method):
              are searched together (planning/optimal/effort.py); that is with corner "auto", the own solver,
              no filters, no shaping, and `rounds` None
     rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
+    smooth : weight of the squares of all jerks, as shares of their limits, against the time [-], 0 or more:
+             with more the joint search finds a smoother and slower motion; at 0 jerk is small only where it
+             costs no time (joint/numbers.py)
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """
 
@@ -44,18 +49,24 @@ class OptimalMethod(Method):
     solver: str | ThirdOrderSolver = OWN
     effort: str = NORMAL
     rounds: int | None = None
+    smooth: float = 0.0
     shaped: bool = False
 
     ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
 
     def plan_job(self, job: Job) -> Plan:
+        effort = EFFORTS[effort_name(self.effort)]
+        search = dataclasses.replace(effort.search, smooth=self.smooth)
         settings = Settings(
             method="optimal",
             corner=self.corner,
             order=ThirdOrder(third_order_solver(self.solver)),
             bezier=BezierCorner(sigma2=SIGMA2),
-            effort=EFFORTS[effort_name(self.effort)],
+            effort=dataclasses.replace(effort, search=search),
             rounds=self.rounds,
             joint=self.corner == AUTO and self.solver == OWN and self.rounds is None,
         )
-        return shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)
+        made = shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)
+        if self.smooth and (self.shaped or not is_searched(job, settings)):
+            made = dataclasses.replace(made, notes=(*made.notes, NOT_SMOOTHER))
+        return made

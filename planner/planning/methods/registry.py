@@ -6,9 +6,11 @@ import dataclasses
 import difflib
 from collections.abc import Sequence
 from importlib import import_module
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
+
+import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.names import (
@@ -53,6 +55,8 @@ class MethodSettings(TypedDict, total=False):
                None for "normal"
     rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or
                more; None for those of the effort, fewer where they gain nothing
+    smooth   : weight of the jerk against the time, 0 or more [-]: with more the joint search of "optimal"
+               finds a smoother and slower motion; None for 0, where jerk is small as far as it costs no time
     shaped   : deliver setpoints that leave the machine's vibration modes at rest
     """
 
@@ -61,6 +65,7 @@ class MethodSettings(TypedDict, total=False):
     solver: str | None
     effort: str | None
     rounds: int | None
+    smooth: float | None
     shaped: bool | None
 
 
@@ -81,7 +86,7 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
-    settings  : geometry, corner, solver, effort, rounds, shaped: `MethodSettings`
+    settings  : geometry, corner, solver, effort, rounds, smooth, shaped: `MethodSettings`
     limits    : of your own, one or several, beside the machine's (docs/extending.md): "optimal" and
                 "second-order" keep them, the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
@@ -139,6 +144,8 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
         made |= {"corner": shape or kind, "rounds": given.get("rounds"), "shaped": bool(given.get("shaped"))}
         if (effort := given.get("effort")) is not None:
             made["effort"] = effort_name(effort)
+    if (smooth := given.get("smooth")) is not None:
+        made["smooth"] = float(smooth)
     if entry.solvers and (solver := given.get("solver")) is not None:
         made["solver"] = solver_name(solver)
     module, _, class_name = entry.home.partition(":")
@@ -165,9 +172,11 @@ def _given(settings: MethodSettings) -> MethodSettings:
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise TypeError(f"unexpected keyword argument '{wrong}'; settings are {', '.join(allowed)}{hint}")
     given = {name: value for name, value in settings.items() if value is not None and value is not False}
-    rounds, corner, shaped = (given.get(name) for name in ("rounds", "corner", "shaped"))
+    rounds, corner, smooth, shaped = (given.get(name) for name in ("rounds", "corner", "smooth", "shaped"))
     if "rounds" in given and not (isinstance(rounds, Integral) and int(rounds) >= 0):
         raise InputError(f"{rounds} rounds; it must be 0 or more, a whole number")
+    if "smooth" in given and not (isinstance(smooth, Real) and 0.0 <= float(smooth) < np.inf):
+        raise InputError(f"smooth = {smooth!r}: it is a number, 0 or more")
     if "corner" in given and not (isinstance(corner, str) or hasattr(corner, "at")):
         raise InputError(f"corner = {corner}: give the name of a shape, or a shape of your own")
     if "shaped" in given and shaped is not True:

@@ -49,6 +49,7 @@ class Search:
     gap       : complementarity at the end, share of the time [-]
     finer     : how finely what is found is cut once more, and the gap of the search from there, one after the
                 other
+    smooth    : weight of the jerk against the time at least [-]
     again     : search from reshaped splines where that has not ended
     small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched
                 where a step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um
@@ -59,6 +60,7 @@ class Search:
     cut: Cut = FIRST_CUT
     gap: float = FIRST_GAP
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
+    smooth: float = 0.0
     again: bool = True
     small: float = float("inf")
 

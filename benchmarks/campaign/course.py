@@ -24,7 +24,6 @@ ARC_CHORDS = 1500  # of an arc at most
 SPLINE_CHORDS = 160  # of a cubic
 RATIO, PLACE = 1e-6, 2e-6  # [-], [mm]: what is rounding
 STRAIGHT = 1e-8  # [rad] a turn below this is none
-TURNED_BACK = np.deg2rad(175.0)  # turns above this are full stops
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -217,6 +216,4 @@ def _stops(blocks: Blocks, block: int, after: int, before: Array, behind: Array)
         np.linalg.norm(u2 / np.linalg.norm(u2) - u1 / np.linalg.norm(u1)),
         np.linalg.norm(u2 / np.linalg.norm(u2) + u1 / np.linalg.norm(u1)),
     )
-    return bool(
-        straight and (angle > TURNED_BACK or (blocks.control[block] == EXACT_PATH and angle > STRAIGHT))
-    )
+    return bool(straight and blocks.control[block] == EXACT_PATH and angle > STRAIGHT)

@@ -35,8 +35,6 @@ PERIOD = 0.00025  # of setpoints [s]
 # What the other code may find to be run too soon [s]: between setpoints it does not know where a vertex is passed on a bend.
 KEPT = 0.25 * PERIOD
 MARK = np.pi / 8  # [rad] between the points of an arc that are passed in order
-# Where a path turns by more than 175 degrees it turns back, and the motion stops, at the vertex to this [mm].
-TURNS_BACK, STOPPED = np.cos(np.radians(175.0)), 1e-5
 BLOCKS = (3, 9)  # from, below
 LENGTHS = (-1.5, 0.5)  # powers of ten [mm]
 FEEDS = (1.0, 4.0)  # powers of ten [mm/min]
@@ -48,7 +46,7 @@ class Case:
     """A program.
 
     points : (V, 3) between its start and end, that are passed in order [mm]
-    within : (V,) how far from them [mm]: the tolerance, or next to nothing where the path turns back and the motion stops
+    within : (V,) how far from them [mm]: the tolerance
     feeds  : (V+1,) between them [mm/s]
     """
 
@@ -66,30 +64,27 @@ def case(seed: int, kind: str | None = None) -> Case:
     tolerance = 10 ** random.uniform(*TOLERANCES)
     slope = random.normal(size=3)
     at, rows, points, feeds, within = np.zeros(3), [], [], [], []
-    before = np.zeros(3)  # direction at the end of the block before
     for _ in range(int(random.integers(*BLOCKS))):
         way = {"line": np.array([1.0, 0.0, 0.0]), "slope": slope}.get(kind, random.normal(size=3))
         way = way * np.array([1.0, 1.0, kind in ("slope", "space")])
         end = np.round(at + way / np.linalg.norm(way) * 10 ** random.uniform(*LENGTHS), 6)
         feed = np.round(10 ** random.uniform(*FEEDS), 2)
         if kind == "arcs" and random.random() < 0.5:
-            words, new, begins, ends = _arc(at, end, random.uniform(-1.0, 1.0))
+            words, new = _arc(at, end, random.uniform(-1.0, 1.0))
         else:
             words, new = "G1 X{:.6f} Y{:.6f} Z{:.6f}".format(*end), end[None]
-            begins = ends = (end - at) / np.linalg.norm(end - at)
         rows.append(f"{words} F{feed:.2f}")
         points.append(new)
-        within += [STOPPED if before @ begins < TURNS_BACK else tolerance] + [tolerance] * (len(new) - 1)
-        before = ends
+        within += [tolerance] * len(new)
         feeds += [feed / 60.0] * len(new)
         at = end
     text = "\n".join(["G21 G90 G94 G17", f"G64 P{tolerance:.4g}", "G0 X0 Y0 Z0", *rows, "M2", ""])
     return Case(text, np.concatenate(points)[:-1], np.array(within[1:]), np.array(feeds), kind)
 
 
-def _arc(at: Array, end: Array, beside: float) -> tuple[str, Array, Array, Array]:
+def _arc(at: Array, end: Array, beside: float) -> tuple[str, Array]:
     """The words of an arc whose centre is so many halves of the chord beside its middle, to the left or the right of it by its sign;
-    points along it (n, 3) to its end; its directions at both ends."""
+    points along it (n, 3) to its end."""
     way = end - at
     center = at + way / 2 + beside * np.array([-way[1], way[0], 0.0]) / 2
     begin, stop = (np.arctan2(*(p - center)[1::-1]) for p in (at, end))
@@ -101,7 +96,7 @@ def _arc(at: Array, end: Array, beside: float) -> tuple[str, Array, Array, Array
     points[-1] = end
     i, j = (center - at)[:2]
     words = f"G3 X{end[0]:.6f} Y{end[1]:.6f} I{i:.9f} J{j:.9f}"
-    return words, points, *(np.array([-np.sin(a), np.cos(a), 0.0]) for a in (begin, begin + turn))
+    return words, points
 
 
 def too_soon(made: Plan, job: Case) -> float:

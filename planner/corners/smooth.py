@@ -156,7 +156,7 @@ def round_corners(
     blend_tangents: bool = False,
     free: float = 0.0,
 ) -> SmoothPath:
-    """Blend every corner of the toolpath within its budget.
+    """Blend every corner of the toolpath within its budget; where it turns right back the path has a full stop.
 
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it;
                      such a corner has theta = 0, bends off both legs within the tolerance, and has no jump
@@ -168,7 +168,7 @@ def round_corners(
     """
     legs = legs_of(toolpath)
     at = legs.first
-    joint = toolpath.joint[at].copy()
+    joint = toolpath.resting().joint[at].copy()
     if blend_tangents:
         jumps = (joint == Joint.SMOOTH) & curvature_jumps(toolpath, at)
         joint[jumps] = np.where(_exact(toolpath, at[jumps]), Joint.STOP, Joint.CORNER)

@@ -1,10 +1,10 @@
 """From the blocks of a program to the segments and joints of a toolpath.
 
-A joint is a full stop at both ends of the program, at a dwell or program stop, where the program asks for
-exact stop (G61.1), or exact path (G61) with a turn (with limited jerk also where the curvature jumps:
-corners/smooth.py), between rapid and feed moves (unless the machine blends rapids), and at a reversal. Where
-the tangents agree it is smooth; everywhere else it is a corner. An axis that never moves and that the machine
-lacks is left out.
+A joint is a full stop where the program needs rest: at both ends, at a dwell or program stop, where it asks
+for exact stop (G61.1), or exact path (G61) with a turn (with limited jerk also where the curvature jumps:
+corners/smooth.py), and between rapid and feed moves (unless the machine blends rapids). Where the tangents
+agree it is smooth; everywhere else, a path that turns right back included, it is a corner. An axis that never
+moves and that the machine lacks is left out.
 
 Rotary axes are measured at a radius R (`Machine.radius`): a coordinate is R times the angle. All axes are
 lengths then, and a tolerance is one of the norm over all of them: with it x y z keep eps, and the angles eps
@@ -38,10 +38,6 @@ from planner.nc.program import MOVES, Kind, PathControl, Program
 # so a segment of 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100
 # mm/s, far below any drive's resolution.
 COLLINEAR_ANGLE = 1e-8
-# Turning angle above which a corner is a reversal and becomes a full stop [rad]: 175 degrees. The corner
-# speed of paper 002 eq. (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000
-# mm/s2 and eps = 0.05 mm only 0.5 mm/s.
-REVERSAL_ANGLE = np.deg2rad(175.0)
 # Coordinates beyond this have lost the micrometre in float64 products and are certainly a mistake [mm].
 COORDINATE_MAX = 1e9
 # A move shorter than this goes nowhere [mm]: a picometre, the rounding of coordinates around 1e3 mm.
@@ -332,7 +328,6 @@ def _joints(
 ) -> tuple[Array, FloatArray]:
     """Kind and dwell of every joint."""
     joint = np.where(theta < COLLINEAR_ANGLE, Joint.SMOOTH, Joint.CORNER).astype(np.uint8)
-    joint[theta > REVERSAL_ANGLE] = Joint.STOP
     inner = np.flatnonzero((block[1:] == block[:-1]) & (joint[1:-1] == Joint.SMOOTH)) + 1  # of splines
     control = program.path_control[block]
     joint[1:][(control == PathControl.EXACT_PATH) & (joint[1:] == Joint.CORNER)] = Joint.STOP

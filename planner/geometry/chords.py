@@ -56,7 +56,7 @@ def arc_sagitta(toolpath: Toolpath, fraction: float) -> tuple[Array, FloatArray]
 
 
 def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
-    """The same path with its arcs and curves cut into chords.
+    """The same path with its arcs and curves cut into chords, and full stops where it turns right back.
 
     fraction : sagitta over tolerance, 0 < fraction < 1 [-]
     whole    : (M,) True for arcs that stay arcs and get a full stop at both ends
@@ -83,7 +83,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
     theta = np.zeros(len(segment) + 1)
     theta[1:-1] = turning_angle(tangent_end[:-1], tangent_start[1:])
     joint = np.full(len(segment) + 1, Joint.CORNER, np.uint8)
-    joint[first], joint[-1] = toolpath.joint[:-1], Joint.STOP
+    joint[first], joint[-1] = toolpath.resting().joint[:-1], Joint.STOP
     bends = np.append(cut, False) | np.insert(cut, 0, False)  # joints of the program with a chord at one side
     turned = first[(bends[:-1] & (toolpath.joint[:-1] == Joint.SMOOTH))]
     joint[turned] = Joint.CORNER

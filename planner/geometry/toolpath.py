@@ -38,9 +38,15 @@ def lesser_end(at_joints: FloatArray) -> FloatArray:
 class Joint(IntEnum):
     """How the motion passes the joint between two segments."""
 
-    STOP = 0  # full stop: path ends, dwells, reversals, exact stop
+    STOP = 0  # full stop, because the program needs rest: its ends, dwells, exact stop
     SMOOTH = 1  # the tangents agree: passed as it is, the curvature may jump
-    CORNER = 2  # the tangents differ: to be rounded within the joint's tolerance
+    CORNER = 2  # the tangents differ: to be passed within the joint's tolerance
+
+
+# Turning angle above which the path turns right back [rad]: 175 degrees. The corner speed of paper 002 eq.
+# (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000 mm/s2 and eps = 0.05 mm
+# only 0.5 mm/s.
+REVERSAL_ANGLE = np.deg2rad(175.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -192,6 +198,12 @@ class Toolpath:
         joint = self.joint.copy()
         joint[at] = how
         return dataclasses.replace(self, joint=joint)
+
+    def resting(self) -> Toolpath:
+        """The same path with full stops where it turns right back: a motion along a fixed path, whose rounded
+        corner would be a cusp there, rests at the vertex. The program does not ask for it."""
+        back = (self.joint == Joint.CORNER) & (self.theta > REVERSAL_ANGLE)
+        return self.with_joints(back, Joint.STOP) if back.any() else self
 
     def part(self, kept: Array) -> Toolpath:
         """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of

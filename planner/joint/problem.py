@@ -181,10 +181,11 @@ def _present(run: TubeRun, leg: np.ndarray, at_vertex: np.ndarray) -> np.ndarray
     words = run.word.shape[1]
     on = np.ones((len(leg), rows.count(axes) + ROWS * len(run.state) + WORD_ROWS * words), dtype=bool)
     more = on[:, 8 * axes :]
-    velocity = (run.feed[leg] > run.velocity.min()).any()
     on[:, : 2 * axes] = np.isfinite(run.jerk).all()
-    on[:, 4 * axes : 8 * axes] = velocity
-    more[:, rows.FEED_NODE : rows.TUBE_NODE] = (run.feed[leg] < np.linalg.norm(run.velocity)).any()
+    # a feed that is no less than the axes can be together leaves the axes' own limits, which are all there is
+    fed = (run.feed[leg] < np.linalg.norm(run.velocity)).any()
+    on[:, 4 * axes : 8 * axes] = not fed or (run.feed[leg] > run.velocity.min()).any()
+    more[:, rows.FEED_NODE : rows.TUBE_NODE] = fed
     more[at_vertex, rows.ORDER_NODE] = False
     limited = np.isfinite(run.across_max[leg])
     more[~limited, rows.NORMAL_NODE] = more[~limited, rows.NORMAL_MID] = False

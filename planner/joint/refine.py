@@ -24,11 +24,13 @@ from planner.joint.run import TubeRun
 # search has to hold it down in more places and takes longer, with more the path gets less of the tolerance.
 # And at least, of the largest that the axes give [-].
 HEADROOM, LEAST = 1.05, 0.05
+TINY = 1e-30  # keeps quotients finite
 
 
 def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) -> FloatArray:
     """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times
-    its own there and within an interpolation period beside it, as far as chords reach.
+    its own there and within an interpolation period beside it, as far as chords reach; where it turns back, the
+    largest acceleration with which it may.
 
     leg    : (N,) of the steps that were found
     period : of interpolation [s]
@@ -42,9 +44,37 @@ def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) ->
     end = np.cumsum(steps.h)
     begin = end - steps.h
     within = np.stack([np.searchsorted(end, begin - period), np.searchsorted(begin, end + period)], axis=1)
+    wanted = np.maximum(HEADROOM * across, _turning_back(run, leg, state, within, period))
     most = LEAST * run.reserved
-    np.maximum.at(most, leg, HEADROOM * np.maximum.reduceat(np.append(across, 0.0), within.ravel())[::2])
+    np.maximum.at(most, leg, np.maximum.reduceat(np.append(wanted, 0.0), within.ravel())[::2])
     return most
+
+
+def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, period: float) -> FloatArray:
+    """(N,) the largest acceleration that a motion can turn back with where this one does [mm/s2], 0 where it
+    does not.
+
+    leg    : (N,) of the steps
+    state  : (N+1, 3, A) at the nodes
+    within : (N, 2) the first step, and the one behind the last, of those within a period [s] of each
+
+    It turns back where its velocity turns by more than a right angle and gets so small that it does within a
+    period: chords miss the vertex there by what all of the acceleration makes of a period, that along the path
+    too. Limited jerk takes a peak of sqrt(2 V j) from the speed V to as much the other way, of which long
+    steps have shown less than half.
+    """
+    v, a = state[:, 1], state[:-1, 2]
+    change, push = np.diff(v, axis=0), np.linalg.norm(a, axis=1)
+    square = np.maximum((change**2).sum(axis=1), TINY)
+    share = np.clip(-(v[:-1] * change).sum(axis=1) / square, 0.0, 1.0)
+    slowest = np.linalg.norm(v[:-1] + share[:, None] * change, axis=1)
+    turned = (v[within[:, 0]] * v[within[:, 1]]).sum(axis=1) < 0.0
+    along = np.maximum(np.abs(a), TINY) / np.maximum(push, TINY)[:, None]
+    fastest = np.minimum(run.feed[leg], np.linalg.norm(run.velocity))
+    peak = np.minimum(
+        (run.acceleration / along).min(axis=1), np.sqrt(2.0 * fastest * np.linalg.norm(run.jerk))
+    )
+    return np.where(turned & (slowest < push * period), peak, 0.0)
 
 
 class Divided(NamedTuple):

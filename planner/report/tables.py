@@ -97,7 +97,7 @@ def corners_table(corners: CornerCheck) -> Table | None:
             ratio_text(speed[k]),
             ratio_text(budget[k]),
             f"{corners.feed_paper[k]:.3f}",
-            f"{corners.gain[k]:.3f}",
+            f"{corners.gain[k]:.3f}" if np.isfinite(corners.gain[k]) else "-",
         )
         angle = f"{np.rad2deg(corners.theta[k]):.2f}"
         unknown = ("not looked at", "-", "-", known[3], "-")

@@ -21,6 +21,10 @@ from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 # [-]: samples 1 ms apart show a motion that rests on a corner as up to 0.025 mm/s at 2e5 mm/s3, where eq. 20
 # allows 10 to 30 mm/s.
 STANDS = 0.01
+# Where the path turns by more [rad] the paper's own corner is next to a cusp, with a speed of 0.044 sqrt(1.5 X
+# eps) and less: eq. (20) says nothing there, and a motion that turns back passes at next to no speed without
+# a rest.
+CUSP = np.deg2rad(175.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -113,19 +117,25 @@ class CornerCheck:
 
     @property
     def stands(self) -> Array:
-        """(C,) True where the motion stops, or next to it (`STANDS`)."""
-        return self.looked & (self.feed_planned < STANDS * np.minimum(self.feed_paper, self.feed_programmed))
+        """(C,) True where the motion stops, or next to it (`STANDS`); not where the path turns back."""
+        stops = self.feed_planned < STANDS * np.minimum(self.feed_paper, self.feed_programmed)
+        return self._turns & stops
+
+    @property
+    def _turns(self) -> Array:
+        """(C,) True where the motion was looked at, and the path does not turn back."""
+        return self.looked & (self.theta <= CUSP)
 
     @property
     def gain(self) -> FloatArray:
-        """(C,) speed over eq. (20)'s speed of the paper's own corner [-]."""
-        return self.feed_planned / self.feed_paper
+        """(C,) speed over eq. (20)'s speed of the paper's own corner [-]; NaN where the path turns back."""
+        return np.where(self.theta <= CUSP, self.feed_planned / self.feed_paper, np.nan)
 
     @property
     def compared(self) -> Array:
         """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the
         programmed feed."""
-        return self.looked & ~self.stands & (self.feed_paper < self.feed_programmed)
+        return self._turns & ~self.stands & (self.feed_paper < self.feed_programmed)
 
     def told(self) -> tuple[FloatArray, FloatArray]:
         """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its
@@ -185,7 +195,7 @@ class CornerCheck:
         if compared:
             of = "" if compared == len(self) else f" of {compared:,} corners where eq. 20 is below the feed"
             said += f"; {self.gains()[0]:.2f} times the speed of eq. 20 (median{of})"
-        elif stops < self.count:
+        elif stops < int(self._turns.sum()):
             said += "; eq. 20 is above the programmed feed at all corners without a stop"
         said += f"; full stops at {stops:,}" if stops else ""
         return said + (f"; {self.not_looked_at:,} could not be checked" if self.not_looked_at else "")

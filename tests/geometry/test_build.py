@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from benchmarks.jobs import problems
 from planner.base.errors import InputError
-from planner.geometry.build import COORDINATE_MAX, REVERSAL_ANGLE, toolpath_from_program, turning_angle
+from planner.geometry.build import COORDINATE_MAX, toolpath_from_program, turning_angle
 from planner.geometry.legs import leg_point, leg_tangent, legs_of
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import REVERSAL_ANGLE, Joint, Toolpath
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 
@@ -41,7 +41,8 @@ def kinds(text: str, machine=MACHINE) -> list[int]:
         ("G61.1\nG1 X10\nX20\nY10", [STOP, STOP, STOP, STOP]),  # exact stop stops everywhere
         ("G61\nG1 X10\nG64\nY10\nX0", [STOP, STOP, CORNER, STOP]),  # the mode at the end of the block holds
         ("G1 X10\nG61.1\nX20\nG64\nX30", [STOP, SMOOTH, STOP, STOP]),
-        ("G1 X10\nX0\nY5", [STOP, STOP, CORNER, STOP]),  # a reversal
+        ("G1 X10\nX0\nY5", [STOP, CORNER, CORNER, STOP]),  # a reversal: its vertex is to be reached, not rested at
+        ("G61\nG1 X10\nG64\nX0\nX5", [STOP, STOP, CORNER, STOP]),  # under exact path it is
         ("G1 X10\nG4 P1\nX20\nY3", [STOP, STOP, CORNER, STOP]),  # a dwell
         ("G1 X10\nM0\nX20\nY3", [STOP, STOP, CORNER, STOP]),  # a program stop
         ("G0 X10\nY10\nG1 X0\nY0", [STOP, CORNER, STOP, CORNER, STOP]),  # rapid and feed
@@ -72,14 +73,23 @@ def test_dwells_stand_at_the_joint_before_the_next_move_and_add_up():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "kind"), [(174.9, CORNER), (175.1, STOP), (180.0, STOP), (0.0, SMOOTH), (1e-5, CORNER)]
+    ("degrees", "kind", "on_a_path"),
+    [
+        (174.9, CORNER, CORNER),
+        (175.1, CORNER, STOP),
+        (180.0, CORNER, STOP),
+        (0.0, SMOOTH, SMOOTH),
+        (1e-5, CORNER, CORNER),
+    ],
 )
-def test_the_angle_decides(degrees, kind):
+def test_the_angle_decides(degrees, kind, on_a_path):
+    """What the program asks for, and what a motion along a fixed path does, whose corner would be a cusp."""
     a = np.deg2rad(degrees)
     path = toolpath_from_program(
         problems.polyline([[0, 0], [10, 0], [10 + 10 * np.cos(a), 10 * np.sin(a)]]), MACHINE
     )
     assert path.joint[1] == kind
+    assert path.resting().joint[1] == on_a_path
     assert path.theta[1] == pytest.approx(a, abs=1e-14 if degrees else 0)
     assert np.rad2deg(REVERSAL_ANGLE) == pytest.approx(175.0)
 

@@ -171,7 +171,7 @@ def test_where_a_spline_stands_still_short_chords_stand_for_it(text: str, chords
     ]
     for q in toolpath.start:
         assert np.linalg.norm(points - q, axis=1).min() < 2e-4
-    reversal = (toolpath.joint[1:-1] == Joint.STOP).sum()
+    reversal = (toolpath.resting().joint[1:-1] == Joint.STOP).sum()
     assert reversal == (1 if "I10" in text or "I6" in text else 0)
 
 

@@ -23,7 +23,11 @@ def test_f_is_kept_along_a_line(method):
         assert outcome(found) == "passed, kept", found
         job = case(seed, "line")
         ends = np.array([float(x) for x in re.findall(r"G1 X(\S+)", job.text)])
-        assert found["time"] >= (np.abs(np.diff(ends, prepend=0.0)) / job.feeds).sum() * (1 - 1e-9)
+        way = np.diff(ends, prepend=0.0)
+        # where the line turns back the motion may turn short of the vertex by the tolerance
+        short = np.pad(np.where(way[1:] * way[:-1] < 0.0, job.within, 0.0), 1)
+        least = np.maximum(np.abs(way) - short[:-1] - short[1:], 0.0) / job.feeds
+        assert found["time"] >= least.sum() * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("seed", slow_but([2, 3], range(5)))

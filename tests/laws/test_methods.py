@@ -111,7 +111,7 @@ def test_the_plain_pulses_exceed_no_more_than_proved(seed, axes):
 def test_the_plain_pulses_do_reach_it():
     """docs/papers.md A: both factors are attained by zig-zags without dwell, that of the jerk by legs of 70 ms for filters of 50
     and 30 ms;
-    almost, as complete reversals are stopped at."""
+    almost, as motions along a fixed path rest at complete reversals."""
     limits = problems.machine(jerk=2000.0 / 0.03, tolerance=50.0)
     turn = np.deg2rad(87.0)
     steps = 7.0 * np.array([[np.cos(turn), np.sin(turn) * (-1) ** k] for k in range(12)])
@@ -123,7 +123,7 @@ def test_the_plain_pulses_do_reach_it():
 
 # --- a corner by itself: the error is what is promised -----------------------------------------------------------------------
 
-corners = st.floats(1.0, 174.0).map(np.deg2rad)  # beyond, reversals are stopped at
+corners = st.floats(1.0, 174.0).map(np.deg2rad)  # beyond, motions along a fixed path rest
 LONG = 60.0  # [mm]: any of these corners ends before the middle of the leg
 
 

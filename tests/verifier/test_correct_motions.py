@@ -109,6 +109,58 @@ def test_a_reversal_passes():
     assert verdict.passed, verdict.faults
 
 
+def turned_at(far: float, jerk: float = 2e5):
+    """Along x from rest at 0 to `far` and back to rest, turning at its largest acceleration, jerk r: far is
+    47/24 jerk r^3 of the time r of a phase."""
+    r = np.cbrt(24.0 / 47.0 * far / jerk)
+    phases = [(r, 1), (r, -1), (r, -1), (r / 2, 0), (r / 2, 0), (r, 1), (r, 1), (r, -1)]
+    begin, states = np.append(0.0, np.cumsum([lasting for lasting, _ in phases])), [np.zeros(3)]
+    for lasting, sign in phases:
+        x, v, a = states[-1]
+        j = sign * jerk
+        states.append(
+            np.array(
+                [
+                    x + lasting * (v + lasting * (a / 2 + lasting * j / 6)),
+                    v + lasting * (a + lasting * j / 2),
+                    a + lasting * j,
+                ]
+            )
+        )
+    np.testing.assert_allclose(states[4], [far, 0.0, -jerk * r], atol=1e-9)
+
+    def motion(t):
+        k = np.clip(np.searchsorted(begin, t, side="right") - 1, 0, len(phases) - 1)
+        x, v, a = np.array(states)[k].T
+        j, tau = jerk * np.array([sign for _, sign in phases])[k], t - begin[k]
+        along = [x + tau * (v + tau * (a / 2 + tau * j / 6)), v + tau * (a + tau * j / 2), a + tau * j, j]
+        return tuple(np.stack([each, 0 * t, 0 * t], axis=1) for each in along)
+
+    return float(begin[-1]), motion
+
+
+@pytest.mark.parametrize(
+    ("turns_at", "fault"), [(5.0, ""), (4.96, ""), (5.04, ""), (4.94, "vertex"), (5.06, "contour")]
+)
+def test_a_reversal_is_a_vertex_to_be_passed_within_its_tolerance(turns_at, fault):
+    """No rest: the motion turns at its largest acceleration; 0.05 mm is the tolerance."""
+    quick = machine(velocity=200.0, acceleration=1e4)
+    verdict = judge(turned_at(turns_at), Moves().line(5, feed=300).line(0, feed=300).toolpath(quick), quick)
+    assert verdict.passed == (not fault), verdict.faults
+    assert all(each.startswith(fault) for each in verdict.sentences) or "eq. 18" in verdict.sentences[-1]
+    assert fault in " ".join(verdict.sentences)
+    assert verdict.vertex_error_mm == pytest.approx(max(5.0 - turns_at, 0.0), abs=2e-3)
+
+
+@pytest.mark.parametrize("x", [(0, 5, 0, 5), (0, 5)])
+def test_a_reversal_that_is_left_out_is_found(x):
+    """A retrace run once instead of twice, or not at all, ends where the program does."""
+    toolpath = Moves().line(5).line(0).line(5).line(0).line(5).toolpath(M)
+    verdict = judge(polyline([(at, 0, 0) for at in x], jerk=2e5), toolpath)
+    assert not verdict.passed
+    assert not verdict.order
+
+
 def test_segments_far_shorter_than_the_budget_pass():
     """4000 segments of 2.5e-5 mm between two long ones: all of them are within the budget at once."""
     moves = Moves().line(5)

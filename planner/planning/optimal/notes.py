@@ -20,7 +20,7 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     """
     notes: list[str] = []
     path, at = best.path, best.path.legs.first
-    added = (path.joint == Joint.STOP) & (toolpath.joint[at] != Joint.STOP)
+    added = (path.joint == Joint.STOP) & (toolpath.resting().joint[at] != Joint.STOP)
     exact = added & np.isin(at, exact_stops(toolpath))
     notes += exact_note(toolpath, at[exact])
     added &= ~exact

@@ -96,7 +96,9 @@ def test_the_universal_identity():
         up = np.arange(13) * duration * V * np.sin(1e-4)
         across = np.where(np.arange(13) % 2, duration * V, 0.0) * np.cos(1e-4)
         guide = guide_through(np.stack([across, up, 0 * up], axis=1), machine)
-        assert not guide.inner.any()  # reversals are full stops; here they are run through all the same
+        assert (
+            not guide.inner.any()
+        )  # a fixed path rests at reversals; here they are run through all the same
         through = dataclasses.replace(guide, first=np.array([0, 12]), dwell=np.zeros(2))
         pulses = VelocityPulses(leg=np.arange(12), length=guide.length, speed=guide.feed)
         command = command_of(through, pulses, np.zeros(13), np.array([T1]), np.array([T2]))

@@ -269,7 +269,7 @@ def test_a_machine_without_an_axis_is_refused():
 # --- jobs that once broke a stage -----------------------------------------------------------------------------------------
 
 
-def test_a_reversal_is_a_full_stop():
+def test_a_reversal_is_a_full_stop_of_a_fixed_path():
     solved = solve(problems.polyline([[0, 0], [10, 0], [0, 0]]), MACHINE)
     assert solved.time == pytest.approx(2 * (10 / 100 + 100 / 2000), rel=1e-9)
 

@@ -111,7 +111,7 @@ def test_a_circle_takes_as_long_as_the_arc(method: str, near: float) -> None:
     rows = [f"K{k} X{x} Y{y} R{w:.17f}" for k, (x, y, w) in zip(knots, corners, strict=False)]
     spline = "G6.2 P3 " + "\n".join(rows + [f"K{k}" for k in knots[9:]])
     arc = "G3 X0 Y0 I10 J0"
-    lead = "G0 Y-10\nG1 Y0\n{}\nG1 Y-10"
+    lead = "G0 Y10\nG1 Y0\n{}\nG1 Y-10"
     one = time_of(planned(lead.format(spline), method, feed=2000.0))
     other = time_of(planned(lead.format(arc), method, feed=2000.0))
     assert one == pytest.approx(other, rel=near)

@@ -74,18 +74,12 @@ class CutMotion(Protocol):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guess:
-    """N steps along a run, the N+1 nodes around them, A axes.
+    """N steps along a run, the N+1 nodes around them, A axes."""
 
-    leg   : (N,) leg of each step
-    h     : (N,) duration [s], > 0
-    state : (N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]
-    place : (N, 4) places of the control points along the run [mm], non-decreasing
-    """
-
-    leg: Array
-    h: FloatArray
-    state: FloatArray
-    place: FloatArray
+    leg: Array  # (N,) leg of each step
+    h: FloatArray  # (N,) duration [s], > 0
+    state: FloatArray  # (N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]
+    place: FloatArray  # (N, 4) places of the control points along the run [mm], non-decreasing
 
     def __post_init__(self) -> None:
         steps = len(self.h)

@@ -45,28 +45,18 @@ NO_CURVES = (Status.INFEASIBLE, "this solver takes lines and arcs, not curves; t
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TubeSolution:
-    """How the search ended, and N steps over A axes unless it failed (then None).
+    """How the search ended, and N steps over A axes unless it failed (then None)."""
 
-    status     : what is known of the steps
-    sentence   : the same for a reader, with what to do about a failure
-    iterations : of the solver
-    solve_time : [s]
-    windows    : into which the own solver cut the run, joins included; 0 of other solvers
-    solved     : of these, how many converged and kept everything without being divided
-    steps      : the motion, exact and within all limits
-    place      : (N+1,) places of the nodes along the run [mm]
-    kept       : (N,) steps that stand for the motion of the start, which stays there; None for none
-    price      : (N, 3 A + 5) what the limits of each step cost (price.py) [s], 0 where steps are kept; None
-                 where the solver does not tell
-    """
-
-    status: Status
-    sentence: str
-    iterations: int
-    solve_time: float
-    windows: int = 0
-    solved: int = 0
-    steps: Steps | None = None
-    place: FloatArray | None = None
+    status: Status  # what is known of the steps
+    sentence: str  # the same for a reader, with what to do about a failure
+    iterations: int  # of the solver
+    solve_time: float  # [s]
+    windows: int = 0  # into which the own solver cut the run, joins included; 0 of other solvers
+    solved: int = 0  # of these, how many converged and kept everything without being divided
+    steps: Steps | None = None  # the motion, exact and within all limits
+    place: FloatArray | None = None  # (N+1,) places of the nodes along the run [mm]
+    # (N,) steps that stand for the motion of the start, which stays there; None for none
     kept: Array | None = None
+    # (N, 3 A + 5) what the limits of each step cost (price.py) [s], 0 where steps are kept; None where the
+    # solver does not tell
     price: FloatArray | None = None

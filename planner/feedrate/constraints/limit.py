@@ -32,14 +32,10 @@ if TYPE_CHECKING:
 
 
 class Cap(NamedTuple):
-    """A bound on feed^2 at P points, inf where there is none.
+    """A bound on feed^2 at P points, inf where there is none."""
 
-    name    : as it is printed, with the axis where there is one: "feed", "velocity.x"
-    feed_sq : (P,) [mm2/s2]
-    """
-
-    name: str
-    feed_sq: FloatArray
+    name: str  # as it is printed, with the axis where there is one: "feed", "velocity.x"
+    feed_sq: FloatArray  # (P,) [mm2/s2]
 
 
 class RowPoint(NamedTuple):
@@ -55,19 +51,14 @@ class RowPoint(NamedTuple):
 
 
 class Limit:
-    """One limit; it overrides the methods of the forms that it has.
+    """One limit; it overrides the methods of the forms that it has."""
 
-    name  : as it is printed; of an axis limit with the axis behind it, see `AxisLimit.called`
-    unit  : of what is limited; rad stands for mm on rotary axes
-    order : slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and
-            errors, 3 of jerks
-    key   : of the machine file, if its value stands alone there
-    """
-
-    name: ClassVar[str]
-    unit: ClassVar[str]
+    name: ClassVar[str]  # as it is printed; of an axis limit with the axis behind it, see `AxisLimit.called`
+    unit: ClassVar[str]  # of what is limited; rad stands for mm on rotary axes
+    # slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and errors,
+    # 3 of jerks
     order: ClassVar[int]
-    key: ClassVar[str] = ""
+    key: ClassVar[str] = ""  # of the machine file, if its value stands alone there
 
     def at_points(self, grid: OnGrid) -> Iterator[Cap]:
         """Caps from the points and the intervals beside them."""

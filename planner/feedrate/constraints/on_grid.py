@@ -26,28 +26,22 @@ JUMP_ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Side:
-    """The curve on one side of P points.
+    """The curve on one side of P points."""
 
-    kappa                 : (P,) effective curvature of the interval (feedrate/sampling/grid.py) [1/mm]
-    tol_chord, tol_filter : (P,) parts of the error budget of chords and of filters [mm]; inf where filters
-                            are measured afterwards
-    """
-
-    kappa: FloatArray
+    kappa: FloatArray  # (P,) effective curvature of the interval (feedrate/sampling/grid.py) [1/mm]
+    # tol_chord and tol_filter: (P,) parts of the error budget of chords and of filters [mm]; inf where
+    # filters are measured afterwards
     tol_chord: FloatArray
     tol_filter: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class OnGrid:
-    """A sampled path with P points on a machine.
-
-    measured : the filters' error is measured afterwards
-    """
+    """A sampled path with P points on a machine."""
 
     samples: PathSamples
     machine: Machine
-    measured: bool = False
+    measured: bool = False  # the filters' error is measured afterwards
 
     @property
     def axes(self) -> tuple[str, ...]:

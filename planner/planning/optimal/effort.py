@@ -42,26 +42,18 @@ class Grids(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """How a motion is searched for geometry and feed together (planning/joint_search.py).
+    """How a motion is searched for geometry and feed together (planning/joint_search.py)."""
 
-    steps_max : of constant jerk that it may have
-    cut       : how finely the first motion is cut into steps
-    gap       : complementarity at the end, share of the time [-]
-    finer     : how finely what is found is cut once more, and the gap of the search from there, one after the
-                other
-    smooth    : weight of the jerk against the time at least [-]
-    again     : search from reshaped splines where that has not ended
-    small     : steps of the motions for which `finer` and `again` are meant. Those of more steps are searched
-                where a step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um
-                took three times the time for 2e-3 less motion
-    """
-
-    steps_max: float
-    cut: Cut = FIRST_CUT
-    gap: float = FIRST_GAP
+    steps_max: float  # of constant jerk that it may have
+    cut: Cut = FIRST_CUT  # how finely the first motion is cut into steps
+    gap: float = FIRST_GAP  # complementarity at the end, share of the time [-]
+    # how finely what is found is cut once more, and the gap of the search from there, one after the other
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
-    smooth: float = 0.0
-    again: bool = True
+    smooth: float = 0.0  # weight of the jerk against the time at least [-]
+    again: bool = True  # search from reshaped splines where that has not ended
+    # steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a
+    # step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the
+    # time for 2e-3 less motion
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:
@@ -77,20 +69,13 @@ THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """The effort of a plan.
+    """The effort of a plan."""
 
-    work   : grid points, counted over all rounds of reshaping
-    rounds : of reshaping at most
-    left   : no more of them where one promises less than this share of the time [-]
-    sizes  : grids by the size of the job, ascending
-    search : for geometry and feed together
-    """
-
-    work: int
-    rounds: int
-    left: float
-    sizes: tuple[Grids, ...]
-    search: Search
+    work: int  # grid points, counted over all rounds of reshaping
+    rounds: int  # of reshaping at most
+    left: float  # no more of them where one promises less than this share of the time [-]
+    sizes: tuple[Grids, ...]  # grids by the size of the job, ascending
+    search: Search  # for geometry and feed together
 
     def grids(self, points: int) -> Grids:
         """The grids for a job that has so many points on a grid of the resolution `COARSE`."""
@@ -127,24 +112,16 @@ EFFORTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a job is planned on a smooth path.
+    """How a job is planned on a smooth path."""
 
-    method : what the plan is called
-    corner : "auto", "spline", the name of a corner shape, or a shape
-    order  : which limits are kept, and the solver for them
-    bezier : the corner of "bezier", and where there is no spline
-    effort : grids and rounds of reshaping
-    rounds : of reshaping; None for those of the effort
-    joint  : whether path and feed are searched together (planning/joint_search.py)
-    """
-
-    method: str
-    corner: str | CornerShape
-    order: Order
+    method: str  # what the plan is called
+    corner: str | CornerShape  # "auto", "spline", the name of a corner shape, or a shape
+    order: Order  # which limits are kept, and the solver for them
+    # the corner of "bezier", and where there is no spline
     bezier: CornerShape = field(default_factory=BezierCorner)
-    effort: Effort = EFFORTS[NORMAL]
-    rounds: int | None = None
-    joint: bool = False
+    effort: Effort = EFFORTS[NORMAL]  # grids and rounds of reshaping
+    rounds: int | None = None  # of reshaping; None for those of the effort
+    joint: bool = False  # whether path and feed are searched together (planning/joint_search.py)
 
     @property
     def not_limited(self) -> tuple[str, ...]:

@@ -25,8 +25,11 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
+# Of the tolerance: what filters take at most to count as none [-].
+NEGLIGIBLE = 1e-2
 NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
 
 
@@ -50,6 +53,13 @@ def chord_rate(machine: Machine) -> float:
 def filter_rate(machine: Machine) -> float:
     """sum T^2/24 [s2]: filter error per unit of acceleration; 0 without filters."""
     return sum(T * T for T in machine.fir.time_constants) / 24.0 if machine.fir else 0.0
+
+
+def filters_count(machine: Machine, toolpath: Toolpath) -> bool:
+    """Whether filters may take more than `NEGLIGIBLE` of the tolerance."""
+    return filter_rate(machine) * normal_anywhere(machine, toolpath.axes) > NEGLIGIBLE * float(
+        toolpath.tolerance.min()
+    )
 
 
 def error_rate(machine: Machine) -> float:

@@ -27,13 +27,13 @@ HEADROOM, LEAST = 1.05, 0.05
 TINY = 1e-30  # keeps quotients finite
 
 
-def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) -> FloatArray:
+def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, reach: float) -> FloatArray:
     """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times
-    its own there and within an interpolation period beside it, as far as chords reach; where it turns back, the
-    largest acceleration with which it may.
+    its own there and beside it, as far as chords and filters reach; where it turns back, the largest
+    acceleration with which it may.
 
-    leg    : (N,) of the steps that were found
-    period : of interpolation [s]
+    leg   : (N,) of the steps that were found
+    reach : of chords and filters, to both sides [s]
     """
     steps = found.steps
     assert steps is not None
@@ -43,20 +43,20 @@ def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, period: float) ->
     across = watched_shares(of_one, leg, steps.h, state, steps.jerk)
     end = np.cumsum(steps.h)
     begin = end - steps.h
-    within = np.stack([np.searchsorted(end, begin - period), np.searchsorted(begin, end + period)], axis=1)
-    wanted = np.maximum(HEADROOM * across, _turning_back(run, leg, state, within, period))
+    within = np.stack([np.searchsorted(end, begin - reach), np.searchsorted(begin, end + reach)], axis=1)
+    wanted = np.maximum(HEADROOM * across, _turning_back(run, leg, state, within, reach))
     most = LEAST * run.reserved
     np.maximum.at(most, leg, np.maximum.reduceat(np.append(wanted, 0.0), within.ravel())[::2])
     return most
 
 
-def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, period: float) -> FloatArray:
+def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, reach: float) -> FloatArray:
     """(N,) the largest acceleration that a motion can turn back with where this one does [mm/s2], 0 where it
     does not.
 
     leg    : (N,) of the steps
     state  : (N+1, 3, A) at the nodes
-    within : (N, 2) the first step, and the one behind the last, of those within a period [s] of each
+    within : (N, 2) the first step, and the one behind the last, of those within `reach` [s] of each
 
     It turns back where its velocity turns by more than a right angle and gets so small that it does within a
     period: chords miss the vertex there by what all of the acceleration makes of a period, that along the path
@@ -74,7 +74,7 @@ def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, pe
     peak = np.minimum(
         (run.acceleration / along).min(axis=1), np.sqrt(2.0 * fastest * np.linalg.norm(run.jerk))
     )
-    return np.where(turned & (slowest < push * period), peak, 0.0)
+    return np.where(turned & (slowest < push * reach), peak, 0.0)
 
 
 class Divided(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 
 from planner.base.names import AUTO
 from planner.base.sizes import SIZES
+from planner.corners.budget import filters_count
 from planner.feedrate.constraints.limits import Limits
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint
@@ -51,6 +52,8 @@ def is_searched(job: Job, settings: Settings) -> bool:
         return False
     from planner.planning.joint_search import searchable  # other plans need not load what it uses
 
+    if job.real[0].fir is not None and job.machine.fir != job.real[0].fir:  # a share of tolerance and filters
+        return False
     return searchable(job) and _least_steps(job) <= settings.effort.search.steps_max
 
 
@@ -94,7 +97,9 @@ def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time."""
+    """Whether there is no plan yet, or the motion on the path takes less time, or may behind filters."""
+    if filters_count(*job.real):
+        return True
     if tried.path is None:
         return tried.best is None
     return tried.path[1].end < (1.0 - SAME_TIME) * counted_time(tried.best)
@@ -115,7 +120,8 @@ def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bo
     if settings.corner != AUTO or (tried.joint and settings.effort.search.smooth):
         return False
     stops_sooner = job.line_stop_time < counted_time(tried.best)
-    return stops_sooner or (not tried.joint and len(job.toolpath) <= KINEMATIC_MOST)
+    only_on_path = not tried.joint or filters_count(*job.real)
+    return stops_sooner or (only_on_path and len(job.toolpath) <= KINEMATIC_MOST)
 
 
 def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:

@@ -22,6 +22,7 @@ import numpy as np
 
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
+from planner.corners.budget import filters_count
 from planner.feedrate.solution import Status
 from planner.joint.guess import Cut, Guess
 from planner.joint.outcome import TubeSolution
@@ -70,10 +71,10 @@ class Joint(NamedTuple):
 
 
 def searchable(job: Job) -> bool:
-    """Whether the search knows all that the motion has to keep: no filters, no splines of the program, no
-    limits of the user, no range in step with the spindle; and whether the path leaves it anything to find."""
+    """Whether the search knows all that the motion has to keep: no limits of the user, no range in step with
+    the spindle; and whether the path leaves it anything to find."""
     machine, toolpath = job.real
-    return machine.fir is None and not machine.own and not toolpath.held.any() and not toolpath.exact.all()
+    return not machine.own and not toolpath.held.any() and not toolpath.exact.all()
 
 
 def joint_plan(
@@ -127,7 +128,7 @@ def joint_plan(
         tables = dataclasses.replace(tables, priced=planned)
         notes = (OF_THE_START,)
     plan = job.plan(
-        made.delivered,
+        made.delivered._replace(filtered=filters_count(*job.real)),
         method=settings.method,
         corner=settings.corner_name,
         solver=planned.solution.solver,

@@ -38,10 +38,11 @@ class Start(RunsInTime):
         return self._guesses[k]
 
     def with_reserve(self, run: TubeRun, leg: Array, found: TubeSolution) -> TubeRun:
-        """A run whose budgets leave room for the chords of the motion that was found along it, and no more;
-        leg (N,) of its steps."""
-        job = self._job
-        return with_reserve(run, job.toolpath, job.machine, reserve_for(run, leg, found, job.machine.dt))
+        """A run whose budgets leave room for the chords of the motion that was found along it, and for the
+        filters behind them, and no more; leg (N,) of its steps."""
+        toolpath, machine = self._job.toolpath, self._job.machine
+        reach = machine.dt + sum(machine.fir.time_constants if machine.fir else ()) / 2.0
+        return with_reserve(run, toolpath, machine, reserve_for(run, leg, found, reach))
 
     def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
         """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts

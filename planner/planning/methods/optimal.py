@@ -37,7 +37,7 @@ class OptimalMethod(Method):
              solver
     effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which path and feed
              are searched together (planning/optimal/effort.py); that is with corner "auto", the own solver,
-             no filters, no shaping, and `rounds` None
+             no shaping, and `rounds` None
     rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
     smooth : weight of the squares of all jerks, as shares of their limits, against the time [-], 0 or more:
              with more the joint search finds a smoother and slower motion; at 0 jerk is small only where it

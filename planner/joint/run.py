@@ -228,7 +228,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
         word, counts, differs = _words(toolpath, row)
         yield TubeRun(
             axis=np.flatnonzero(moves),
-            left="G61 asks for the exact path" if toolpath.exact[first[0] : first[-1]].any() else differs,
+            left=_kept_as_it_is(toolpath, slice(first[0], first[-1])) or differs,
             word=word,
             counts=counts[moves],
             first=first,
@@ -248,6 +248,13 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             reserved=budgets.reserved,
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
+
+
+def _kept_as_it_is(toolpath: Toolpath, run: slice) -> str:
+    """Why the motion along a run has to be that on the path, "" if it has not."""
+    if toolpath.held[run].any():
+        return "a thread is cut in step with the spindle"
+    return "G61 asks for the exact path" if toolpath.exact[run].any() else ""
 
 
 def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,10 @@ from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.path_motion import first_motion, kept_on_path, plan_on_path
-from planner.planning.page import best_of
+from planner.planning.page import best_of, tolerant
+
+if TYPE_CHECKING:
+    from planner.planning.joint_search import Others
 
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not
 # searched [-]: on 30,000 lines of dense chords the search took half of the computing and found nothing; on a
@@ -67,7 +70,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     if steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
-    found = joint_plan(job, settings, first, settings.effort.search, partial(_otherwise, settings))
+    found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings))
     return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps)
 
 
@@ -88,8 +91,7 @@ def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
     if path is None:
         return tried
     planned, motion = path
-    search, alone = settings.effort.search, partial(_on_a_path, settings)
-    found = joint_plan(job, settings, planned, search, alone, motion)
+    found = joint_plan(job, settings, planned, settings.effort.search, _others(ON_PATH, settings), motion)
     if found.plan is None:
         return dataclasses.replace(tried, path=path)
     best = found.plan if tried.best is None else faster(tried.best, found.plan)
@@ -190,12 +192,15 @@ RETRIES = (
 )
 
 
-def _otherwise(settings: Settings, run: Job) -> Plan:
-    return best_of(ALONE, run, settings)
+def _others(attempts: tuple[Attempt, ...], settings: Settings) -> Others:
+    """What there is of runs that the search does not find: these attempts at each, with less tolerance or
+    slower in places where that does not pass, and the motion on a path."""
+    from planner.planning.joint_search import Others
 
+    def alone(run: Job) -> Plan:
+        return tolerant(run, best_of(attempts, run, settings), partial(best_of, attempts, settings=settings))
 
-def _on_a_path(settings: Settings, run: Job) -> Plan:
-    return best_of(ON_PATH, run, settings)
+    return Others(alone, lambda job: kept_on_path(job, settings))
 
 
 def _least_steps(job: Job) -> int:

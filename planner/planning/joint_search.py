@@ -4,8 +4,9 @@ run by run.
 A run is what lies between two full stops. Long runs are searched one after the other, the windows of each
 side by side, then short ones side by side; what is found does not depend on the number of threads. The motion
 from which the search begins may keep its limits at the points of a coarse grid only: where the search leaves
-no step of it nothing else is asked of it, and a run on which the search does not end is planned by itself in
-another way (runs_alone.py). Or it keeps them everywhere: then it stays where the search does not end.
+no step of it nothing else is asked of it, and a run on which the search does not end, or that is not
+searched (G61, threads), is planned by itself in another way (runs_alone.py). Or it keeps them everywhere:
+then it stays where the search does not end.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -34,6 +35,7 @@ from planner.joint.solvers import TubeSolver
 from planner.joint.splice import SplicedRun
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
+from planner.planning.job.by_run import RunsInTime, full_stops
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
@@ -49,9 +51,6 @@ from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
 LONG = SIZES.searched_shared
-# Runs that are not found are planned each by itself; with more than this share of the steps on them the job
-# is, as a whole [-].
-FAILED_MOST = 0.5
 # What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
 # other [-].
 SEARCHES = (1.0, 1.2, 2.3)
@@ -60,6 +59,18 @@ UNPRICED, UNPRICED_MOST = 0.01, 0.5
 OF_THE_START = "what limits cost is told of the motion before geometry and feed were found together"
 
 Report = Callable[[float], None]
+
+
+class Others(NamedTuple):
+    """What there is of runs that are not searched, or not found.
+
+    alone : plans one of them, as a job
+    kept  : the motion of the whole job on a path, its limits kept everywhere, for as many as are not planned
+            each by itself; None where there is none
+    """
+
+    alone: Callable[[Job], Plan]
+    kept: Callable[[Job], tuple[OnPath, Motion] | None]
 
 
 class Joint(NamedTuple):
@@ -71,10 +82,13 @@ class Joint(NamedTuple):
 
 
 def searchable(job: Job) -> bool:
-    """Whether the search knows all that the motion has to keep: no limits of the user, no range in step with
-    the spindle; and whether the path leaves it anything to find."""
+    """Whether the search knows all that the motion has to keep: no limits of the user, no thread behind
+    filters; and whether there is a run to be searched."""
     machine, toolpath = job.real
-    return not machine.own and not toolpath.held.any() and not toolpath.exact.all()
+    if machine.own or (machine.fir is not None and toolpath.held.any()):
+        return False
+    left = np.logical_or.reduceat(toolpath.exact | toolpath.held, full_stops(toolpath)[:-1])
+    return not bool(left.all())
 
 
 def joint_plan(
@@ -82,14 +96,14 @@ def joint_plan(
     settings: Settings,
     planned: OnPath,
     search: Search,
-    alone: Callable[[Job], Plan],
+    others: Others,
     motion: Motion | None = None,
 ) -> Joint:
     """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where
     shorter ones do not pass.
 
     search : how finely, and up to which size
-    alone  : plans a run, as a job, on which the search does not end, or the verdict finds something
+    others : what there is where the search does not end, or the verdict finds something
     motion : that on the path where it keeps its limits between grid points too: it stays where the search
              does not end; else None
     """
@@ -105,23 +119,31 @@ def joint_plan(
             job.tell("search", steps=steps, of=most)
             return Joint(None, steps)
         found = searched_runs(runs, start, search.of(steps), report, stays=stays)
-    made = None
-    if found is not None and any(one.steps for one in found):
+    made, kept = None, cache(lambda: others.kept(job))
+    if any(one.steps for one in found):
         parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
-        made = with_runs_alone(job, parts, alone, ALONE_MOST, settings.not_limited)
+        made = with_runs_alone(
+            job,
+            parts,
+            others.alone,
+            ALONE_MOST,
+            settings.not_limited,
+            kept=lambda: None if (path := kept()) is None else RunsInTime(path[1], job),
+        )
     time = made.delivered.trajectory.cycle_time if made else np.nan
     count = len(made.plans) if made else 0
     job.tell("search", found=time, before=start.motion.end, kept=made is not None, steps=steps, alone=count)
     if made is None and search.of(steps).finer and not stays:
-        return joint_plan(job, settings, planned, dataclasses.replace(search, finer=()), alone)
-    if found is None or made is None:
+        return joint_plan(job, settings, planned, dataclasses.replace(search, finer=()), others)
+    if made is None:
         return Joint(None, steps)
-    for k in made.plans:
+    for k in (*made.plans, *made.stays):
         why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
         found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
     left = [k for k, one in enumerate(found) if one.steps is None]
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
-    held = history(planned.problem, planned.solution, *times_of_pieces(motion)) if motion else None
+    stayed = kept() if made.stays else (planned, motion) if motion else None
+    held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None
     alone_held = {k: plan.grid for k, plan in made.plans.items()}
     tables, notes = tabled(job, held, made.delivered, found, left, alone_held)
     if tables.prices is None and stays and priced(planned, job.machine):
@@ -177,9 +199,8 @@ def _of_whole(report: Report, begin: float, end: float, share: float) -> None:
 
 def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
-) -> list[FoundRun] | None:
-    """The solution on each run; None where more than `FAILED_MOST` of the steps are on runs that are not
-    found as a whole, unless the start `stays` there."""
+) -> list[FoundRun]:
+    """The solution on each run; where the start `stays` it is divided where it fails."""
     size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
     found: list[FoundRun | None] = [None for _ in runs]
     stopped = threading.Event()
@@ -187,16 +208,11 @@ def searched_runs(
     def done() -> int:
         return sum(steps for steps, of_run in zip(size, found, strict=True) if of_run is not None)
 
-    def lost() -> int:
-        return sum(steps for steps, run in zip(size, found, strict=True) if run is not None and not run.whole)
-
     def one(k: int, tell: Report) -> None:
         if stopped.is_set():
             return
         solver, within = solver_of(search, tell, stays=stays), start.lasting(k) if stays else np.inf
         found[k] = search_run(k, runs[k], start, solver, within)
-        if not stays and lost() > FAILED_MOST * sum(size):
-            stopped.set()
 
     def share(before: int, of_run: int, part: float) -> None:
         report((before + part * of_run) / sum(size))
@@ -211,7 +227,7 @@ def searched_runs(
     else:
         for task in work:
             task()
-    return None if stopped.is_set() else [of_run for of_run in found if of_run is not None]
+    return [of_run for of_run in found if of_run is not None]
 
 
 def search_run(

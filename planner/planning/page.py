@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -143,6 +144,14 @@ def within_tolerance(job: Job, method: Method) -> Plan:
     if method.keeps_tolerance:
         again = _runs_alone(job, made, method) or with_less_tolerance(job, made, method.plan_job)
     return faster(again or made, made.slower_in_places())
+
+
+def tolerant(run: Job, made: Plan, planned: Callable[[Job], Plan]) -> Plan:
+    """The plan of a job of one run; where it does not pass planned with less tolerance, or slower in
+    places."""
+    if made.verdict is None or made.verdict.passed:
+        return made
+    return faster(with_less_tolerance(run, made, planned), made.slower_in_places())
 
 
 def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan:

@@ -10,6 +10,8 @@ import pytest
 
 import planner
 from benchmarks.net import ablation
+from planner.feedrate.solution import Status
+from planner.joint.parts import FoundRun
 from planner.planning.attempts import ATTEMPTS, RETRIES
 from planner.planning.job.job import Job
 from planner.planning.job.trace import Trace
@@ -74,7 +76,10 @@ def test_an_attempt_that_makes_no_plan_leaves_it_to_the_next(monkeypatch: pytest
     """The search finds nothing from the first splines, nor in long steps: then from reshaped ones, and then the motion on the path."""
     from planner.planning import joint_search
 
-    monkeypatch.setattr(joint_search, "searched_runs", lambda *more, **named: None)
+    def nothing(runs, *more, **named):
+        return [FoundRun(run, Status.ACCEPTABLE, "made up") for run in runs]
+
+    monkeypatch.setattr(joint_search, "searched_runs", nothing)
     names = [attempt.name for attempt in ATTEMPTS]
     steps = steps_of(CORNERS)
     assert [name for name in steps if name in names] == names

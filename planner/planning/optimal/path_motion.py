@@ -31,13 +31,13 @@ from planner.planning.job.plan import Plan
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
-from planner.planning.optimal.geometry import corner_shape, lost_joints, splined_with_stops
+from planner.planning.optimal.geometry import corner_shape, splined_with_stops
 from planner.planning.optimal.notes import no_spline_note, not_compared_note
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.result import plan_of_solution, priced, prices_of
 from planner.planning.optimal.rounds import reshaped
 from planner.planning.optimal.tighten import within_limits
-from planner.smoothing.spline_path import SplineShape, spline_shape, with_spline
+from planner.smoothing.spline_path import SplineShape, with_spline
 
 PRICED_BESIDE = SIZES.priced_beside
 
@@ -134,13 +134,13 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
 
 def first_motion(job: Job, settings: Settings) -> OnPath | None:
     """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points
-    only; None where a run gets no spline, where there is no solution, and where the splines have more spans
-    than the steps that are searched."""
-    rounded = _rounded(job, settings)
+    only, with a full stop where a run gets none; None where no run has one, where there is no solution, and
+    where the splines have more spans than the steps that are searched."""
+    given = _rounded(job, settings)
     with job.stage("geometry"):
-        shape = spline_shape(rounded, job.machine)
-        whole = shape.splines.fits.all() and not len(lost_joints(rounded, shape, fence=False))
-    if not whole or shape.splines.span_first[-1] > settings.effort.search.steps_max:
+        rounded, shape = splined_with_stops(given, job.machine, settings.order.jerk_limited)
+    fits = shape.splines.fits
+    if (len(fits) and not fits.any()) or shape.splines.span_first[-1] > settings.effort.search.steps_max:
         return None
     try:
         planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)

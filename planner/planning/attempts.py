@@ -10,7 +10,7 @@ run, or leaves something, the motion on that path is delivered.
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -197,10 +197,16 @@ def _others(attempts: tuple[Attempt, ...], settings: Settings) -> Others:
     slower in places where that does not pass, and the motion on a path."""
     from planner.planning.joint_search import Others
 
-    def alone(run: Job) -> Plan:
-        return tolerant(run, best_of(attempts, run, settings), partial(best_of, attempts, settings=settings))
+    known: dict[tuple[int, int], Plan] = {}  # of a run, when the search begins once more in long steps
 
-    return Others(alone, lambda job: kept_on_path(job, settings))
+    def alone(run: Job) -> Plan:
+        blocks = int(run.toolpath.block[0]), int(run.toolpath.block[-1])
+        if blocks not in known:
+            made = best_of(attempts, run, settings)
+            known[blocks] = tolerant(run, made, partial(best_of, attempts, settings=settings))
+        return known[blocks]
+
+    return Others(alone, cache(lambda job: kept_on_path(job, settings)))
 
 
 def _least_steps(job: Job) -> int:

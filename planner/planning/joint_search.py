@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -66,7 +66,7 @@ class Others(NamedTuple):
 
     alone : plans one of them, as a job
     kept  : the motion of the whole job on a path, its limits kept everywhere, for as many as are not planned
-            each by itself; None where there is none
+            each by itself; None where there is none. What is asked for once more is not planned again
     """
 
     alone: Callable[[Job], Plan]
@@ -119,7 +119,7 @@ def joint_plan(
             job.tell("search", steps=steps, of=most)
             return Joint(None, steps)
         found = searched_runs(runs, start, search.of(steps), report, stays=stays)
-    made, kept = None, cache(lambda: others.kept(job))
+    made = None
     if any(one.steps for one in found):
         parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
         made = with_runs_alone(
@@ -128,7 +128,7 @@ def joint_plan(
             others.alone,
             ALONE_MOST,
             settings.not_limited,
-            kept=lambda: None if (path := kept()) is None else RunsInTime(path[1], job),
+            kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
         )
     time = made.delivered.trajectory.cycle_time if made else np.nan
     count = len(made.plans) if made else 0
@@ -142,7 +142,7 @@ def joint_plan(
         found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
     left = [k for k, one in enumerate(found) if one.steps is None]
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
-    stayed = kept() if made.stays else (planned, motion) if motion else None
+    stayed = others.kept(job) if made.stays else (planned, motion) if motion else None
     held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None
     alone_held = {k: plan.grid for k, plan in made.plans.items()}
     tables, notes = tabled(job, held, made.delivered, found, left, alone_held)

@@ -116,3 +116,59 @@ def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
     assert searched(told)["alone"] == 1
     assert made.verdict.passed, made.verdict.faults
     assert made.cycle_time < whole.cycle_time * (1.0 + 0.1 / 12)  # of one run of twelve
+
+
+def test_a_run_that_is_not_found_nor_planned_alone_is_that_of_the_motion_on_the_path(monkeypatch):
+    monkeypatch.setattr(joint_search, "ALONE_MOST", 0)
+    own = joint_search.search_run
+
+    def one_fails(k, run, *more):
+        return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else own(k, run, *more)
+
+    whole, _ = planned()
+    monkeypatch.setattr(joint_search, "search_run", one_fails)
+    made, told = planned()
+    assert searched(told)["alone"] == 0
+    assert made.verdict.passed, made.verdict.faults
+    assert "stays on 1 of 12 runs between full stops" in made.sentence
+    assert "made up" in made.sentence
+    assert abs(made.cycle_time / whole.cycle_time - 1.0) < 0.05 / 12
+    assert made.grid is not None
+
+
+ZIGZAG = "".join(f"G1 X{3 * k} Y{4 * (k % 2)}\n" for k in range(7)) + "G4 P0.1\n"
+EXACT = "G61\nG1 X20 Y6\nX0 Y8\nG1 X0 Y0\nG64 P0.05\nG4 P0.1\n"
+THREAD = "S600 M3\nG33 Z-20 K1\nG4 P0.1\nG0 X0 Y0 Z0\nG4 P0.1\n"
+
+
+@pytest.mark.parametrize(("between", "why"), [(EXACT, "exact path"), (THREAD, "in step with the spindle")])
+def test_exact_runs_and_threads_are_on_the_path_and_the_runs_around_them_are_searched(between, why):
+    """No run but theirs loses its search: the job takes as long as its parts do, each as a job."""
+    machine, begin = planner.load_machine("mill"), "G21 G90 G64 P0.05 F6000\n"
+
+    def time_of(text: str) -> tuple[float, str]:
+        plan = planner.plan(planner.read_program(text=begin + text + "M2\n", machine=machine), machine)
+        assert plan.verdict is not None
+        assert plan.verdict.passed, plan.verdict.faults
+        return plan.cycle_time, plan.sentence
+
+    whole, sentence = time_of(ZIGZAG + "G1 X0 Y0\nG4 P0.1\n" + between + ZIGZAG)
+    assert why in sentence
+    parts = (ZIGZAG + "G1 X0 Y0\nG4 P0.1\n", between, ZIGZAG)
+    assert whole == pytest.approx(sum(time_of(part)[0] for part in parts), rel=2e-4)
+
+
+def test_a_job_one_of_whose_runs_gets_no_spline_is_searched():
+    """A knot of some tolerances, on which no spline fits, and a zig-zag before it."""
+    knot = (
+        "G1 X5 Y0\nX4.856 Y-0.133\nX4.990 Y-0.048\nX4.951 Y-0.141\nX5.061 Y-0.054\n"
+        "X5.111 Y-0.045\nX5.119 Y0.098\nX5.126 Y-0.027\nX4.998 Y0.002\nX12 Y3\n"
+    )
+    machine, told = planner.load_machine("mill"), Trace()
+    text = "G21 G90 G64 P0.05 F6000\n" + ZIGZAG + "G1 X0 Y0\nG4 P0.1\n" + knot + "M2\n"
+    plan = planner.plan(planner.read_program(text=text, machine=machine), machine, effort="quick", log=told)
+    assert plan.verdict is not None
+    assert plan.verdict.passed, plan.verdict.faults
+    assert plan.sentence.startswith("the best motion near its start, geometry and feed together")
+    assert "stays on 1 of 3 runs" in plan.sentence
+    assert searched(told)["alone"] == 1

@@ -120,7 +120,7 @@ def joint_plan(
             return Joint(None, steps)
         found = searched_runs(runs, start, search.of(steps), report, stays=stays)
     made = None
-    if any(one.steps for one in found):
+    if any(one.whole or (stays and one.steps) for one in found):
         parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
         made = with_runs_alone(
             job,

@@ -133,9 +133,23 @@ def extrusion_of(
 
 
 def extruding_part(extrusion: Extrusion, kept: Array) -> Extrusion:
-    """The ratios of the segments `kept` (M,) alone; what the extruder does in time is that of the whole
-    path."""
-    return replace(extrusion, ratio=extrusion.ratio[kept])
+    """What the extruder does along the segments `kept` (M,) alone, all or none of those between two full stops.
+    What it does while the axes wait at a joint belongs to the segment behind it."""
+    behind = np.append(kept, kept[-1])
+    touched = (behind | np.append(False, kept))[extrusion.joint]
+    old, new = extrusion.joint[touched], np.append(0, np.cumsum(kept))
+    leave = np.where(behind[old], extrusion.leave[touched], extrusion.arrive[touched])
+    joint, first = np.unique(new[old], return_index=True)
+    moves = behind[extrusion.at]
+    return replace(
+        extrusion,
+        joint=joint,
+        arrive=extrusion.arrive[touched][first],
+        leave=leave[np.append(first[1:], len(old)) - 1],
+        ratio=extrusion.ratio[kept],
+        at=new[extrusion.at[moves]],
+        **{name: getattr(extrusion, name)[moves] for name in ("delay", "amount", "speed")},
+    )
 
 
 def _before(at: Array, lasts: FloatArray) -> FloatArray:

@@ -31,7 +31,8 @@ LONGEST, MOST_FOR_LENGTH = 4.0, 60
 ARC_STEP = 0.8
 # Where no jerk is limited, units of steps at a jump from no acceleration to the full one [-]: a step becomes
 # shorter by no more than a factor (nlp.py), and a long one beside the jump would be the ramp.
-JUMP = 3.0
+# Of a unit, how far samples that are looked at for jumps are apart at least [-].
+JUMP, SEEN = 3.0, 0.1
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
 
@@ -127,22 +128,25 @@ def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
     return least
 
 
-def _busy(run: TubeRun, motion: Trajectory) -> FloatArray:
-    """(T-1,) how long the jerk is at its limit between samples, or without one, where accelerations jump, how
-    long it would be at its scale [s]."""
-    if not np.isfinite(run.jerk).all():
-        acceleration = motion.acceleration[:, run.axis].copy()
-        acceleration[[0, -1]] = 0.0
-        jump = np.abs(np.diff(acceleration, axis=0))
-        return np.asarray(JUMP * (jump / run.jerk_scale).max(axis=1))
-    share = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
-    return np.asarray(np.diff(motion.t) * (share[:-1] + share[1:]) / 2)
+def _busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
+    """(T,) how long the jerk has been at its limit until the samples, or without one, where accelerations jump,
+    how long it would have been at its scale [s]."""
+    if np.isfinite(run.jerk).all():
+        share = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
+        return np.append(0.0, np.cumsum(np.diff(motion.t) * (share[:-1] + share[1:]) / 2))
+    # a jump between two samples at nearly the same time would have steps of no length
+    seen = np.unique(np.floor(motion.t / (SEEN * unit)), return_index=True)[1]
+    seen = np.append(seen[seen < len(motion.t) - 1], len(motion.t) - 1)
+    acceleration = motion.acceleration[seen][:, run.axis]
+    acceleration[[0, -1]] = 0.0
+    jumps = (np.abs(np.diff(acceleration, axis=0)) / run.jerk_scale).max(axis=1)
+    return np.asarray(np.interp(motion.t, motion.t[seen], np.append(0.0, np.cumsum(JUMP * jumps))))
 
 
 def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
     unit = unit_of(run)
-    spent = np.append(0.0, np.cumsum(_busy(run, motion))) * cut.per_unit / unit
+    spent = _busy(run, motion, unit) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
     # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from
     # that of the run

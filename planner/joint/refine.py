@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.geometry.toolpath import REVERSAL_ANGLE
 from planner.joint.checks import watched_shares
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
@@ -58,10 +59,10 @@ def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, re
     state  : (N+1, 3, A) at the nodes
     within : (N, 2) the first step, and the one behind the last, of those within `reach` [s] of each
 
-    It turns back where its velocity turns by more than a right angle and gets so small that it does within a
-    period: chords miss the vertex there by what all of the acceleration makes of a period, that along the path
-    too. Limited jerk takes a peak of sqrt(2 V j) from the speed V to as much the other way, of which long
-    steps have shown less than half.
+    It turns back beside a vertex where the path does, where its velocity turns by more than a right angle and
+    gets so small that it does within a period: chords miss the vertex there by what all of the acceleration
+    makes of a period, that along the path too. Limited jerk takes a peak of sqrt(2 V j) from the speed V to as
+    much the other way, of which long steps have shown less than half.
     """
     v, a = state[:, 1], state[:-1, 2]
     change, push = np.diff(v, axis=0), np.linalg.norm(a, axis=1)
@@ -74,7 +75,17 @@ def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, re
     peak = np.minimum(
         (run.acceleration / along).min(axis=1), np.sqrt(2.0 * fastest * np.linalg.norm(run.jerk))
     )
-    return np.where(turned & (slowest < push * reach), peak, 0.0)
+    return np.where(turned & (slowest < push * reach) & _beside_reversal(run)[leg], peak, 0.0)
+
+
+def _beside_reversal(run: TubeRun) -> Array:
+    """(R,) whether the path turns back where a leg begins or ends."""
+    legs = np.arange(len(run))
+    ahead, behind = run.tangents(legs[1:], np.zeros(len(run) - 1)), run.tangents(legs[:-1], run.length[:-1])
+    cosine = (ahead * behind).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(ahead, axis=1) * np.linalg.norm(behind, axis=1), TINY)
+    back = cosine < np.cos(REVERSAL_ANGLE)
+    return np.append(back, False) | np.append(False, back)
 
 
 class Divided(NamedTuple):

@@ -17,6 +17,7 @@ from planner.nc.reader import parse_program
 from planner.planning.job import less_tolerance
 from planner.planning.methods.bezier import BezierMethod
 from planner.verifier import CornerCheck, verify
+from planner.verifier.corners import CUSP
 from planner.verifier.pieces import RATIO_ROUNDING
 
 MACHINE = problems.machine()
@@ -40,7 +41,7 @@ JOBS = {
     "arcs": problems.arcs(),
     "budgets": parse_program(BUDGETS, source="budgets"),
 }
-CORNERS = {"pentagon": 4, "zigzag": 7, "five points": 3, "arcs": 4, "budgets": 5}
+CORNERS = {"pentagon": 4, "zigzag": 7, "five points": 3, "arcs": 5, "budgets": 5}
 
 
 @cache
@@ -62,7 +63,7 @@ def test_every_method_keeps_the_laws_at_every_programmed_corner(method, job):
     assert (found.told()[0] <= found.speed_ratio).all()
     assert (found.told()[1] <= found.budget_ratio).all()
     if method == "stop":
-        assert found.stands.all()
+        assert (found.stands | (found.theta > CUSP)).all()  # beyond it nothing is told
     if method == "optimal":
         assert found.worst_speed_ratio > 0.9  # the law is no empty one
         assert found.gains()[0] > 1.2

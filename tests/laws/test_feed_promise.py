@@ -33,7 +33,7 @@ def test_f_is_kept_along_a_line(method):
 @pytest.mark.parametrize("seed", slow_but([2, 3], range(5)))
 def test_f_is_kept_round_corners_and_on_arcs(seed):
     """Blocks that lie inside the tolerance, reversals, arcs."""
-    for method in ("second-order", "kinematic"):
+    for method in ("optimal", "kinematic"):
         found = row(seed, method)
         assert outcome(found) == "passed, kept", found
 

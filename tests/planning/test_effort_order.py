@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from benchmarks.jobs import problems
+from planner.feedrate.solution import Status
+from planner.joint.parts import FoundRun
 from planner.nc.reader import parse_program
 from planner.planning import joint_search
 from planner.planning.attempts import ATTEMPTS
@@ -22,7 +24,8 @@ def test_what_quick_finds_is_taken_where_shorter_steps_find_nothing(monkeypatch)
     searched = joint_search.searched_runs
 
     def not_in_shorter_steps(runs, start, search, *more, **named):
-        return None if search.finer else searched(runs, start, search, *more, **named)
+        nothing = [FoundRun(run, Status.ACCEPTABLE, "not found") for run in runs]
+        return nothing if search.finer else searched(runs, start, search, *more, **named)
 
     monkeypatch.setattr(joint_search, "searched_runs", not_in_shorter_steps)
     trace = Trace()

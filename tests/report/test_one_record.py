@@ -50,7 +50,9 @@ KINDS = {
     "laser": Kind("G21 M4 S400 F1800\nG1 X12\nS150 X18 Y4\nS0 X22\nM5\n"),
     "plot": Kind("IN;SP1;PU200,0;PD1400,0;PD1400,900;PU;PD0,900;PU;SP0;", {"plotter": {"pen_down": 0.03}}),
     "printer": Kind(
-        "G21 M83\nG1 X12 E0.6 F1500\nY9 E0.4\nG1 E-1.2 F2100\nG0 X0\nG1 E1.2 F2100\n", axes={"e": FILAMENT}
+        "G21 M83\nG1 X12 E0.6 F1500\nY9 E0.4\nG1 E-1.2 F2100\nG0 X0\nG1 E1.2 F2100\n",
+        axes={"e": FILAMENT},
+        method="optimal",
     ),
     "tilting table": Kind(
         "G21 G90\nM428\nG1 X9 A4 C12 F900\nX18 Y4 A9 C35\nY15 A12 C50\nM429\n",

@@ -153,4 +153,4 @@ def test_a_real_plan() -> None:
     )
     assert set(said["prices"]["saved_range_s"]) == set(said["prices"]["saved_s"])
     assert f"10 % more saves {worth}" in " ".join(text(plan_table(plan)).split())
-    assert "more saves" not in text(plan_table(planner.plan(program, machine, method="second-order")))
+    assert "more saves" not in text(plan_table(planner.plan(program, machine, method="kinematic")))

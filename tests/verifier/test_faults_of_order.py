@@ -150,7 +150,7 @@ def test_a_stop_that_is_rounded_is_found():
 def test_a_stop_before_the_vertex_is_found():
     """Paper 003's undershoot: at rest, but 0.01 mm before the programmed point."""
     points = [(0, 0, 0), (9.99, 0, 0), (3, 0, 0)]
-    toolpath = Moves().line(10).line(3).toolpath(M)
+    toolpath = Moves().line(10, control=PathControl.EXACT_STOP).line(3).toolpath(M)
     verdict = judge(polyline(points, jerk=2e5), toolpath)
     assert "line 10" in fault(verdict, "stop")
 

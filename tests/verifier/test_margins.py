@@ -48,7 +48,7 @@ def test_a_stop_is_no_further_from_its_vertex_than_a_sample_beside_a_rest_can_be
     short = (
         1e-6 + ratio * np.sqrt(3) * J * H**3 / 48
     )  # of each of three axes; 1e-6 mm is what programs are written to
-    toolpath = Moves().line(1).line(0).toolpath(M)
+    toolpath = Moves().line(1, control=PathControl.EXACT_STOP).line(0).toolpath(M)
     motion = chain(
         polyline([(0, 0, 0), (1 - short, 0, 0)], jerk=J),
         stay((1 - short, 0, 0), 0.01),

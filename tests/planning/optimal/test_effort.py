@@ -10,7 +10,6 @@ from planner import plan
 from planner.base.errors import InputError
 from planner.base.names import EFFORTS as NAMES
 from planner.machine import load_machine
-from planner.machine.parts import Fir
 from planner.machine.user_limit import PathLimit
 from planner.planning.optimal.effort import EFFORTS
 
@@ -64,11 +63,10 @@ def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
     "why",
     [
         {"machine": MACHINE.with_own((Slow(),))},
-        {"machine": MACHINE.model_copy(update={"fir": Fir(time_constants=(0.004,))})},
         {"geometry": "spline"},
         {"rounds": 1},
     ],
-    ids=["a limit of one's own", "filters", "splines asked for", "rounds asked for"],
+    ids=["a limit of one's own", "splines asked for", "rounds asked for"],
 )
 def test_what_the_search_does_not_know_is_planned_by_rounds(why):
     made = plan(problems.zigzag(4), **({"machine": MACHINE} | why))

@@ -44,6 +44,9 @@ class ChordGuide(Guide):
     v_acc: FloatArray
     v_jerk: FloatArray  # (R,) the same for their jerks (par. 17)
     tol: FloatArray  # (R,) what filters and interpolation may use of the tolerance [mm]
+    corner: Array  # (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half: FloatArray  # (R,) sine of half the turning angle there [-]
+    whole: FloatArray  # (R,) tolerance, with what the rounding uses of it [mm]
     segment: Array  # (R,) segment of the toolpath
 
     @property
@@ -53,7 +56,7 @@ class ChordGuide(Guide):
 
 
 _OF_CHORDS = (
-    "direction", "feed", "programmed", "kappa", "v_acc", "v_jerk", "tol", "segment",
+    "direction", "feed", "programmed", "kappa", "v_acc", "v_jerk", "tol", "corner", "sin_half", "whole", "segment",
 )  # fmt: skip  # columns of a `ChordGuide` of which both parts of a chord that is cut have the same
 
 
@@ -116,7 +119,8 @@ def guide_of_path(
     path, segment = samples.path, samples.segment
     toolpath = path.toolpath
     corner = np.where(samples.element < 0, ~samples.element, -1)
-    tol = np.where(corner >= 0, path.tol[corner] - path.tol_ap[corner], toolpath.along[segment])
+    whole = np.where(corner >= 0, path.tol[corner], toolpath.along[segment])
+    tol = whole - np.where(corner >= 0, path.tol_ap[corner], 0.0)
     behind = np.linalg.norm(np.append(samples.d2_left[1:], samples.d2_left[-1:], axis=0), axis=1)
     kappa = np.maximum(np.linalg.norm(samples.d2_right, axis=1), behind)
     h = np.diff(samples.s, append=samples.s[-1])
@@ -133,7 +137,7 @@ def guide_of_path(
     length = np.linalg.norm(chord, axis=1)
     moving = length > 0
     start, end, chord, length, row = start[moving], end[moving], chord[moving], length[moving], row[moving]
-    axes, programmed = toolpath.axes, toolpath.feed[segment][row]
+    axes, programmed, at_corner = toolpath.axes, toolpath.feed[segment][row], corner[row]
     with np.errstate(divide="ignore", over="ignore"):
         axes_allow = length * (machine.limits("velocity", axes) / np.abs(chord)).min(axis=1)
     speeds = [_circle_speeds(side, machine, axes) for side in (start, end)]
@@ -152,6 +156,9 @@ def guide_of_path(
         v_acc=np.minimum(speeds[0][0], speeds[1][0]),
         v_jerk=np.minimum(speeds[0][1], speeds[1][1]),
         tol=tol[row] * (1 - SAGITTA),
+        corner=at_corner,
+        sin_half=np.where(at_corner >= 0, np.sin(path.theta[at_corner] / 2), 0.0),
+        whole=whole[row],
         segment=segment[row],
     )
     return cut_beside_slower(made)

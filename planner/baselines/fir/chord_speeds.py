@@ -4,7 +4,8 @@ The command runs the guide's chords one after another at a constant speed each.
 
 What is exceeded is mended where it comes from:
 
-* error          the chords that turn, around the one that was commanded Td/2 before, get slower;
+* error          the chords that turn, around the one that was commanded Td/2 before, get slower; a corner's then last as long as the
+                 gap that paper 000 leaves between two pulses;
 * acceleration   T1 gets longer, up to 2 V/A: whatever the command, |a| <= 2 V/T1 (docs/papers.md, universal identity);
 * jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2);
 * feed           a lower programmed feed holds on beside its block, for as long as the filters see it (`feeds_held`).
@@ -31,6 +32,9 @@ paper 001), nor is it needed: what the filters see at the constant speed v is th
 kernel as weight. By a rule with two nodes that has the kernel's second and fourth moment mu2, mu4,
 
     D = p(s - v x) + p(s + v x) - 2 p(s),   error w |D|,   acceleration D/x^2,      x^2 = mu4/mu2,   w = mu2^2/(2 mu4).
+
+A corner that turns by theta is missed by no more than eps if the command takes as long as the gap Td - Tk
+that paper 000's eq. 15 puts between the pulses of two legs, with V in its legs.
 """
 
 from __future__ import annotations
@@ -45,6 +49,7 @@ from planner.baselines.fir.chord_guide import STRAIGHT, ChordGuide, feeds_held
 from planner.baselines.fir.command import Command, VelocityPulses, command_of
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, fastest_of, slowing
+from planner.corners.fir import overlap_time
 from planner.feedrate.constraints import filter_error, phase_lag
 from planner.machine import Machine
 
@@ -56,7 +61,8 @@ AROUND = 0.1
 # T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits
 # [-].
 MARGINS_MAX = np.array([2.0, 4.0])
-# So many largest speeds are tried, from the feed down to this fraction of it [-].
+# So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean
+# length reach from rest to rest.
 SPEEDS, LOWEST = 9, 0.17
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
@@ -124,7 +130,10 @@ class ChordSpeeds(SpeedPlan):
 def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
     """The fastest of a few plans that keep tolerance and limits, each run by itself."""
     high = guide.largest(guide.feed)
-    tops = (high * LOWEST**share for share in np.linspace(0.0, 1.0, SPEEDS))
+    corners = np.add.reduceat(np.diff(guide.corner, prepend=-1) > 0, guide.first[:-1])
+    leg = guide.total(guide.length) / (1 + corners)
+    low = np.minimum(LOWEST * high, np.cbrt(machine.limits("jerk", guide.axes).min() * leg**2 / 4.0))
+    tops = (high * (low / high) ** share for share in np.linspace(0.0, 1.0, SPEEDS))
     return fastest_of((first_plan(guide, machine, top) for top in tops), machine)
 
 
@@ -209,7 +218,8 @@ def first_speeds(
 ) -> FloatArray:
     """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
 
-    What either the curvature beside a chord or the mean of the path allows.
+    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the
+    gap takes.
 
     most         : (R,) largest speeds [mm/s]
     acceleration : (A,) limits of the axes [mm/s2]
@@ -219,7 +229,7 @@ def first_speeds(
     v = np.minimum(most, local)
     bent = np.flatnonzero(local < most)
     v[bent] = np.maximum(v[bent], _v_mean(guide, bent, most[bent], acceleration, T1, T2))
-    return v
+    return v * _slower_corners(guide, v, most, T1, T2)
 
 
 def two_nodes(T1: FloatArray, T2: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -253,6 +263,27 @@ def _v_mean(
         if not len(open_):
             break
     return v
+
+
+def _slower_corners(
+    guide: ChordGuide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1
+    elsewhere."""
+    chord = np.flatnonzero(guide.corner >= 0)
+    by = np.ones(len(guide))
+    if not len(chord):
+        return by
+    first = np.flatnonzero(np.diff(guide.corner[chord], prepend=-2))
+    at, run = chord[first], guide.run[chord[first]]
+    last = np.append(chord[first[1:] - 1], chord[-1])
+    V = np.sqrt(most[at] * most[last])
+    gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
+    lasting = np.add.reduceat(guide.length[chord] / v[chord], first)
+    by[chord] = np.repeat(
+        np.minimum(lasting / np.maximum(gap, 1e-300), 1.0), np.diff(np.append(first, len(chord)))
+    )
+    return by
 
 
 def guide_point(guide: ChordGuide, s: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.command import lower_between
-from planner.baselines.fir.guide import Guide
+from planner.baselines.fir.guide import Guide, per_leg, picked
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
@@ -37,27 +37,25 @@ STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 class ChordGuide(Guide):
     """The chords of a smooth path, with what paper 001's formulas need of each."""
 
-    programmed: FloatArray  # (R,) programmed feed, inf for rapids [mm/s]
-    kappa: FloatArray  # (R,) largest curvature of the path at the chord [1/mm]
+    feed: FloatArray = per_leg(finite=False)
+    programmed: FloatArray = per_leg(finite=False)  # (R,) programmed feed, inf for rapids [mm/s]
+    kappa: FloatArray = per_leg()  # (R,) largest curvature of the path at the chord [1/mm]
     # (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13); inf if
     # straight
-    v_acc: FloatArray
-    v_jerk: FloatArray  # (R,) the same for their jerks (par. 17)
-    tol: FloatArray  # (R,) what filters and interpolation may use of the tolerance [mm]
-    corner: Array  # (R,) joint whose rounded corner the chord belongs to, ascending, or -1
-    sin_half: FloatArray  # (R,) sine of half the turning angle there [-]
-    whole: FloatArray  # (R,) tolerance, with what the rounding uses of it [mm]
-    segment: Array  # (R,) segment of the toolpath
+    v_acc: FloatArray = per_leg(finite=False)
+    v_jerk: FloatArray = per_leg(finite=False)  # (R,) the same for their jerks (par. 17)
+    tol: FloatArray = per_leg()  # (R,) what filters and interpolation may use of the tolerance [mm]
+    corner: Array = per_leg(
+        np.int64
+    )  # (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    sin_half: FloatArray = per_leg()  # (R,) sine of half the turning angle there [-]
+    whole: FloatArray = per_leg()  # (R,) tolerance, with what the rounding uses of it [mm]
+    segment: Array = per_leg(np.int64)  # (R,) segment of the toolpath
 
     @property
     def budget(self) -> FloatArray:
         """(R, 2) the same on both halves of a chord [mm]."""
         return np.stack([self.tol, self.tol], axis=1)
-
-
-_OF_CHORDS = (
-    "direction", "feed", "programmed", "kappa", "v_acc", "v_jerk", "tol", "corner", "sin_half", "whole", "segment",
-)  # fmt: skip  # columns of a `ChordGuide` of which both parts of a chord that is cut have the same
 
 
 def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
@@ -75,7 +73,7 @@ def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
     s = np.setdiff1d(s[inside], guide.s)
     at = np.searchsorted(guide.s, s, side="right") - 1  # the chord that is cut
     rows = np.insert(np.arange(len(guide)), at + 1, at)
-    columns = {name: getattr(guide, name)[rows] for name in _OF_CHORDS}
+    columns = picked(guide, {"leg": rows, "joint": np.arange(len(guide) + 1)})
     cuts = guide.point[at] + (s - guide.s[at])[:, None] * guide.direction[at]
     columns["point"] = np.insert(guide.point, at + 1, cuts, axis=0)
     columns["s"] = np.insert(guide.s, at + 1, s)

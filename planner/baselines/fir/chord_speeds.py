@@ -39,7 +39,6 @@ that paper 000's eq. 15 puts between the pulses of two legs, with V in its legs.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,8 +46,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.chord_guide import STRAIGHT, ChordGuide, feeds_held
 from planner.baselines.fir.command import Command, VelocityPulses, command_of
+from planner.baselines.fir.guide import per_leg, per_run
 from planner.baselines.fir.measure import slowest
-from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, fastest_of, slowing
+from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.corners.fir import overlap_time
 from planner.feedrate.constraints import filter_error, phase_lag
 from planner.machine import Machine
@@ -63,7 +63,7 @@ AROUND = 0.1
 MARGINS_MAX = np.array([2.0, 4.0])
 # So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean
 # length reach from rest to rest.
-SPEEDS, LOWEST = 9, 0.17
+SPEEDS, LOWEST = 18, 0.17
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
 # A mean's speed is good enough when it exceeds nothing by more than this [-]: the motion is measured
@@ -75,10 +75,9 @@ MEAN_OVER = 0.02
 class ChordSpeeds(SpeedPlan):
     """Speeds on the R chords of a guide in S runs."""
 
-    rows = SpeedPlan.rows | {"v": "leg", "margin": "run"}
     guide: ChordGuide
-    v: FloatArray  # (R,) constant speed of each chord [mm/s]
-    margin: FloatArray  # (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
+    v: FloatArray = per_leg()  # (R,) constant speed of each chord [mm/s]
+    margin: FloatArray = per_run(2)  # (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
 
     def time(self) -> FloatArray:
         """(S,) durations of the runs [s], dwells not counted."""
@@ -98,18 +97,15 @@ class ChordSpeeds(SpeedPlan):
         """
         guide, given = self.guide, self.guide.profile_filters is not None
         over = np.stack([made.largest(made.seen.acceleration), made.largest(made.seen.jerk)], axis=1)
-        wrong = made.wrong
-        everything = wrong & ((over > 1.0).any(axis=1) if given else n >= PATIENCE)
+        everything = (over > 1.0).any(axis=1) if given else np.full(guide.runs, n >= PATIENCE)
         as_a_whole = np.where(everything, BEYOND / np.sqrt(made.largest(made.seen.worst)), 1.0)
         v = self.v * np.minimum(self._by_error(made), as_a_whole[guide.run])
         if given:
-            return dataclasses.replace(self, v=v)
-        margin = np.clip(self.margin * over / BEYOND, 1.0, MARGINS_MAX) if n < PATIENCE else MARGINS_MAX
-        margin = np.where(wrong[:, None], margin, self.margin)
-        T1, T2 = (
-            np.where(wrong, new, old)
-            for new, old in zip(filter_lengths(guide, v, machine, margin), (self.T1, self.T2), strict=True)
-        )
+            return ChordSpeeds(guide=guide, v=v, T1=self.T1, T2=self.T2, margin=self.margin)
+        margin = np.clip(self.margin * over / BEYOND, 1.0, MARGINS_MAX)
+        if n >= PATIENCE:
+            margin = np.broadcast_to(MARGINS_MAX, margin.shape)
+        T1, T2 = filter_lengths(guide, v, machine, margin)
         return ChordSpeeds(
             guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin
         )
@@ -127,17 +123,29 @@ class ChordSpeeds(SpeedPlan):
         return np.where(guide.kappa > STRAIGHT, by, 1.0)
 
 
-def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-    """The fastest of a few plans that keep tolerance and limits, each run by itself."""
+def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], FloatArray]:
+    """`SPEEDS` plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that
+    they promise the S runs.
+
+    guide : its dwells are not looked at
+    """
     high = guide.largest(guide.feed)
     corners = np.add.reduceat(np.diff(guide.corner, prepend=-1) > 0, guide.first[:-1])
     leg = guide.total(guide.length) / (1 + corners)
     low = np.minimum(LOWEST * high, np.cbrt(machine.limits("jerk", guide.axes).min() * leg**2 / 4.0))
-    tops = (high * (low / high) ** share for share in np.linspace(0.0, 1.0, SPEEDS))
-    return fastest_of((first_plan(guide, machine, top) for top in tops), machine)
+    plans = [_first_plan(guide, machine, high * (low / high) ** (k / (SPEEDS - 1))) for k in range(SPEEDS)]
+    return plans, np.array([plan.time() for plan in plans])
 
 
-def first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSpeeds:
+def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
+    """The fastest of a few plans that keep tolerance and limits, each run by itself.
+
+    guide : without dwells, from `Guide.pick`
+    """
+    return settled_fastest(*promised(guide, machine), machine)
+
+
+def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSpeeds:
     """First speeds up to `top` (S,) and the filters for them."""
     acceleration = machine.limits("acceleration", guide.axes)
     most, margin = np.minimum(guide.feed, top[guide.run]), np.ones((guide.runs, 2))

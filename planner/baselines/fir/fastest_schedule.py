@@ -1,30 +1,41 @@
-"""The fastest schedule: which speed, which filters, stops or none.
+"""The fastest schedule: which speed, which filters, which full stops.
 
 A high speed V needs a long filter, T1 = V/A, which every standstill and every curve pays for; a pulse of
-length L is fastest from rest to rest at about V = sqrt(L A), well below the feed of many programs. So each
-run between full stops is tried with several V, and with margins on T2 = A/J: 1 where nothing overlaps or all
-flows, up to 2 where overlaps add jerks up. The time of a schedule is known without making its motion; the
-most promising of every margin is slowed down for what it exceeds.
+length L is fastest from rest to rest at about V = sqrt(L A), well below the feed of many programs. So V is
+searched for, over decades, and with it the margin on T2 = A/J: 1 where nothing overlaps or all flows, up to 2
+where overlaps add jerks up. The time of a schedule is known without making its motion; what it cannot see
+costs when the most promising are settled.
 
-Where the command waits anyway a full stop costs little more, and what it parts has filters of its own.
+Where the command waits anyway a full stop costs little more, and what it parts may have filters of its own.
 """
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
+from planner.base.point_to_point import rest_to_rest_times
 from planner.baselines.fir.guide import LegGuide
 from planner.baselines.fir.rules import schedule
 from planner.baselines.fir.schedule import Schedule
-from planner.baselines.fir.slow_down import fastest_of
+from planner.baselines.fir.slow_down import WORTH, settled_fastest
 from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Speeds that are tried, from the fastest leg's to what the shortest leg is best run at from rest to rest.
-SPEEDS = 32
-MARGINS = (1.0, 1.25, 1.5, 1.75, 2.0)
+# Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to
+# rest; then others between them, to this natural logarithm of their ratio.
+SPEEDS = 10
+FINEST = 0.03
+# Margins that are tried; from the second on with speeds near the best of the one before.
+MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
+NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
+# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
+# they are tried at all corners, as a corner may be so slow that a stop is faster.
+STOPS = (1.0, 0.0)
+WAIT_ROUNDING = 1e-9  # of that fraction
 # In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion
 # by dt^2/8 of it. T1 is at least so long that this is the given fraction of the tolerance [-]: what is left
 # is for the filters.
@@ -34,35 +45,109 @@ MODES = 2
 
 
 def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
-    """The fastest of three schedules that keep tolerance and limits: of the guide, with full stops where that
-    waits, and with full stops at all corners."""
+    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops than the
+    given one."""
     plan = _settled(guide, machine)
-    for stops in (plan.gap() > 0, guide.inner & (guide.sin_half > 0)):
-        if stops.any():
-            stopping = _settled(guide.stopping(np.flatnonzero(stops)), machine)
-            plan = min(plan, stopping, key=lambda one: one.time().sum())
-    return plan
+    for fraction in STOPS:
+        plan = _stopping(plan, machine, _waits(plan, fraction))
+    return _stopping(plan, machine, plan.guide.inner & (plan.guide.sin_half > 0))
+
+
+def _waits(plan: Schedule, fraction: float) -> Array:
+    """(R+1,) joints at which the command waits for this fraction of the filters' delay or longer."""
+    gap, (T1, T2) = plan.gap(), plan.at_joints()
+    return (gap > 0) & (gap >= fraction * (T1 + T2) * (1 - WAIT_ROUNDING))
+
+
+def _stopping(plan: Schedule, machine: Machine, stops: Array) -> Schedule:
+    """Full stops at the joints `stops` (R+1,), in the runs that gain by it."""
+    guide, time = plan.guide, plan.time()
+    tried = np.logical_or.reduceat(stops[:-1], guide.first[:-1]) & (
+        _least_time(guide, stops) < time * (1 - WORTH)
+    )
+    if not tried.any():
+        return plan
+    legs = np.flatnonzero(tried[guide.run])
+    stopping = guide.pick(tried).stopping(np.flatnonzero(stops[legs]))
+    other = _settled(stopping, machine)
+    home = guide.run[legs[stopping.first[:-1]]]  # the run that each of these was cut from
+    new_time = np.bincount(home, other.time(), guide.runs)
+    better = tried & (new_time < time * (1 - WORTH))
+    if not better.any():
+        return plan
+    cut = guide.stopping(np.flatnonzero(stops & np.append(better[guide.run], False)))
+    home_of_cut = guide.run[cut.first[:-1]]
+    kept = dataclasses.replace(plan, guide=cut, T1=plan.T1[home_of_cut], T2=plan.T2[home_of_cut])
+    return kept.put(better[home_of_cut], other.pick(better[home]))
+
+
+def _least_time(guide: LegGuide, stops: Array) -> FloatArray:
+    """A time (S,) [s] that each run cannot beat with full stops at the joints `stops` (R+1,): straight from
+    stop to stop."""
+    stopping = guide.stopping(np.flatnonzero(stops))
+    limits = (stopping.largest(value) for value in (stopping.feed, stopping.a_max, stopping.j_max))
+    times = rest_to_rest_times(stopping.total(stopping.length), *limits)
+    return np.asarray(np.bincount(guide.run[stopping.first[:-1]], times, guide.runs), dtype=np.float64)
 
 
 def _settled(guide: LegGuide, machine: Machine) -> Schedule:
-    """The fastest schedule of every run, each margin with the speed that promises to be the fastest."""
+    """The fastest of the settled schedules, each run with the choices that are most promising for it."""
     margins = MARGINS if guide.profile_filters is None else MARGINS[:1]
-    return fastest_of((_promising(guide, machine, margin) for margin in margins), machine)
+    speeds, times = _search(guide, machine, margins)
+    plans = [
+        plan_for(guide, machine, speed, np.full(guide.runs, margin))
+        for speed, margin in zip(speeds, margins, strict=True)
+    ]
+    return settled_fastest(plans, times, machine)
 
 
-def _promising(guide: LegGuide, machine: Machine, margin: float) -> Schedule:
+def _search(guide: LegGuide, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """For each margin (K,) the best speed of each run [mm/s] and its time [s], both (K, S), by the times of
+    schedules.
+
+    Where nothing waits at the first margin, the others would make filters longer for nothing; and where the
+    second, the largest, is slower, those between them are not tried.
+    """
     high = guide.largest(guide.feed)
     low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
+    step = np.log(high / low) / (SPEEDS - 1)
+    tries = [np.exp(-k * step) * high for k in range(SPEEDS)]
+    speeds, times = (np.empty((len(margins), guide.runs)) for _ in range(2))
+    speeds[:], times[:] = _best_speeds(guide, machine, margins[0], tries, step)
+    plan = plan_for(guide, machine, speeds[0], np.full(guide.runs, margins[0]))
+    hopeful: Array = np.logical_or.reduceat((plan.gap() > 0)[:-1], guide.first[:-1])
+    for k in range(1, len(margins)):
+        if k == 2:
+            hopeful = hopeful & (times[1] <= times[0])
+        if not hopeful.any():
+            break
+        picked = guide.pick(hopeful)
+        tries = [np.minimum(speeds[k - 1, hopeful] * ratio, high[hopeful]) for ratio in NEARBY]
+        step = np.full(picked.runs, np.log(NEARBY[0] / NEARBY[1]))
+        speeds[k, hopeful], times[k, hopeful] = _best_speeds(picked, machine, margins[k], tries, step)
+    return speeds, times
+
+
+def _best_speeds(
+    guide: LegGuide, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Best speed (S,) [mm/s] of each run and its time (S,) [s]: among `tries`, `step` (S,) apart in
+    logarithm, and between them."""
+    margins, high = np.full(guide.runs, margin), guide.largest(guide.feed)
     best, best_time = high, np.full(guide.runs, np.inf)
-    for share in np.linspace(0.0, 1.0, SPEEDS):
-        speed = high * (low / high) ** share
-        time = plan_for(guide, machine, speed, margin).time()
-        best, best_time = np.where(time < best_time, speed, best), np.minimum(time, best_time)
-    return plan_for(guide, machine, best, margin)
+    while tries:
+        for speed in tries:
+            time = plan_for(guide, machine, speed, margins).time()
+            better = time < best_time
+            best, best_time = np.where(better, speed, best), np.where(better, time, best_time)
+        step = step / 2
+        signs = (-1, 1) if (step > FINEST).any() else ()
+        tries = [np.minimum(best * np.exp(sign * step), high) for sign in signs]
+    return best, best_time
 
 
 def filters_for(
-    guide: LegGuide, machine: Machine, speed: FloatArray, margin: float
+    guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """T1 and T2 (S,) [s]: the guide's own, or the shortest for legs run at their feed and at most at `speed`.
 
@@ -70,7 +155,8 @@ def filters_for(
     both equal where V does not reach A), lengthened to whole periods of the machine's vibration modes (eq.
     10).
 
-    speed : (S,) [mm/s]
+    speed  : (S,) [mm/s]
+    margin : (S,) [-]
     """
     if guide.profile_filters is not None:
         return guide.given_filters()
@@ -89,9 +175,12 @@ def filters_for(
     )
 
 
-def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: float) -> Schedule:
-    """The first schedule with the filters for a `speed` (S,), the largest on each run [mm/s], not yet slowed
-    down."""
+def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
+    """The first schedule with the filters for a speed, not yet slowed down.
+
+    speed  : (S,) largest speed on each run [mm/s]
+    margin : (S,) on T2 = A/J [-]
+    """
     T1, T2 = filters_for(guide, machine, speed, margin)
     return schedule(guide, machine, np.minimum(guide.feed, speed[guide.run]), T1, T2)
 

@@ -3,19 +3,23 @@
 Filters are empty at a full stop, so every run may have its own. Paper 000 runs along the program itself: arcs
 become chords, collinear lines of one feed are one leg. Paper 001 runs along the fine chords of a smooth path
 (chord_guide.py).
+
+Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is
+declared so is checked and made read-only, picked for some runs and put back, for every record in the same
+way.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import InputError
 from planner.geometry.chords import chorded, parted_by_feed
 from planner.geometry.legs import legs_of
@@ -25,6 +29,75 @@ from planner.machine import Machine
 # Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with
 # feed^2, so that this costs half of it in feed.
 CHORD_FRACTION = 0.05
+
+
+def per_run(width: int | None = None) -> Any:
+    """A field (S,), or (S, width), of float64."""
+    return _column("run", np.float64, width)
+
+
+def per_leg(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R,), or (R, A) with `axes`; with `finite=False` infinity is allowed."""
+    return _column("leg", dtype, -1 if axes else None, finite)
+
+
+def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
+    """A field (R+1,), or (R+1, A) with `axes`."""
+    return _column("joint", dtype, -1 if axes else None, finite)
+
+
+def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
+    """A field with its rows, type and width in the metadata; width -1 for one column per axis."""
+    return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
+
+
+def _columns(record: Any) -> list[tuple[str, Any]]:
+    """Names and metadata of the columns of a record."""
+    return [(one.name, one.metadata) for one in fields(record) if "rows" in one.metadata]
+
+
+def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
+    """Check the columns of a record and make them read-only.
+
+    sizes : number of rows per "run", "leg" and "joint"
+    axes  : A, the width of columns with `axes`
+
+    Raises ValueError for a column of another shape, or one that is not finite and should be.
+    """
+    for name, of in _columns(record):
+        width = () if of["width"] is None else (axes if of["width"] < 0 else of["width"],)
+        freeze(record, name, of["dtype"], (sizes[of["rows"]], *width), finite=of["finite"])
+
+
+def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
+    """Indices of the rows that the chosen runs have, for "run", "leg" and "joint".
+
+    first  : (S+1,) first joint of each run, as of `Guide`
+    chosen : (S,) True for the runs that are meant, one at least
+    """
+    run = np.flatnonzero(chosen)
+    legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))
+    return {"run": run, "leg": legs, "joint": np.append(legs, first[run[-1] + 1])}
+
+
+def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
+    """The given rows (n,) of "run", "leg" and "joint" (`chosen_rows`) of all columns, by name."""
+    return {name: getattr(record, name)[rows[of["rows"]]] for name, of in _columns(record)}
+
+
+def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
+    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run
+    belongs to the next one.
+
+    rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
+    chosen : a record of these rows alone
+    """
+    columns: dict[str, Any] = {}
+    for name, of in _columns(record):
+        last = -1 if of["rows"] == "joint" else None
+        columns[name] = getattr(record, name).copy()
+        columns[name][rows[of["rows"]][:last]] = getattr(chosen, name)[:last]
+    return columns
 
 
 class Line(NamedTuple):
@@ -59,11 +132,18 @@ class Guide(ABC):
     profile_filters: tuple[float, float] | None = None
     first: Array  # (S+1,) first joint of each run, and the last joint of all
     dwell: FloatArray  # (S+1,) standstill before the first run and after each [s]
-    point: FloatArray  # (R+1, A) the joints [mm]
-    s: FloatArray  # (R+1,) length from the start [mm]
-    length: FloatArray  # (R,) [mm]
-    direction: FloatArray  # (R, A) unit vectors
-    feed: FloatArray  # (R,) programmed feed, at most what the axes' velocities allow along the leg [mm/s]
+    point: FloatArray = per_joint(axes=True)  # (R+1, A) the joints [mm]
+    s: FloatArray = per_joint()  # (R+1,) length from the start [mm]
+    length: FloatArray = per_leg()  # (R,) [mm]
+    direction: FloatArray = per_leg(axes=True)  # (R, A) unit vectors
+    # (R,) programmed feed, at most what the axes' velocities allow along the leg [mm/s]
+    feed: FloatArray = per_leg()
+
+    def __post_init__(self) -> None:
+        freeze(self, "first", np.int64, (None,))
+        freeze(self, "dwell", np.float64, (len(self.first),))
+        legs = len(self.length)
+        freeze_columns(self, {"leg": legs, "joint": legs + 1}, len(self.axes))
 
     def __len__(self) -> int:
         return len(self.length)
@@ -109,18 +189,30 @@ class Guide(ABC):
         T2, T1 = sorted(self.profile_filters or (0.0, 0.0))
         return np.full(self.runs, T1), np.full(self.runs, T2)
 
+    def pick(self, chosen: Array) -> Self:
+        """The runs `chosen` (S,), each shifted to where the one before ends, without the dwells: good for
+        planning only."""
+        columns = picked(self, chosen_rows(self.first, chosen))
+        along = np.cumsum(columns["length"][:, None] * columns["direction"], axis=0)
+        columns["point"] = np.vstack([np.zeros((1, len(self.axes))), along])
+        columns["s"] = np.concatenate([[0.0], np.cumsum(columns["length"])])
+        first = np.concatenate([[0], np.cumsum(np.diff(self.first)[chosen])])
+        return dataclasses.replace(self, first=first, dwell=np.zeros(len(first)), **columns)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LegGuide(Guide):
     """The legs of a program, with what paper 000's rules need of them."""
 
     lines: Toolpath  # the toolpath with its arcs as chords
-    joint_at: Array  # (R+1,) index of each joint among those of `lines`
-    slower: Array  # (R,) True where the program asks for less than on another leg of the run
-    a_max: FloatArray  # (R,) acceleration along the leg that the axes allow [mm/s2]
-    j_max: FloatArray  # (R,) jerk along the leg that the axes allow [mm/s3]
-    tol: FloatArray  # (R+1,) contour error budget at the joint [mm]
-    sin_half: FloatArray  # (R+1,) sine of half the turning angle at the joint, 0 at full stops
+    joint_at: Array = per_joint(np.int64)  # (R+1,) index of each joint among those of `lines`
+    slower: Array = per_leg(
+        np.bool_
+    )  # (R,) True where the program asks for less than on another leg of the run
+    a_max: FloatArray = per_leg()  # (R,) acceleration along the leg that the axes allow [mm/s2]
+    j_max: FloatArray = per_leg()  # (R,) jerk along the leg that the axes allow [mm/s3]
+    tol: FloatArray = per_joint()  # (R+1,) contour error budget at the joint [mm]
+    sin_half: FloatArray = per_joint()  # (R+1,) sine of half the turning angle at the joint, 0 at full stops
 
     @property
     def budget(self) -> FloatArray:

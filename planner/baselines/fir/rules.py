@@ -40,6 +40,11 @@ the cubic zone is V1 V2/(V1^(1/3) + V2^(1/3))^3 <= sqrt(V1 V2)/8, with equality 
 would be too small.
 
 Neighbours on a leg that is run through in Tv do not disturb each other's error if Tk_i + Tk_{i+1} <= Tv + Td.
+
+Peaks of the axes within an isolated corner (Tv >= Td), with eta = (Tk - T2)/T2 clipped to [0, 1]:
+
+    acceleration  max(|w1 - eta w2|, |w2 - eta w1|) / T1
+    jerk          max(|w1|, |w2|;  |w1 + w2| if 0 < Tk < 2 T2;  |w2 - w1| if Tk > T1) / (T1 T2)
 """
 
 from __future__ import annotations
@@ -56,6 +61,9 @@ from planner.baselines.fir.schedule import Schedule
 from planner.corners.budget import largest_normal
 from planner.corners.fir import overlap_time
 from planner.machine import Machine
+
+# Pulses that were made to reach their limits exactly may exceed them by rounding [-].
+LIMIT_ROUNDING = 1e-9
 
 
 def corner_error(
@@ -103,6 +111,37 @@ def overlap_beside(
     return np.minimum(overlap, np.maximum(room / 2, room - neighbour))
 
 
+def overlap_within_limits(
+    overlap: FloatArray,
+    w1: FloatArray,
+    w2: FloatArray,
+    T1: FloatArray,
+    T2: FloatArray,
+    acceleration: FloatArray,
+    jerk: FloatArray,
+) -> FloatArray:
+    """The longest overlap (n,), at most `overlap`, at which an isolated corner keeps the axes' limits.
+
+    w1, w2             : (n, A) velocities of the pulses [mm/s], each within the limits by itself
+    T1, T2             : (n,) filters [s]
+    acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
+    """
+    delay = T1 + T2
+    a_room = acceleration * T1[:, None] * (1 + LIMIT_ROUNDING)
+    j_room = jerk * (T1 * T2)[:, None] * (1 + LIMIT_ROUNDING)
+    eta = np.ones(len(overlap))  # the largest that is allowed
+    for one, other in ((w1, w2), (w2, w1)):
+        opposed = one * other < 0
+        room = np.divide(a_room - np.abs(one), np.abs(other), out=np.ones_like(one), where=opposed)
+        eta = np.minimum(eta, np.clip(room.min(axis=1), 0.0, 1.0))
+    overlap = np.where(eta < 1, np.minimum(overlap, T2 * (1 + eta)), overlap)
+    apart = (np.abs(w2 - w1) > j_room).any(axis=1)
+    overlap = np.where(apart, np.minimum(overlap, T1), overlap)
+    along = (np.abs(w1 + w2) > j_room).any(axis=1)
+    partial = (overlap < 2 * T2) & (overlap < delay)
+    return np.where(along & partial, 0.0, overlap)
+
+
 # More joints than this to one side of a flow joint are taken together.
 FLOW_JOINTS = 24
 # Steps in which the speed of a flow joint is lowered, and what one may leave of it [-]: the error falls with
@@ -119,6 +158,7 @@ def schedule(
     speed_max : (R,) largest speed on each leg [mm/s]
     T1, T2    : (S,) filters of each run [s]
     """
+    a, j = (machine.limits(q, guide.lines.axes) for q in ("acceleration", "jerk"))
     filters = np.stack([T1, T2])[:, guide.run]  # of each leg
     speed = np.minimum(speed_max, filters[0] * np.minimum(guide.a_max, filters[1] * guide.j_max))
     overlap, passing = np.zeros(len(guide) + 1), np.full(len(guide) + 1, np.inf)
@@ -139,7 +179,8 @@ def schedule(
         leg, other = at + side, at + 2 * side + 1
         shorter = overlap_beside(overlap[at], overlap[other], guide.length[leg] / speed[leg], delay[leg])
         waiting[waits] = np.minimum(waiting[waits], np.where(tied[other], shorter, np.inf))
-    overlap[at] = waiting[waits]
+    w = guide.direction * speed[:, None]
+    overlap[at] = overlap_within_limits(waiting[waits], w[at - 1], w[at], T1_at[waits], T2_at[waits], a, j)
     return Schedule(
         guide=guide, T1=T1, T2=T2, speed=speed, passing=passing, overlap=overlap, holding=guide.slower
     )

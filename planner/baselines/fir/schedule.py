@@ -17,7 +17,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command, VelocityPulses, command_of, lower_between
-from planner.baselines.fir.guide import LegGuide
+from planner.baselines.fir.guide import LegGuide, per_joint, per_leg
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
@@ -36,12 +36,16 @@ HASTE = 0.02
 class Schedule(SpeedPlan):
     """Speeds and overlaps of a guide of R legs."""
 
-    rows = SpeedPlan.rows | {"speed": "leg", "passing": "joint", "overlap": "joint", "holding": "leg"}
     guide: LegGuide
-    speed: FloatArray  # (R,) largest speed on each leg [mm/s]
-    passing: FloatArray  # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
-    overlap: FloatArray  # (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
-    holding: Array  # (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
+    speed: FloatArray = per_leg()  # (R,) largest speed on each leg [mm/s]
+    passing: FloatArray = per_joint(
+        finite=False
+    )  # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
+    # (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
+    overlap: FloatArray = per_joint()
+    holding: Array = per_leg(
+        np.bool_
+    )  # (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
 
     def at_joints(self) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the run that each joint lies in (the last joint: of the last one)."""
@@ -70,7 +74,7 @@ class Schedule(SpeedPlan):
         n    : rounds before this one; from `ROUNDS` on the guide is run from joint to joint
         """
         if n >= ROUNDS - 1:
-            return _stopping(self, made.wrong[self.guide.run])
+            return _stopping(self)
         return _slower(self, made, slowing(made.seen.worst, max(SLOWEST, 1.0 - HASTE * n)))
 
 
@@ -140,12 +144,12 @@ def _leg_times(guide: LegGuide, command: Command) -> tuple[FloatArray, FloatArra
     return t[first], np.where(standing, t[last], np.append(t[first[1:]], t[-1]))
 
 
-def _stopping(plan: Schedule, legs: Array) -> Schedule:
-    """Full stops at all joints of the `legs` (R,), and half the speed."""
-    inner = plan.guide.inner & np.append(legs, False)
+def _stopping(plan: Schedule) -> Schedule:
+    """Full stops at all joints, and half the speed."""
+    inner = plan.guide.inner
     return dataclasses.replace(
         plan,
-        speed=np.where(legs, plan.speed / 2, plan.speed),
+        speed=plan.speed / 2,
         passing=np.where(inner, np.inf, plan.passing),
         overlap=np.where(inner, 0.0, plan.overlap),
     )

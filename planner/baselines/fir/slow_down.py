@@ -2,23 +2,25 @@
 is exceeded, repeat.
 
 How a plan gets slower is the paper's affair (`SpeedPlan.slower`); it must come to an end. Runs between full
-stops do not know of each other: one whose motion exceeds nothing stays as it is, and of several plans each
-run has the one that is fastest for it.
+stops do not know of each other: each is done as soon as its motion exceeds nothing.
+
+Several plans, each with the time that it promises, are settled in the order of what they promise, for each
+run by itself.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command
-from planner.baselines.fir.guide import Guide
+from planner.baselines.fir.guide import Guide, chosen_rows, freeze_columns, per_run, picked, put_back
 from planner.baselines.fir.measure import Measured, measure
 from planner.baselines.fir.superpose import Filtered, superpose
 from planner.machine import Machine
@@ -31,6 +33,8 @@ RATIO_ROUNDING = 5e-7
 # One round slows down by the root of what is exceeded, since most of it falls with the square of the speed,
 # and a little more, but not to less than half [-].
 BEYOND, SLOWEST = 0.995, 0.5
+# A plan is settled if it promises to save this fraction of the time [-].
+WORTH = 2e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,13 +42,16 @@ class SpeedPlan(ABC):
     """How fast a guide is commanded, and the filters of its S runs.
 
     T1, T2 : (S,) T1 >= T2 [s]
-    rows   : the fields with a row for each "run", "leg" or "joint"
     """
 
-    rows: ClassVar[dict[str, str]] = {"T1": "run", "T2": "run"}
     guide: Guide
-    T1: FloatArray
-    T2: FloatArray
+    T1: FloatArray = per_run()
+    T2: FloatArray = per_run()
+
+    def __post_init__(self) -> None:
+        legs = len(self.guide)
+        sizes = {"run": self.guide.runs, "leg": legs, "joint": legs + 1}
+        freeze_columns(self, sizes, len(self.guide.axes))
 
     @abstractmethod
     def command(self) -> Command:
@@ -56,11 +63,20 @@ class SpeedPlan(ABC):
 
     @abstractmethod
     def slower(self, made: Made, machine: Machine, n: int) -> Self:
-        """A slower plan, with the same for runs that exceed nothing.
+        """A slower plan, of which only runs that exceed something are used.
 
         made : the motion of this plan
         n    : rounds before this one
         """
+
+    def pick(self, chosen: Array) -> Self:
+        """The plan of the runs `chosen` (S,) of its guide."""
+        columns = picked(self, chosen_rows(self.guide.first, chosen))
+        return dataclasses.replace(self, guide=self.guide.pick(chosen), **columns)
+
+    def put(self, chosen: Array, plan: Self) -> Self:
+        """This plan with `plan`, of these runs alone, for the runs `chosen` (S,)."""
+        return dataclasses.replace(self, **put_back(self, chosen_rows(self.guide.first, chosen), plan))
 
 
 class Made(NamedTuple):
@@ -73,11 +89,6 @@ class Made(NamedTuple):
     def largest(self, ratio: FloatArray) -> FloatArray:
         """(S,) the largest of a measured `ratio` (n,) in each run [-]."""
         return np.maximum.reduceat(ratio, np.searchsorted(self.seen.t, self.motion.begin))
-
-    @property
-    def wrong(self) -> Array:
-        """(S,) True for runs that exceed something."""
-        return np.asarray(self.largest(self.seen.worst) > 1.0 + RATIO_ROUNDING)
 
 
 P = TypeVar("P", bound=SpeedPlan)
@@ -99,22 +110,46 @@ def slowing(ratio: FloatArray, most: float = BEYOND) -> FloatArray:
 
 def slow_down(plan: P, machine: Machine) -> P:
     """Slow a plan down until it keeps tolerance and limits, or `ROUNDS` times."""
+    left = np.ones(plan.guide.runs, bool)
     for n in range(ROUNDS):
-        made = make(plan, machine)
-        if not made.wrong.any():
+        chosen = plan.pick(left)
+        made = make(chosen, machine)
+        wrong: Array = made.largest(made.seen.worst) > 1.0 + RATIO_ROUNDING
+        if not wrong.any():
             break
-        plan = plan.slower(made, machine, n)
+        slower = chosen.slower(made, machine, n).pick(wrong)
+        left[left] = wrong
+        plan = plan.put(left, slower)
     return plan
 
 
-def fastest_of(plans: Iterable[P], machine: Machine) -> P:
-    """Some plans of one guide, slowed down: each run with the one that is fastest for it."""
-    slowed = [slow_down(plan, machine) for plan in plans]
-    best = np.argmin([plan.time() for plan in slowed], axis=0)
-    run = slowed[0].guide.run
-    which = {"run": best, "leg": best[run], "joint": best[np.append(run, run[-1])]}
-    columns = {
-        name: np.stack([getattr(plan, name) for plan in slowed])[which[of], np.arange(len(which[of]))]
-        for name, of in slowed[0].rows.items()
-    }
-    return dataclasses.replace(slowed[0], **columns)
+def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> P:
+    """The fastest of a few plans of one guide once they are slowed down, each run with what is most promising
+    for it.
+
+    times : (K, S) what the K plans promise [s]; slowed down they take longer
+    """
+    best, time = plans[0], np.full(times.shape[1], np.inf)
+    for rank in np.argsort(times, axis=0, kind="stable"):
+        promised = np.take_along_axis(times, rank[None], axis=0)[0]
+        tried = promised < time * (1 - WORTH)
+        if not tried.any():
+            break
+        new = slow_down(_mixed(plans, rank).pick(tried), machine)
+        new_time = new.time()
+        better = new_time < time[tried]
+        taken = tried.copy()
+        taken[tried] = better
+        if better.any():
+            best = best.put(taken, new.pick(better))
+        time[taken] = new_time[better]
+    return best
+
+
+def _mixed(plans: Sequence[P], which: Array) -> P:
+    """Each run with its own (S,) of the plans."""
+    mixed = plans[0]
+    for k in range(1, len(plans)):
+        if (which == k).any():
+            mixed = mixed.put(which == k, plans[k].pick(which == k))
+    return mixed

@@ -24,7 +24,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.baselines.fir.chord_guide import ChordGuide, guide_of_path
-from planner.baselines.fir.chord_speeds import ChordSpeeds, fastest_speeds, v_sc
+from planner.baselines.fir.chord_speeds import ChordSpeeds, fastest_speeds, promised, v_sc
 from planner.baselines.fir.guide import check_profile_filters
 from planner.baselines.fir.superpose import axes_of, reached, superpose
 from planner.corners.bezier import BezierCorner
@@ -43,9 +43,8 @@ ROUNDING_FRACTION = 0.1
 # Interpolation error of the grid that the chords start from, as of feedrate/sampling/samples.py: they are
 # refined by the angle they turn.
 RESOLUTION = 0.05
-# Corners that turn by more may become full stops, all of them, where that is faster: the filters may change
-# there [rad].
-STOP_ANGLE = np.deg2rad(25.0)
+# Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
+STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))
 # Phase lag phi of v_ph [rad]: up to it the second-order error is good to 1 % (docs/papers.md).
 PHASE_LAG = 0.5
 
@@ -79,16 +78,12 @@ class FirSplineMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         with job.stage("geometry"):
-            toolpath, machine = job.toolpath, job.machine
-            sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > STOP_ANGLE)
-            tried = [toolpath, toolpath.with_joints(sharp, Joint.STOP)][
-                : 1 + (sharp.any() and not self.plain)
-            ]
-            guides = [guide_of(one, machine, self.profile_filters) for one in tried]
+            stopping = job.toolpath if self.plain else self._with_stops(job.toolpath, job.machine)
+            guide = guide_of(stopping, job.machine, self.profile_filters)
         with job.stage("solve"):
-            plans = ((self._plain if self.plain else fastest_speeds)(guide, machine) for guide in guides)
-            speeds = min(plans, key=lambda plan: plan.time().sum())
-            motion = _motion(speeds, toolpath)
+            alone = guide.pick(np.ones(guide.runs, bool))
+            speeds = self._plain(alone, job.machine) if self.plain else fastest_speeds(alone, job.machine)
+            motion = _motion(dataclasses.replace(speeds, guide=guide), job.toolpath)
         delay = 1e3 * (speeds.T1 + speeds.T2)
         return job.plan(
             job.deliver(motion, as_it_is=True) if self.plain else job.deliver_in_time(motion),
@@ -97,8 +92,29 @@ class FirSplineMethod(Method):
             solver="filters",
             status=Status.ACCEPTABLE,
             sentence=f"filters of {delay.min():.3g} to {delay.max():.3g} ms in all",
-            grid_points=len(speeds.guide) + speeds.guide.runs,
+            grid_points=len(guide) + guide.runs,
         )
+
+    def _with_stops(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
+        """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by
+        itself: at a full stop the filters may change."""
+        ends = np.flatnonzero(toolpath.joint == Joint.STOP)
+        best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
+        for angle in STOP_ANGLES:
+            sharp = (toolpath.joint == Joint.CORNER) & (toolpath.theta > angle)
+            if not sharp.any() and np.isfinite(best_time).all():
+                continue
+            stopping = toolpath.with_joints(sharp, Joint.STOP)
+            joint = stopping.joint
+            guide = guide_of(stopping, machine, self.profile_filters)
+            time = promised(guide.pick(np.ones(guide.runs, bool)), machine)[1].min(axis=0)
+            run = np.searchsorted(ends, np.flatnonzero(joint == Joint.STOP)[:-1], side="right") - 1
+            time = np.bincount(run, time, len(ends) - 1)
+            better = np.append(time < best_time, False)[
+                np.searchsorted(ends, np.arange(len(joint)), side="right") - 1
+            ]
+            best, best_time = np.where(better, joint, best), np.minimum(time, best_time)
+        return dataclasses.replace(toolpath, joint=best)
 
     def _plain(self, guide: ChordGuide, machine: Machine) -> ChordSpeeds:
         """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19) with the largest v_p of each run, and v_sc (par.

@@ -8,7 +8,7 @@ from guides import corner, guide_through, machine_of, overlapping
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.baselines.fir.rules import corner_error, overlap_beside, overlap_within
+from planner.baselines.fir.rules import corner_error, overlap_beside, overlap_within, overlap_within_limits
 from planner.baselines.fir.slow_down import make
 from planner.corners.fir import overlap_time
 from planner.planning.methods.fir import motion_of
@@ -165,6 +165,33 @@ def test_the_smaller_speed_would_be_unsafe():
     }
     assert by[10.0] < 0.5 * missed
     assert missed <= by[np.sqrt(1000.0)]
+
+
+@given(
+    theta=thetas,
+    turn=st.floats(0, 6.3),
+    T1=st.floats(0.01, 0.1),
+    ratio=st.floats(0.05, 1.0),
+    share=st.floats(0.0, 1.0),
+)
+@settings(max_examples=80)
+def test_overlaps_within_limits_keep_them(theta, turn, T1, ratio, share):
+    """The longest overlap at which two pulses at their limits stay within them, measured on the motion."""
+    T2 = T1 * ratio
+    a, j = V / T1, V / (T1 * T2)
+    c, s = np.cos(turn), np.sin(turn)
+    points = corner(theta, 50.0, 3) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    machine = machine_of(velocity=1e4, acceleration=a, jerk=j)
+    guide = guide_through(points, machine)
+    w = guide.direction * V
+    ones = np.ones(1)
+    Tk = overlap_within_limits(
+        ones * share * (T1 + T2), w[:1], w[1:], ones * T1, ones * T2, np.full(3, a), np.full(3, j)
+    )[0]
+    assert 0 <= Tk <= share * (T1 + T2)
+    made = make(overlapping(guide, Tk, T1, T2), machine)
+    assert made.seen.acceleration.max() <= 1 + 1e-6
+    assert made.seen.jerk.max() <= 1 + 1e-6
 
 
 def test_neighbours_stay_apart():

@@ -30,8 +30,8 @@ from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
 # Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations. At
-# the largest the durations stay, so that the kinematics are linear and a step closes them: at 1e4 they crept on,
-# and one window of four that fail did so for gaps that this left.
+# the largest the durations stay, so that the kinematics are linear and a step closes them: at 1e4 they creep on,
+# and windows go on to the last iteration for the gaps that this leaves.
 FREEZE, FROZEN = 2.5, 1e8
 # The time has settled when it changes by no more than this share of the complementarity asked for in so many
 # iterations in a row, and at last after so many at that complementarity: frozen as soon as that is reached,

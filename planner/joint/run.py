@@ -46,6 +46,8 @@ from planner.machine import LINEAR_AXES, Machine
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+# Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
+# axis by the budget [-]: finer ones take more steps and end hardly sooner.
 SHARP = 0.25
 ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 

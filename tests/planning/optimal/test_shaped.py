@@ -28,12 +28,12 @@ def pentagon():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["optimal", "second-order"])
-def test_pentagon_does_not_ring_and_is_about_as_fast_as_filters(pentagon, method):
+def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
     """Without shaping it rings with 0.8 mm; method fir, which chooses its filters for the mode, takes 1.0419 s."""
     made = plan(pentagon, SHAKEN, method=method, shaped=True)
     assert made.verdict.passed
     assert left(made) < LEFT
-    assert made.trajectory.cycle_time < 1.002 * plan(pentagon, SHAKEN, method="fir").trajectory.cycle_time
+    assert made.trajectory.cycle_time < plan(pentagon, SHAKEN, method="fir").trajectory.cycle_time
     assert "shaped for 1 vibration modes" in made.sentence
 
 

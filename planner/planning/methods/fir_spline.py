@@ -97,7 +97,8 @@ class FirSplineMethod(Method):
 
     def _with_stops(self, toolpath: Toolpath, machine: Machine) -> Toolpath:
         """The toolpath with full stops at its sharp corners where that promises to be faster, for each run by
-        itself: at a full stop the filters may change."""
+        itself: at a full stop the filters may change. Where it turns right back the rounded path rests."""
+        toolpath = toolpath.resting()
         ends = np.flatnonzero(toolpath.joint == Joint.STOP)
         best, best_time = toolpath.joint, np.full(len(ends) - 1, np.inf)
         for angle in STOP_ANGLES:

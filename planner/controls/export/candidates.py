@@ -145,7 +145,10 @@ class Candidates:
         control = self.control
         if row.radius:  # which the control would reckon with once more
             return not control.cycles
-        return (planned and row.motion <= 30) or not takes_move(row, control, self.source.program.reading)
+        own = row.value("E") is not None  # an extruder's moves stay, where the control knows them
+        return (planned and row.motion <= 30 and not own) or not takes_move(
+            row, control, self.source.program.reading
+        )
 
     @cached_property
     def feed_in_force(self) -> FloatArray:

@@ -163,7 +163,7 @@ def groups(rows: list[Row], replaced: Array) -> list[Group]:
             found[-1] = Group(last.first, row.last, last.replaced, last.placed)
         else:
             found.append(Group(row.first, row.last, chords, row.placed))
-        parted = shifts
+        parted = shifts or row.feeds
     return found
 
 
@@ -174,7 +174,13 @@ def breaks(rows: list[Row], replaced: Array) -> Array:
     """
     found: set[int] = set()
     for row, chords in zip(rows, replaced.tolist(), strict=True):
-        if not chords or row.others or any(word.letter in "SMT" for word in row.words) or row.motion > 30:
+        if (
+            not chords
+            or row.others
+            or row.feeds
+            or any(word.letter in "SMT" for word in row.words)
+            or row.motion > 30
+        ):
             found |= {row.first, row.last}
     return np.array(sorted(found), dtype=np.int64)
 

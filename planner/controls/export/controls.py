@@ -15,9 +15,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 
-from planner.controls.export.rows import G92, RETRACTIONS, Row, Word
+from planner.controls.export.rows import G10, G92, RETRACTIONS, Row, Word
 from planner.nc import codes
 from planner.nc.reading import ABSOLUTE, Reading
+from planner.nc.settings import EVERYTHING
 
 _STAYS = "this control always stays on the path"
 _ONE_ZERO = "this control has no work offsets: its zero is the program's"
@@ -25,6 +26,7 @@ _STRAIGHT = "what it would choose is written out as straight moves"
 _RPM = "S is in revolutions per minute there anyway"
 _OPERATOR = "what the operator may override is this control's own"
 _NOT_USED = "the control has no such mode"
+_ALL_OFF = "this control does not look at its words, and would let go of all motors at once"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +45,9 @@ class Control:
     # codes ("G64") that change nothing of what it does, and why
     idle: dict[str, str] = field(default_factory=dict)
     instead: dict[str, str] = field(default_factory=dict)  # M codes ("M6"), and what is written for them
+    # settings ("M84") that mean more where it does not look at words of these letters, and why they are then
+    # left out; "" where they are refused
+    unheard: dict[str, tuple[str, str]] = field(default_factory=dict)
     letters: str  # of the words that it takes beside those of codes; axes are among them
     one_command: bool = False  # a line holds one code, at its start, and moves have G0 or G1 on every line
     rapid_feed: bool = False  # G0 moves at the F in force
@@ -101,7 +106,11 @@ KLIPPER = Control(
     g=frozenset((0, 10, 40, 210, 280, 900, 910, 920)),
     m=frozenset(),
     settings=_PRINTER - {17} | {73, 110, 112} | set(range(20, 28)),
-    idle=_IDLE_ON_PRINTERS,
+    idle={**_IDLE_ON_PRINTERS, "M17": "motors are on from their first move"},
+    unheard={
+        **dict.fromkeys(("M18", "M84"), (EVERYTHING, _ALL_OFF)),  # klippy/extras/stepper_enable.py
+        **dict.fromkeys(("M109", "M190"), ("R", "")),  # without S it would switch the heater off
+    },
     instead={"M0": "PAUSE", "M1": "PAUSE", "M60": "PAUSE", "M6": "PAUSE"},
     letters="FXYZE",
     one_command=True,
@@ -116,6 +125,8 @@ MARLIN = replace(
     KLIPPER,
     name="marlin",
     m=frozenset((0, 1, 3, 4, 5, 7, 8, 9)),
+    idle=_IDLE_ON_PRINTERS,
+    unheard={},
     settings=_PRINTER | {73, 75, 76, 77, 85, 110, 111, 112, 113, 155, 201, 203, 205, 301, 302, 420, 851, 900},
     instead={"M60": "M0", "M6": "M0"},
     number=False,  # a line number needs a checksum on the serial line
@@ -150,9 +161,20 @@ def is_setting(words: list[Word], control: Control) -> bool:
     """Whether the control knows a code that moves no axis, with its words: a setting, a retraction, G92 E."""
     first, letters = words[0], {word.letter for word in words}
     if first.letter == "M":
-        return first.code % 10 == 0 and first.code // 10 in control.settings
+        known = first.code % 10 == 0 and first.code // 10 in control.settings
+        unheard, _ = control.unheard.get(f"M{first.code // 10}", ("", ""))
+        return known and letters.isdisjoint(unheard)
     retracts = first.code in RETRACTIONS and letters == {"G"}
     return control.one_command and (retracts or (first.code == G92 and letters <= set("GE")))
+
+
+def sets_tools(row: Row) -> bool:
+    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows
+    neither."""
+    kind = row.value("L")
+    more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
+    lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)
+    return (G10 in row.g() and more) or lengths
 
 
 def takes_move(row: Row, control: Control, reading: Reading) -> bool:

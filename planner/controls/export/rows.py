@@ -10,7 +10,8 @@ before. Everything else stays a line of its own:
     G53, G28, G30, homing                  machine coordinates; what they move has no place in the program's coordinates afterwards
     M6                                     the control may go to where it changes tools, or the operator may move it
     G54 to G59.3, G10, G52, G92, G43, G49  they shift those coordinates: all axes are placed anew (G92 places those that it names)
-    rotary and second axes, E              chords have X, Y and Z only
+    rotary and second axes                 chords have X, Y and Z only
+    E of an extruder                       beside straight moves; arcs that a printer does not know share theirs among their chords
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
 ENDS = frozenset((20, 300))  # M2 and M30, in tenths
 _TOOL_CHANGE = 6
 _ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
+_FLAG = re.compile(r"([A-FH-LP-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)|)[ \t]*", re.IGNORECASE)
+_FLAGS = re.compile(f"(?:{_FLAG.pattern})+", re.IGNORECASE)
 _IN_PLANE = {170: "XY", 180: "XZ", 190: "YZ"}
 
 
@@ -161,10 +164,13 @@ def _rows(words: Words, applied: Words, program: Program) -> list[Row]:
     ignored = frozenset(program.reading.ignore)
     rows, begun = [], False
     for r, line in enumerate(words.line.tolist()):
-        found, text = [], ""
+        found: list[Word] = []
+        text = ""
         for w in range(first[r], first[r + 1]):
             if letters[w] == FAULT:
-                text = text or _text(words, first[r])
+                flags = _flags(found, _text(words, w))
+                found += flags
+                text = text or ("" if flags else _text(words, first[r]))
             elif letters[w] != ord("N"):
                 number = words.text(w)[1:].replace(" ", "").replace("\t", "").lstrip("+")
                 found.append(Word(chr(letters[w]), values[w], number if same[w] else flat_number(values[w])))
@@ -178,6 +184,16 @@ def _rows(words: Words, applied: Words, program: Program) -> list[Row]:
             break
         begun = True
     return rows
+
+
+def _flags(before: list[Word], rest: str) -> list[Word]:
+    """The words of a line from a letter without a number on: M84 X Y E says which motors, M420 V only that it
+    is told. None where the line is not that of a setting to which they all belong."""
+    alone = [word.letter for word in before if word.letter in "GM"] == ["M"] and before[0].letter == "M"
+    found = setting("M", before[0].code, "", "") if alone and _FLAGS.fullmatch(rest) else None
+    if found is None or found.own != EVERYTHING:
+        return []
+    return [Word(c.upper(), float(number or "nan"), number) for c, number in _FLAG.findall(rest)]
 
 
 def _text(words: Words, word: int) -> str:
@@ -323,7 +339,7 @@ class _Follower:
             and not self.program.origins.at(row.first)[1]
             and (self.simple[blocks] | (cycle & (self.program.kind[blocks] >= Kind.DWELL))).all()
             and not any(self.turns[letter][blocks].any() for letter in self.turns)
-            and row.value("E") is None
+            and (row.value("E") is None or row.motion not in codes.CYCLES)
             and (self.absolute or not self.extrudes)  # G90 and G91 between chords would change what E is
             and self.ignored.isdisjoint(named)
         )
@@ -332,12 +348,3 @@ class _Follower:
 def _is_arc(row: Row, g: list[int]) -> bool:
     """Whether a row under G2 or G3 is a full circle, which needs no coordinate."""
     return not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
-
-
-def sets_tools(row: Row) -> bool:
-    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows
-    neither."""
-    kind = row.value("L")
-    more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
-    lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)
-    return (G10 in row.g() and more) or lengths

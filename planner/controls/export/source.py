@@ -13,8 +13,8 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
-from planner.controls.export.controls import Control, is_command, is_setting, takes_move
-from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word, rows_of, sets_tools
+from planner.controls.export.controls import Control, is_command, is_setting, sets_tools, takes_move
+from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word, rows_of
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.language.detect import without_leader

@@ -42,6 +42,8 @@ class Switches(Output):
             self._say(text)
         elif name in self.program.reading.ignore:
             self._note(name, f"{name} is left out, as --ignore says", row)
+        elif why := self.control.idle.get(name) or self.control.unheard.get(name, ("", ""))[1]:
+            self._note(name, f"{text} is left out: {why}", row)
         else:
             self._refuse(row, text)
 

@@ -7,16 +7,18 @@ same coordinates.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.controls.export.chords import DECIMALS, Polyline
-from planner.controls.export.controls import GRBL, Control, takes_move
+from planner.controls.export.chords import DECIMALS, LINEAR, Polyline
+from planner.controls.export.controls import GRBL, Control, sets_tools, takes_move
+from planner.controls.export.filament import Filament
 from planner.controls.export.output import INCH_DECIMALS
-from planner.controls.export.rows import G4, G10, G53, HOMES, LENGTHS, Row, Source, Word, sets_tools
+from planner.controls.export.rows import G4, G10, G53, HOMES, LENGTHS, Row, Source, Word
 from planner.controls.export.switches import Switches
 from planner.machine import Machine
 from planner.nc import codes
@@ -53,6 +55,7 @@ class Translator(Switches):
         super().__init__(source, control, machine)
         self.replaced, self.line, self.rapid = replaced, line, rapid
         self.move = 0  # of the polyline
+        self.filament = Filament(control, machine)
 
     def translated(self) -> Translation:
         """The whole program. Raises InputError for the first line that the control has no words for."""
@@ -84,6 +87,7 @@ class Translator(Switches):
             self._chords(row)
         elif row.named or row.moves or _one_shot(row) >= 0 or (row.feeds and self.control.extruder):
             self._move(row)
+        self.filament.follow(row)
         self._pass(row)
         self._stops(row)
 
@@ -153,6 +157,8 @@ class Translator(Switches):
     def _why_kept(self, row: Row) -> str:
         if not row.per_minute:
             return "its feed is not per minute"
+        if self.extrudes and not row.absolute:
+            return "it is under G91, where E is a step; write it under G90"
         away = [c for c in "XYZ" if c not in row.placed]
         return (
             f"the program does not say where {' and '.join(away)} are before it"
@@ -203,6 +209,7 @@ class Translator(Switches):
         offset = self.program.origins.at(row.first)[0]
         rests = [k for k in range(row.first, row.last) if self.program.kind[k] == Kind.DWELL]
         stop = int(np.searchsorted(line.block, row.last))
+        fed = self._shared(row, line.points[self.move : stop + 1, :LINEAR])
         while self.move < stop or rests:
             k = self.move
             if rests and (k >= stop or line.block[k] > rests[0]):
@@ -215,8 +222,10 @@ class Translator(Switches):
                 if end[a] != start[a]
             ]
             self.move += 1
+            feeds = next(fed)
             if not words:
                 continue
+            words += feeds
             code = "G0" if line.rapid[k] else "G1"
             head = [code] if code != self.motion or self.control.one_command else []
             self.motion = code
@@ -224,6 +233,16 @@ class Translator(Switches):
                 speed = float(self.rapid[k] if line.rapid[k] else line.feed[k])
                 words += self._feed_of(max(speed, FEED_MIN) * SECONDS_PER_MINUTE / unit, as_is=False)
             self._say_move(row, self._distance(absolute=True), [*head, *words])
+
+    def _shared(self, row: Row, points: FloatArray) -> Iterator[list[str]]:
+        """The E words of the chords of a row between points (n+1, 3) [mm]."""
+        if not (row.feeds and self.control.extruder):
+            return iter([[]] * (len(points) - 1))
+        shares = self.filament.shared(row, points)
+        if shares is None:
+            what = f"{row.value('E')} of an arc as chords, while nothing says where E is before it, as G92 E0 and M83 would"
+            self._refuse(row, what)
+        return iter([f"E{plain(share)}"] for share in shares)
 
     def _pass(self, row: Row) -> None:
         """Leave the moves of the polyline that the row's own words have made."""

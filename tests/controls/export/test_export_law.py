@@ -131,6 +131,87 @@ def test_filament_is_counted_as_printers_do() -> None:
     assert filament(text, "marlin")[:, [0, 3]].tolist() == [[1, 1], [1, 1], [3, 1.5]]
 
 
+ARCS = """G21
+G90
+{mode}
+G92 E0
+G1 X6 Y0 Z0.3 E0.2 F1500 ; told
+G3 X0 Y6 I-6 J0 {first}
+G1 X-4 {line}
+G2 X-4 Y6 I3.5 J0 Z0.8 {round}
+G1 X1 Y1 {way}
+G3 X4 Y4 I0 J3 {last}
+(kept from going as it is)
+M400
+"""
+PLACES = {"mode": "M82", "first": "E1.4", "line": "E1.6", "round": "E2.9 F900", "way": "E2.9", "last": "E2.1"}
+STEPS = {"mode": "M83", "first": "E1.2", "line": "E0.2", "round": "E1.3 F900", "way": "E0", "last": "E-0.8"}
+
+BOTH = STEPS | {"way": "E0\nM82", "last": "E2.1"}  # places go on where steps end
+
+
+def _print(text: str, control: str, *, extruder: bool) -> Candidates:
+    axis = Axis(velocity=60.0, acceleration=3000.0, jerk=100000.0)
+    mill = machine()
+    printer = mill.model_copy(update={"axes": mill.axes | {"e": axis}}) if extruder else mill
+    reading = Reading(extruder="refuse" if extruder else "ignore")
+    program = planner.read_program(text=text, machine=printer, reading=reading)
+    return Candidates(planner.plan(program, printer, method="kinematic"), CONTROLS[control], TOLERANCE)
+
+
+@pytest.mark.parametrize("words", [PLACES, STEPS, BOTH])
+@pytest.mark.parametrize("extruder", [True, False])
+@pytest.mark.parametrize("control", ["klipper", "marlin"])
+def test_arcs_share_their_filament_along_the_way(control: str, extruder: bool, words: dict[str, str]) -> None:
+    """Filament against the way, by the control's own rules; ten times the filament, so that the tolerance is a tenth of it there."""
+    text = ARCS.format(**words)
+    job = _print(text, control, extruder=extruder)
+    for one in [*job.own(0.01), *job.chords(0.01, "chords")]:
+        out = job.written(one)[0].decode()
+        assert not unknown_words(out, control)
+        assert "G2" not in {line.split(" ")[0] for line in out.splitlines()}
+        there, back = (filament(each, control)[:, :4] * (1, 1, 1, 10) for each in (text, out))
+        assert alike(there, back, TOLERANCE)
+        assert filament(out, control)[-1, :4] == pytest.approx(filament(text, control)[-1, :4], abs=1e-9)
+
+
+def test_an_arc_whose_filament_is_not_known_is_refused() -> None:
+    """A place of E feeds what the one before leaves, which nothing tells at the start; G91 makes it a step."""
+    for text, said in (
+        ("G21 G90\nG0 X0 Y0\nG2 X4 Y0 I2 J0 E1 F600\n", r":3: E1 .*nothing says where E is"),
+        ("G21 G90\nG92 E0\nG0 X0 Y0\nG91\nG2 X4 Y0 I2 J0 E1 F600\n", r":5: G2 .*write it under G90"),
+    ):
+        job = _print(text, "klipper", extruder=False)
+        with pytest.raises(InputError, match=said):
+            job.written(job.own(0.01)[0])
+
+
+@pytest.mark.parametrize("setting", ["M84 X Y E", "M18 S30", "M84 Z0", "M17 X", "M84XE"])
+def test_motors_of_single_axes(setting: str) -> None:
+    """Marlin lets go of those named, and S only sets a time; Klipper's M18 and M84 let go of all at once, whatever stands beside
+    them, and Z may drop."""
+    text = f"G21\nG90\nG1 X9 E1 F600\n{setting}\nM117 done\n"
+    job = _print(text, "marlin", extruder=False)
+    assert not job.why_not
+    assert setting in job.written(job.own(0.01)[0])[0].decode().splitlines()
+    job = _print(text, "klipper", extruder=False)
+    data, notes = job.written(job.own(0.01)[0])
+    assert not unknown_words(data.decode(), "klipper")
+    assert b"M84" not in data
+    assert [note for note in notes if note.startswith("line 4: M") and "is left out" in note]
+    assert not _print("G21\nG1 X9 F600\nM84\n", "klipper", extruder=False).why_not
+
+
+def test_what_klipper_would_take_for_no_temperature_is_refused() -> None:
+    """It looks at S alone: M109 R180 would switch the heater off."""
+    text = "G21\nM109 {}180\nG1 X9 E1 F600\n"
+    assert not _print(text.format("S"), "klipper", extruder=False).why_not
+    assert not _print(text.format("R"), "marlin", extruder=False).why_not
+    job = _print(text.format("R"), "klipper", extruder=False)
+    with pytest.raises(InputError, match=":2: M109 R180"):
+        job.written(job.own(0.01)[0])
+
+
 @pytest.mark.parametrize("control", ["grbl", "linuxcnc"])
 def test_controls_without_an_extruder_say_what_they_leave_out(control: str) -> None:
     text = "G21 G90\nG0 X0 Y0\nG1 X9 E1 F600\nG1 E-1\nY9\nM2\n"

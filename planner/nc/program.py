@@ -100,8 +100,8 @@ class ToolPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class SetLimit:
-    """A limit that the program sets (nc/set_limits.py): "velocity" [mm/s] or "acceleration" [mm/s2] of an
-    axis, or "feed" [mm/s]."""
+    """A limit that the program sets (nc/set_limits.py): "velocity" [mm/s, deg/s] or "acceleration" [mm/s2,
+    deg/s2] of an axis, or "feed" [mm/s]."""
 
     quantity: str
     axis: str

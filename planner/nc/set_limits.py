@@ -1,16 +1,18 @@
 """Speed factors and limits that programs of printers and of grbl set, and the machine that they leave.
 
     M220 S50            F of what follows counts half; B keeps the factor, R brings it back (Marlin); Klipper and RepRapFirmware too
-    M201 X Y Z E        accelerations of axes [units/s2]
+    M201, M202 X Y Z E  accelerations of axes [units/s2]; M202 those of Repetier's travels
     M203 X Y Z E        speeds of axes: in units/s in Marlin, in units/min in RepRapFirmware, whose numbers go beyond `PER_MINUTE`
     M204 S, P, T        acceleration along the path [units/s2], of printing and travelling moves; R of the extruder alone
     SET_VELOCITY_LIMIT  VELOCITY and ACCEL of Klipper, along the path
-    $110= to $122=      speeds [mm/min] and accelerations of grbl's axes
+    $110= to $125=      speeds [mm/min, deg/min] and accelerations of grbl's axes
 
+Rotary and second axes have their letters there; of rotary ones they are in degrees, in programs in inch too.
 A factor is one of F and holds block by block. Limits are those of a machine, which is one for the whole
 motion: of all that were in force on a move the lowest holds throughout, which keeps each of them, and is said
-first where they change on the way. A limit along the path is one of every axis: on a diagonal the axes' own
-let the path have up to sqrt(3) of it. Limits above the machine's change nothing.
+first where they change on the way. A limit of the acceleration along the path is one of every axis: on a
+diagonal the axes' own let the path have up to sqrt(3) of it, which is said too. Limits above the machine's
+change nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.machine import Machine
+from planner.machine import EXTRUDER, ROTARY_AXES, Machine
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
@@ -29,12 +31,12 @@ from planner.nc.program import MOVES, SetLimit
 from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
 
-SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", "M201", "M204"
+SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", ("M201", "M202"), "M204"
 # From this value on M203 is in units per minute: no printer moves at a metre a second, and RepRapFirmware's x
 # and y are above 17 mm/s.
 PER_MINUTE = 1000.0
-_AXES = "xyze"
-EVERY_AXIS = "xyz"
+EVERY_AXIS = "xyzabcuvw"
+_AXES = EVERY_AXIS + EXTRUDER
 FEED = "feed"  # what VELOCITY bounds beside the axes
 
 
@@ -46,7 +48,7 @@ class LimitsInForce:
         self._now: dict[tuple[str, str], float] = {}
         self._seen: list[dict[tuple[str, str], float]] = []  # on moves
         self._blocks = 0  # that were looked at
-        self._line = 0  # of the first that is set
+        self._line = self._along = 0  # of the first that is set, of the first acceleration along the path
         self._kept = 1.0  # factor that M220 B keeps
 
     def take(
@@ -80,12 +82,18 @@ class LimitsInForce:
         }
         limits = tuple(SetLimit(quantity=q, axis=a, value=v) for (q, a), v in sorted(lowest.items()))
         if len(self._seen) > 1:
-            text = "the program changes its limits of speed or acceleration on the way: the lowest of each holds throughout"
+            text = (
+                "the program changes its limits of speed or acceleration on the way: the lowest of each holds throughout, and what "
+                "has higher ones takes longer than on the machine"
+            )
             findings.assume(text, self._line)
         elif limits:
             findings.note(
                 "limits that the program sets hold where they are lower than the machine's", self._line
             )
+        if self._along and (machine is None or limited(machine, limits) is not machine):
+            text = "an acceleration along the path (M204, ACCEL) limits each axis: a diagonal may have up to 1.7 times as much"
+            findings.assume(text, self._along)
         if machine is not None and limited(machine, limits, above=True) is not machine:
             findings.assume("the program sets limits above those of the machine file, which hold", self._line)
         return limits
@@ -104,12 +112,15 @@ class LimitsInForce:
             per_minute = max(given.values(), default=0.0) >= PER_MINUTE
             said = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
             findings.assume(f"speeds of {SPEEDS} are read per {said}", line)
-            self._set("velocity", given, unit / (SECONDS_PER_MINUTE if per_minute else 1.0))
-        elif name == ACCELERATIONS:
+            self._set("velocity", given, unit, SECONDS_PER_MINUTE if per_minute else 1.0)
+        elif name in ACCELERATIONS:
             self._set("acceleration", given, unit)
         elif name == ALONG_PATH:
             of_path = [given[key] for key in "spt" if key in given]
+            if len(set(of_path)) > 1:
+                findings.assume(f"of S, P and T of {name} the lowest holds for every move", line)
             if of_path:
+                self._along = self._along or line
                 self._set("acceleration", dict.fromkeys(EVERY_AXIS, min(of_path)), unit)
             if "r" in given:
                 self._set("acceleration", {"e": given["r"]}, unit)
@@ -117,9 +128,8 @@ class LimitsInForce:
             self._take_velocity_limit(given, line, findings)
         else:
             quantity, axis = GRBL[name]
-            self._set(
-                quantity, {axis: given[""]}, 1.0 / SECONDS_PER_MINUTE if quantity == "velocity" else 1.0
-            )
+            per = SECONDS_PER_MINUTE if quantity == "velocity" else 1.0
+            self._set(quantity, {axis: given[""]}, per=per)
 
     def _take_factor(self, given: Mapping[str, float], state: State, line: int) -> None:
         if "b" in given:
@@ -132,18 +142,20 @@ class LimitsInForce:
 
     def _take_velocity_limit(self, given: Mapping[str, float], line: int, findings: Findings) -> None:
         if "accel" in given:
-            self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]), 1.0)
+            self._along = self._along or line
+            self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]))
         if "velocity" in given:
-            self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]), 1.0)
-            self._set(FEED, {"": given["velocity"]}, 1.0)
+            self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]))
+            self._set(FEED, {"": given["velocity"]})
         rest = sorted(given.keys() - {"accel", "velocity"})
         if rest:
             findings.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
 
-    def _set(self, quantity: str, values: Mapping[str, float], factor: float) -> None:
+    def _set(self, quantity: str, values: Mapping[str, float], unit: float = 1.0, per: float = 1.0) -> None:
+        """Values by axis, in units of so many mm, or degrees, per so many seconds."""
         for axis, value in values.items():
             if axis in _AXES or quantity == FEED:
-                self._now[quantity, axis] = value * factor
+                self._now[quantity, axis] = value * (1.0 if axis in ROTARY_AXES else unit) / per
 
 
 def limited(machine: Machine, limits: Sequence[SetLimit], *, above: bool = False) -> Machine:

@@ -24,10 +24,11 @@ EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 
 # Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
 # what they limit.
-SETS_LIMITS = frozenset((201, 203, 204, 220))
+SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
-GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate("xyz")} | {
-    f"$12{k}": ("acceleration", axis) for k, axis in enumerate("xyz")
+_GRBL_AXES = "xyzabc"  # grblHAL has six
+GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate(_GRBL_AXES)} | {
+    f"$12{k}": ("acceleration", axis) for k, axis in enumerate(_GRBL_AXES)
 }
 CORNERS = "no limit of this plan, which goes around corners within the tolerance and the machine's acceleration and jerk"
 UNKNOWN_M = Assumption(

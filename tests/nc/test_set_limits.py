@@ -18,8 +18,16 @@ from planner.nc.reading import Reading
 from planner.nc.set_limits import limited
 from planner.report.export import write_plan
 
+EVERY = "xyzabcuvw"
 LIMITS = {"velocity": 200, "acceleration": 2000, "jerk": 1e6}
 PRINTER = Machine(name="printer", dt=1e-3, tolerance=0.05, axes=dict.fromkeys("xyze", LIMITS))
+
+WITH_ALL = PRINTER.model_copy(
+    update={
+        "axes": Machine(name="all", dt=1e-3, tolerance=0.05, axes=dict.fromkeys(EVERY, LIMITS)).axes
+        | PRINTER.axes
+    }
+)
 
 
 # --- speed factor ---------------------------------------------------------------------------------------------------------
@@ -84,12 +92,17 @@ SETS = [
     ("M201 X700 Y800 Z90 E4000", {"acceleration": {"x": 700, "y": 800, "z": 90, "e": 4000}}),
     ("M203 X70 Y80.5 Z9 E40", {"velocity": {"x": 70, "y": 80.5, "z": 9, "e": 40}}),
     ("M203 X4200 Y4800 Z180 E1500", {"velocity": {"x": 70, "y": 80, "z": 3, "e": 25}}),  # RepRapFirmware: per minute
-    ("M204 S600", {"acceleration": {"x": 600, "y": 600, "z": 600}}),
-    ("M204 P800 T500 R900", {"acceleration": {"x": 500, "y": 500, "z": 500, "e": 900}}),
-    ("SET_VELOCITY_LIMIT ACCEL=450", {"acceleration": {"x": 450, "y": 450, "z": 450}}),
+    ("M202 X700 Z90", {"acceleration": {"x": 700, "z": 90}}),  # Repetier's travels
+    ("M204 S600", {"acceleration": dict.fromkeys(EVERY, 600)}),
+    ("M204 P800 T500 R900", {"acceleration": dict.fromkeys(EVERY, 500) | {"e": 900}}),
+    ("SET_VELOCITY_LIMIT ACCEL=450", {"acceleration": dict.fromkeys(EVERY, 450)}),
     ("set_velocity_limit velocity=55 accel=450.5 ; slow", {
-        "acceleration": {"x": 450.5, "y": 450.5, "z": 450.5}, "velocity": {"x": 55, "y": 55, "z": 55}, "feed": {"": 55},
+        "acceleration": dict.fromkeys(EVERY, 450.5), "velocity": dict.fromkeys(EVERY, 55), "feed": {"": 55},
     }),
+    ("M201 A700 U80", {"acceleration": {"a": 700, "u": 80}}),  # degrees and mm
+    ("M203 B7200 U7200", {"velocity": {"b": 120, "u": 120}}),
+    ("$113=3000", {"velocity": {"a": 50}}),  # grblHAL
+    ("$125=25.5", {"acceleration": {"c": 25.5}}),
     ("$110=3000", {"velocity": {"x": 50}}),
     ("$122 = 25.5", {"acceleration": {"z": 25.5}}),
 ]  # fmt: skip
@@ -99,10 +112,10 @@ SETS = [
 def test_limits_that_a_program_sets_are_limits_of_what_follows(
     command: str, sets: dict[str, dict[str, float]]
 ) -> None:
-    program = parse_program(f"G21\n{command}\nG1 X50 F9000\n", PRINTER)
+    program = parse_program(f"G21\n{command}\nG1 X50 F9000\n", WITH_ALL)
     found = {(it.quantity, it.axis): it.value for it in program.limits}
     assert found == pytest.approx({(q, a): v for q, axes in sets.items() for a, v in axes.items()})
-    used = limited(PRINTER, program.limits)
+    used = limited(WITH_ALL, program.limits)
     for letter, axis in used.axes.items():
         for quantity in ("velocity", "acceleration", "jerk"):
             given = sets.get(quantity, {}).get(letter, np.inf)
@@ -128,8 +141,28 @@ def test_limits_that_change_on_the_way_hold_at_their_lowest_and_it_is_said_first
     assert any("the lowest of each holds throughout" in it for it in program.assumptions)
     late = parse_program("G21\nG1 X5 F600\nM204 S400\nX9\n", PRINTER)
     assert any("holds throughout" in it for it in late.assumptions)
-    assert not parse_program("G21\nM204 S900\nM204 S400\nG1 X9 F600\nM204 S50", PRINTER).assumptions
+    assert not parse_program("G21\nM201 X900\nM201 X400\nG1 X9 F600\nM201 X50", PRINTER).assumptions
     assert parse_program("G21\nG1 X9 F600\nM204 S50", PRINTER).limits == ()
+
+
+@pytest.mark.parametrize("command", ["M204 P500", "SET_VELOCITY_LIMIT ACCEL=500"])
+def test_what_a_limit_along_the_path_does_not_bound_is_said_first(command: str) -> None:
+    """The plan has it on each axis, so that the path may have more along a diagonal: 2^(1/2) in x and y, 3^(1/2) in x, y and z."""
+    text = f"G21\n{command}\nG1 X60 Y60 F60000\n"
+    plan = planner.plan(parse_program(text, PRINTER), PRINTER, method="stop")
+    assert plan.trajectory is not None
+    along = np.linalg.norm(plan.trajectory.acceleration[:, :2], axis=1).max()
+    assert along == pytest.approx(500 * 2**0.5, rel=1e-2)
+    (said,) = plan.program.assumptions
+    assert "up to 1.7 times as much" in said
+
+
+def test_of_printing_and_travelling_accelerations_the_lower_holds_and_it_is_said() -> None:
+    program = parse_program("G21\nM204 P800 T500\nG1 X9 F600", PRINTER)
+    assert any("S, P and T of M204 the lowest" in it for it in program.assumptions)
+    assert not any(
+        "S, P and T" in it for it in parse_program("G21\nM204 P800 T800\nG1 X9 F600", PRINTER).assumptions
+    )
 
 
 def test_limits_above_the_machines_are_said_first() -> None:

@@ -18,7 +18,6 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.joint.legs import LegFormulas, along_tangent, formula_point, nearest_point
 from planner.joint.run import TubeRun
-from planner.joint.state_limits import used
 
 PLACES = 33  # where a step is looked at first [-]
 NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
@@ -36,10 +35,6 @@ class Keeps(NamedTuple):
     jerk: FloatArray  # (A,)
     feed: FloatArray  # (R,)
     normal: FloatArray  # (R,)
-    state: FloatArray  # (K,)
-    linear: FloatArray  # (A,)
-    word: FloatArray  # (R, W)
-    counts: FloatArray  # (A,)
     budget: FloatArray  # (R,)
     curvature: FloatArray  # (R,)
     vertex_budget: FloatArray  # (R+1,)
@@ -57,29 +52,9 @@ def _at(v, a, j, t):
 
 
 @njit(cache=True, error_model="numpy")
-def _of_state(keeps, r, h, v, a, j):
-    """The largest share of the state's limits in a step on leg r, and of the feed in the axes that F goes
-    by."""
-    worst, axes = 0.0, len(v)
-    w, b = np.empty(axes), np.empty(axes)
-    for n in range(PLACES if len(keeps.state) or keeps.word.shape[1] else 0):
-        t = h * n / (PLACES - 1)
-        for k in range(axes):
-            w[k], b[k] = v[k] + t * (a[k] + 0.5 * t * j[k]), a[k] + t * j[k]
-        for kind in range(len(keeps.state)):
-            worst = max(worst, used(kind, w, b, keeps.linear) / keeps.state[kind])
-        if keeps.word.shape[1]:
-            square = 0.0
-            for k in range(axes):
-                square += keeps.counts[k] * w[k] * w[k]
-            worst = max(worst, np.sqrt(square) / keeps.word[r, 0])
-    return worst
-
-
-@njit(cache=True, error_model="numpy")
 def _of_limits(keeps, r, h, v, a, j):
     """The largest share of a limit in a step on leg r."""
-    worst, axes = _of_state(keeps, r, h, v, a, j), len(v)
+    worst, axes = 0.0, len(v)
     for k in range(axes):
         worst = max(worst, abs(j[k]) / keeps.jerk[k])
         worst = max(worst, max(abs(a[k]), abs(a[k] + h * j[k])) / keeps.acceleration[k])
@@ -107,12 +82,11 @@ def _of_limits(keeps, r, h, v, a, j):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def watched_shares(keeps, leg, h, state, jerk):
-    """(N,) the largest share in every step of the limits that rows watch in places, of the normal
-    acceleration and the state; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
+def normal_shares(keeps, leg, h, state, jerk):
+    """(N,) the largest share in every step of the limit of the normal acceleration, which rows watch in
+    places; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
     shares = np.zeros(len(leg))
     for i in range(len(leg)):
-        shares[i] = _of_state(keeps, leg[i], h[i], state[i, 1], state[i, 2], jerk[i])
         for n in range(PLACES):
             square, _, across = _at(state[i, 1], state[i, 2], jerk[i], h[i] * n / (PLACES - 1))
             if square > 0.0 and across > 0.0:

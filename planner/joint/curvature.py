@@ -11,9 +11,9 @@ from planner.base.kernels import njit
 from planner.joint.rows import (
     FEED_NODE,
     FEED_ROWS,
+    LAW_ROWS,
     NORMAL_MID,
     NORMAL_NODE,
-    STATE_ROWS,
     SWITCH,
     TUBE_NODE,
     VECTOR_OF_NODE,
@@ -78,7 +78,7 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
             continue
         m = of[r]
         if m == -2:
-            row = lin.state[i, r - more - STATE_ROWS]
+            row = lin.laws[i, r - more - LAW_ROWS]
             for s in range(4 * axes + 1):
                 for t in range(s + 1):
                     W[s, t] += ratio[r] * row[s] * row[t]

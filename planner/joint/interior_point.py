@@ -26,7 +26,6 @@ from planner.base.kernels import njit
 from planner.joint.curvature import Barrier
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.rows import TUBE_NODE, VECTORS, Linear, put_rows, slopes
-from planner.joint.state_limits import ROWS, WORD_ROWS
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
 # Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations. At
@@ -141,8 +140,8 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         np.zeros((N, 3, axes)),
     )
     node = np.zeros((N, 3, axes))
-    state = np.zeros((N, ROWS * limits.state.shape[1] + WORD_ROWS * limits.word.shape[1], S + C))
-    lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), state)
+    laws = np.zeros((N, limits.laws.first[-1], S + C))
+    lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), laws)
     factor = Factor(np.zeros((N, C, S)), np.zeros((N, C, C)), np.zeros((N + 1, S, S)))
     slacks = Slacks(np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many))
     s, z, missing, ds, dz = slacks

@@ -14,8 +14,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.joint.guess import Guess
+from planner.joint.own_laws import Where, motion_at
 from planner.joint.run import TubeRun
-from planner.joint.state_limits import state_shares
 
 # Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their
 # square from acceleration to position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
@@ -132,7 +132,8 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
         np.sqrt((np.abs(a) / run.acceleration).max()),
         np.cbrt((np.abs(j) / run.jerk).max()),
     ]
-    watched = np.isfinite(run.across_max).any() or len(run.state)
+    watched = np.isfinite(run.across_max).any() or len(run.laws)
+    state, begin, end = np.stack([steps.position, v, a], axis=1), guess.place[:, 0], guess.place[:, 3]
     for fraction in MEASURED_AT if watched else ():
         tau = fraction * h
         along, push = v + tau * (a + tau * j / 2), a + tau * j
@@ -140,5 +141,7 @@ def _excess(run: TubeRun, guess: Guess, steps: Steps) -> float:
         across_sq = (push**2).sum(axis=1) * speed_sq - (along * push).sum(axis=1) ** 2
         normal_sq = np.divide(across_sq, speed_sq, out=np.zeros(len(h)), where=speed_sq > 0)
         ratios.append(np.sqrt(np.sqrt(np.maximum(normal_sq, 0.0)) / run.across_max[leg]).max())
-        ratios.append(np.sqrt(state_shares(run.state, run.linear, along, push).max(initial=0.0)))
+        where = Where(leg, begin + fraction * (end - begin))
+        used = run.laws.shares(where, motion_at(state, j, fraction * steps.h)) ** (1.0 / run.laws.orders)
+        ratios.append(used.max(initial=0.0))
     return float(max(ratios))

@@ -41,14 +41,15 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from planner.base.errors import import_needed
+from planner.base.errors import InputError, import_needed
 from planner.joint.guess import Guess
+from planner.joint.laws import PUSH, REST
 from planner.joint.motion import steps_of
-from planner.joint.numbers import CENTRE, acceleration_along, jerk_weights, step_numbers
+from planner.joint.numbers import CENTRE, acceleration_along, formula, jerk_weights, step_numbers
 from planner.joint.outcome import BROKE_DOWN, NO_CURVES, SOLVED, STUCK, TubeSolution
+from planner.joint.own_laws import Law
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
-from planner.joint.state_limits import REST, formula
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: without it windows take more iterations, or do not
 # converge; a larger one costs time.
@@ -66,7 +67,7 @@ WATCHED, LONGER_WATCHED = (0.5, 1.0), 1.5
 # does not count.
 NOT_SLOWER = 1e-4
 NODE_ROW = 2  # of the rows of a step: of the tolerance of the node at its end
-# By how much rows of limits of the state may be missed [-]: at rest they are 0 for every motion, and ipopt
+# By how much rows of the tangential acceleration may be missed [-]: at rest they are 0 for every motion, and ipopt
 # needs room there.
 RELAXED = 1e-6
 # A job may have this many legs (arcs count as many as the steps they need): what memory and time allow.
@@ -127,7 +128,7 @@ class TubeNLP:
         v_max, a_max, j_max = run.velocity / speed, run.acceleration / acc, run.jerk / jerk
 
         watched = len(WATCHED) if np.isfinite(run.across_max).any() else 0
-        state = np.flatnonzero(np.isfinite(run.state)).tolist()
+        pushes = pushes_of(run)
 
         # ---- variables, stage by stage: state (p, v, a) and place of a node; jerk, duration and the other
         # places of its step -------- Legs may be a thousand times shorter than others: places, and what
@@ -217,9 +218,9 @@ class TubeNLP:
             w0, w1, w2 = (ca.DM(run.counts) * one for one in (v, ordinate, v1))
             inner = ca.dot(w0, w1), (2 * ca.sumsqr(w1) + ca.dot(w0, w2)) / 3, ca.dot(w1, w2)
             rows.append((ca.vertcat(ca.sumsqr(w0), *inner, ca.sumsqr(w2)) / word**2, -np.inf, 1.0))
-        for kind in state:
-            bound = run.state[kind] / acc
-            ordinates = formula(ca, kind, (v, ordinate, v1), (a, a1), run.linear, REST * pace)
+        for push in pushes:
+            bound = push.bound / acc
+            ordinates = formula(ca, (v, ordinate, v1), (a, a1), push.counts, REST * pace)
             for there, (pushed, along_it) in zip(
                 (from_rest, from_rest * to_rest, from_rest * to_rest, to_rest), ordinates, strict=True
             ):
@@ -311,3 +312,17 @@ class TubeNLP:
             ),
             place=place,
         )
+
+
+def pushes_of(run: TubeRun) -> list[Law]:
+    """The laws of the tangential acceleration. Raises InputError if the run has others than that and the
+    feed."""
+    found = []
+    for law in run.laws.laws:
+        if law.kind == PUSH and np.isfinite(law.bound):
+            found.append(law)
+        elif law.limit is not None or np.isfinite(law.bound):
+            raise InputError(
+                f"limit '{law.name}': the solvers ipopt and fatrop do not keep it; plan with own"
+            )
+    return found

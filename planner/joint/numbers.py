@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -90,3 +92,20 @@ def acceleration_along(guess: Guess) -> FloatArray:
     own = pace(guess.state[:, 1])
     v, a = (guess.state[:-1, k] / 2 + guess.state[1:, k] / 2 for k in (1, 2))
     return own * (v * a).sum(axis=1) / np.maximum((v**2).sum(axis=1), (0.5 * own) ** 2)
+
+
+def formula(ca: Any, w: Any, b: Any, counts: FloatArray, rest: Any) -> list[tuple[Any, Any]]:
+    """Pairs (a.v, v.e) of all four ordinates of PUSH in symbols of casadi, given as `ca`.
+
+    w, b   : ordinates of the velocity (3) and of the acceleration (2) of a step
+    counts : (A,) 1 for the axes that count, else 0
+    rest   : speed to which directions are smoothed
+    """
+    w, b = [counts * one for one in w], [counts * one for one in b]
+    e0, e1 = (one / ca.sqrt(ca.sumsqr(one) + rest**2) for one in (w[0], w[2]))
+    return [
+        (ca.dot(b[0], w[0]), ca.dot(w[0], e0)),
+        ((ca.dot(b[1], w[0]) + 2 * ca.dot(b[0], w[1])) / 3, (ca.dot(w[0], e1) + 2 * ca.dot(w[1], e0)) / 3),
+        ((2 * ca.dot(b[1], w[1]) + ca.dot(b[0], w[2])) / 3, (2 * ca.dot(w[1], e1) + ca.dot(w[2], e0)) / 3),
+        (ca.dot(b[1], w[2]), ca.dot(w[2], e1)),
+    ]

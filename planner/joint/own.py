@@ -19,21 +19,23 @@ from typing import ClassVar
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, switches_kept, watched_shares, worst_shares
+from planner.joint.checks import Keeps, normal_shares, switches_kept, worst_shares
 from planner.joint.guess import Guess
 from planner.joint.interior_point import Tuning, solve_window
+from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
+from planner.joint.law_window import NEAR, Window, near
 from planner.joint.legs import LegFormulas
 from planner.joint.motion import Steps, closed_at_nodes
 from planner.joint.nlp import PULL
 from planner.joint.outcome import TubeSolution
+from planner.joint.own_laws import watched
 from planner.joint.price import columns, step_prices
-from planner.joint.problem import NARROWED, StepWindow, Tighter, window_of
+from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.run import TubeRun
-from planner.joint.state_limits import state_shares
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that
 # a window which fails is divided into.
@@ -153,10 +155,10 @@ class _Search:
         self.settings, self.run, self.guess = settings, run, _Cut(guess)
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
-        self.price = np.zeros((len(guess), columns(len(run.axis))))
+        self.price = np.zeros((len(guess), columns(run)))
         self.iterations, self.windows, self.solved = 0, 0, 0
         self._keeps = keeps_of(run)
-        self._strain = _strain(run, guess)
+        self._strain = strain(run, guess)
         self._stopped = False
         self._done, self._all = 0, len(guess)  # steps of all windows
 
@@ -182,13 +184,13 @@ class _Search:
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
         v, a = state[at, 1], state[at, 2]
         feed = np.minimum(run.feed[leg[at]], run.feed[leg[at - 1]])
-        pushed = state_shares(run.state, run.linear, v, a).max(axis=1, initial=0.0)
         beside = np.stack([v, v - a * h[at - 1, None] / 2, v + a * h[at, None] / 2])  # of the Bezier velocity
         shares = (
             (np.abs(beside) / run.velocity).max(axis=(0, 2)),
             np.linalg.norm(beside, axis=2).max(axis=0) / feed,
             *(np.maximum(run.word_share(leg[at], one), run.word_share(leg[at - 1], one)) for one in beside),
-            np.sqrt(np.maximum((np.abs(a) / run.acceleration).max(axis=1), pushed)),
+            np.sqrt((np.abs(a) / run.acceleration).max(axis=1)),
+            *(law_shares(run, self.guess, at) ** (1.0 / run.laws.orders)).T,
         )
         by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
         state[at, 1] /= by
@@ -259,30 +261,45 @@ class _Search:
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
         takes their place."""
+        run = self.run
         for prox, missed in tries:
-            tight = Tighter(np.ones(hi - lo), np.ones(hi - lo))
-            for _ in range(TIGHTENED):
+            pull = PULL
+            tight, begun = np.ones((hi - lo, 2 + len(run.laws))), Window(self.guess, lo, hi)
+            needed, told = near(run.laws, begun), np.zeros(len(run.laws), dtype=bool)
+            for number in range(TOLD if len(run.laws) else TIGHTENED):
                 if self._stopped:
                     return False
-                window = window_of(self.run, self.guess, lo, hi, missed, tight, self.settings.smooth)
-                tuning = Tuning(PULL, prox, self.settings.gap, missed, self.settings.least, *START)
+                which = np.flatnonzero(needed)
+                window = window_of(run, begun, begun.lo, begun.hi, missed, tight, self.settings.smooth, which)
+                tuning = Tuning(pull, prox, self.settings.gap, missed, self.settings.least, *START)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
                 )
                 count.iterations += iterations
                 if not done:
                     break
-                if self._taken(lo, hi, window, tight):
-                    self.price[lo:hi] = step_prices(window, z)
+                over = self._taken(lo, hi, window, begun)
+                if over is None:
+                    self.price[lo:hi] = step_prices(run, window, z)
                     return True
-                if not tight.any():
+                if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                     break
+                pull = PULL_AGAIN if run.laws.moved else PULL
+                # rows that are far off are asked for about other places first
+                settled = np.zeros(len(run.laws), dtype=bool)
+                settled[which] = window.limits.laws.exact()
+                of_laws = over[:, 2:]
+                settled |= needed & (told | (of_laws.max(axis=0) < 1.0 + SLID))
+                tight[:, :2] *= np.where(over[:, :2] > 1.0, over[:, :2] * TIGHTER, 1.0)
+                tight[:, 2:] *= np.where(settled, tightened(of_laws, told), 1.0)
+                told, needed = needed.copy(), needed | (of_laws > NEAR).any(axis=0)
         return False
 
-    def _taken(self, lo: int, hi: int, window: StepWindow, tight: Tighter) -> bool:
-        """Whether the steps lo .. hi - 1 of a window that has been solved keep everything; if they are faster
-        they take their place. Where a limit that is watched in places only is exceeded between them, or a
-        curve bends more within a step than its rows know, `tight` grows."""
+    def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window) -> FloatArray | None:
+        """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are
+        faster they take their place. Else the shares (hi - lo, 2 + M) that they use of what rows watch in places, or
+        about other places, only: the normal acceleration, the tolerance along curves, the laws; then `begun` becomes
+        what was found."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -290,23 +307,26 @@ class _Search:
         nodes[[0, -1]] = state[[0, -1]]
         found, jerk = closed_at_nodes(nodes, h, window.u[:, :axes] * (window.length / window.second**3))
         place = window.place * window.length
+        along = place + run.offset[leg][:, None]
         limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
-        if not (limit <= 1.0 + ROUNDING and tube.max() <= 1.0):
-            across = watched_shares(self._keeps, leg, h, found, jerk)
+        ends = np.append(along[:, 0], guess.place[hi - 1, 3])
+        of_laws = watched(run.laws, leg, h, found, jerk, ends)
+        inside = limit <= 1.0 + ROUNDING and of_laws.max(initial=0.0) <= 1.0 + ROUNDING
+        if not (inside and tube.max() <= 1.0):
+            if run.laws.moved and tube.max() <= 1.0:
+                begun.put(h, found, along)
             # what passes a short leg at its distance is nearest to one of its ends, and too far in its middle:
             # no step of such a leg alone is the cause
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
-            for one, share in ((tight.limit, across), (tight.room, of_leg[leg])):
-                one *= np.where(share > 1.0, share * TIGHTER, 1.0)
-            return False
+            return np.column_stack([normal_shares(self._keeps, leg, h, found, jerk), of_leg[leg], of_laws])
         if not switches_kept(run, leg, found):
-            return False
+            return np.zeros((hi - lo, 2 + len(run.laws)))
         if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
-            guess.place[lo:hi, :3] = place + run.offset[leg][:, None]
+            guess.place[lo:hi, :3] = along
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False
-        return True
+        return None
 
 
 def keeps_of(run: TubeRun) -> Keeps:
@@ -320,28 +340,7 @@ def keeps_of(run: TubeRun) -> Keeps:
         jerk=run.jerk,
         feed=run.feed,
         normal=run.across_max,
-        state=run.state,
-        linear=run.linear,
-        word=run.word,
-        counts=run.counts,
         budget=run.budget,
         curvature=run.curvature,
         vertex_budget=run.vertex_budget,
     )
-
-
-def _strain(run: TubeRun, guess: Guess) -> FloatArray:
-    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each
-    step."""
-    leg: Array = guess.leg
-    p, v, a = (guess.state[:-1, k] for k in range(3))
-    far = np.linalg.norm(p - run.points(leg, guess.place[:, 0] - run.offset[leg]), axis=1) / run.room[leg]
-    shares = (
-        far,
-        (np.abs(v) / run.velocity).max(axis=1),
-        np.linalg.norm(v, axis=1) / run.feed[leg],
-        run.word_share(leg, v),
-        (np.abs(a) / run.acceleration).max(axis=1),
-        *state_shares(run.state, run.linear, v, a).T,
-    )
-    return np.max(shares, axis=0)

@@ -23,46 +23,48 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.feedrate.constraints.limits import FEED as FEED_LIMIT
 from planner.joint import rows
 from planner.joint.problem import StepWindow
-from planner.joint.state_limits import ROWS, STATE_LIMITS
+from planner.joint.run import TubeRun
 
-# Columns behind those of the axes (jerk, acceleration, velocity) of the prices of a step.
-FEED, NORMAL, STATE = range(3)
-KINDS = len(STATE_LIMITS)
-ROOM, VERTEX, OTHER = range(STATE + KINDS, STATE + KINDS + 3)
+# Columns behind those of the axes (jerk, acceleration, velocity) of the prices of a step; those of the run's
+# laws from `LAWS` on.
+FEED, NORMAL, ROOM, VERTEX, OTHER, LAWS = range(6)
 
 
-def columns(axes: int) -> int:
+def columns(run: TubeRun) -> int:
     """How many prices a step has."""
-    return 3 * axes + OTHER + 1
+    return 3 * len(run.axis) + LAWS + len(run.laws)
 
 
-def step_prices(window: StepWindow, z: FloatArray) -> FloatArray:
-    """(N, 3 A + K + 5) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a
-    window: jerk, acceleration and velocity of each axis, then the feed, the normal acceleration, the K limits
-    of the state, the room of the leg and that of the vertex that the step begins at, and what bounds only the
-    steps themselves."""
+def step_prices(run: TubeRun, window: StepWindow, z: FloatArray) -> FloatArray:
+    """(N, 3 A + 5 + M) dT/d(ln limit) of the limits at each step [s], from the multipliers z (N, R) of a
+    window: jerk, acceleration and velocity of each axis, then the feed, the normal acceleration, the room of
+    the leg and that of the vertex that the step begins at, what bounds only the steps themselves, and the M
+    laws; a feed that is a law counts as the feed."""
     axes = window.limits.box.shape[1]
     box, more = z[:, : 8 * axes].reshape(-1, 4, 2, axes).sum(axis=2), z[:, 8 * axes :]
     at_vertex = window.limits.at_vertex
     node = more[:, rows.TUBE_NODE]
-    last = rows.STATE_ROWS + ROWS * window.limits.state.shape[1]
-    state = more[:, rows.STATE_ROWS : last].reshape(len(z), -1, ROWS).sum(axis=2)
-    state = state if state.shape[1] else np.zeros((len(z), KINDS))
+    none = np.zeros(len(z))
     price = np.column_stack(
         [
             box[:, 0],
             box[:, 1],
             box[:, 2] + box[:, 3],
-            more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1) + more[:, last:].sum(axis=1),
+            more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1),
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_MID],
-            state,
-            more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, 0.0, node),
-            np.where(at_vertex, node, 0.0),
+            more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, none, node),
+            np.where(at_vertex, node, none),
             more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH]].sum(
                 axis=1
             ),
+            np.zeros((len(z), len(run.laws))),
         ]
     )
+    first = rows.LAW_ROWS + window.limits.laws.first
+    for m, law in enumerate(window.which):
+        column = FEED if run.laws.laws[law].name == FEED_LIMIT.name else LAWS + law
+        price[:, 3 * axes + column] += more[:, first[m] : first[m + 1]].sum(axis=1)
     return -window.second * price

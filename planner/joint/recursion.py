@@ -24,8 +24,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.joint.curvature import model_of_rows
-from planner.joint.rows import STATE_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
-from planner.joint.state_limits import add_state_curvature
+from planner.joint.law_curvature import add_law_curvature
+from planner.joint.rows import LAW_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
@@ -84,8 +84,8 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
         model_of_rows(W, G, legs, limits, lin, i, barrier, of)
-        if lin.state.shape[1]:
-            add_state_curvature(W, limits, i, x[i], u[i], barrier.z[i, 8 * axes + STATE_ROWS :])
+        if lin.laws.shape[1]:
+            add_law_curvature(W, limits, i, x[i], u[i], barrier.z[i, 8 * axes + LAW_ROWS :])
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
         for k in range(axes):
             W[S + k, S + k] += 2.0 * limits.smooth[i] * limits.h[i] / limits.box[0, k] ** 2
@@ -180,7 +180,7 @@ def forces(limits, lin, q, pull, u, w):
                 continue
             m = of[r]
             if m == -2:
-                row = lin.state[i, r - more - STATE_ROWS]
+                row = lin.laws[i, r - more - LAW_ROWS]
                 for k in range(4 * axes):
                     w[i, k] += q[i, r] * row[k]
                 own += q[i, r] * row[4 * axes]

@@ -15,7 +15,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import REVERSAL_ANGLE
-from planner.joint.checks import watched_shares
+from planner.joint.checks import normal_shares
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn, keeps_of
@@ -40,8 +40,8 @@ def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, reach: float) -> 
     assert steps is not None
     state = np.stack([steps.position, steps.velocity, steps.acceleration], axis=1)
     state = np.concatenate([state, state[-1:]])  # of the last node nothing is looked at
-    of_one = keeps_of(run)._replace(normal=np.ones(len(run)), state=np.zeros(0))
-    across = watched_shares(of_one, leg, steps.h, state, steps.jerk)
+    of_one = keeps_of(run)._replace(normal=np.ones(len(run)))
+    across = normal_shares(of_one, leg, steps.h, state, steps.jerk)
     end = np.cumsum(steps.h)
     begin = end - steps.h
     within = np.stack([np.searchsorted(end, begin - reach), np.searchsorted(begin, end + reach)], axis=1)

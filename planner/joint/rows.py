@@ -30,8 +30,8 @@ vertex), along which n = (y - nearest)/room2 holds whether or not the nearest po
 convex. On an arc the inner control points belong to the tangents at the places of the step's nodes (run.py),
 which move with them: those rows depend on a second vector, p or the next node's, through `lin.node`.
 
-Limits that are functions of velocity and acceleration (state_limits.py) have rows of another kind, with their
-derivatives by p, v, a, j and h, behind all others where a run has such limits.
+Other limits (laws.py) have rows of another kind, with their derivatives by p, v, a, j and h, behind all
+others where a window needs them.
 
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
@@ -46,8 +46,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
-from planner.joint.state_limits import put_state_rows
 
 # Vectors y, in this order.
 P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
@@ -62,7 +62,7 @@ VECTOR_OF_NODE = (
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
 ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC, SWITCH = range(9, 15)
 MORE_ROWS = 15
-STATE_ROWS = MORE_ROWS  # the first of those of the state's limits
+LAW_ROWS = MORE_ROWS  # the first of those of the laws
 VECTOR_OF_BOX = (J, A, MID, V)
 
 
@@ -79,11 +79,7 @@ class StepLimits(NamedTuple):
     feed_node: FloatArray  # (N,)
     normal: FloatArray  # (N,)
     normal_node: FloatArray  # (N,)
-    state: FloatArray  # (N, K) of the state's limits
-    state_node: FloatArray  # (N, K)
-    word: FloatArray  # (N, W) feed in the axes that F goes by, if others move with them: W is 1 or 0
-    counts: FloatArray  # (A,) 1 for those axes, else 0
-    linear: FloatArray  # (A,) 1 for x, y and z, else 0
+    laws: LawRows
     step_max: FloatArray  # (N,)
     pace: FloatArray  # (N,) a speed like that of the step
     h: FloatArray  # (N,) duration that it is pulled to
@@ -106,12 +102,12 @@ class Linear(NamedTuple):
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
-    state: FloatArray  # (N, 6 K + 5 W, 4 A + 1) derivatives of the rows of the state's limits
+    laws: FloatArray  # (N, .., 4 A + 1) derivatives of the rows of the laws
 
 
 @njit(cache=True, error_model="numpy")
 def count(axes):
-    """How many rows a step of so many axes has, without those of the state's limits."""
+    """How many rows a step of so many axes has, without those of the laws."""
     return 8 * axes + MORE_ROWS
 
 
@@ -263,7 +259,7 @@ def put_rows(legs, limits, x, u, lin):
         g[more + ORDER_NODE], g[more + ORDER_MID], g[more + ARC] = order_node, order_mid, arc - 1.0
         _ball(y, ACROSS, limits.normal_node[i], more + NORMAL_NODE, g, n)
         _ball(y, ACROSS_MID, limits.normal[i], more + NORMAL_MID, g, n)
-        put_state_rows(limits, i, x[i], u[i], g[more + STATE_ROWS :], lin.state[i])
+        put_law_rows(limits, i, x[i], u[i], g[more + LAW_ROWS :], lin.laws[i])
         for c in range(3):
             place = lin.place[i, c]
             if (c == 0 and limits.at_vertex[i]) or place <= 0.0 or place >= legs.length[limits.leg[i]]:
@@ -272,13 +268,13 @@ def put_rows(legs, limits, x, u, lin):
 
 @njit(cache=True, error_model="numpy")
 def vector_of(row, axes):
-    """The vector y that a row depends on; -1 for those of h alone, -2 for those of the state's limits."""
+    """The vector y that a row depends on; -1 for those of h alone, -2 for those of the laws."""
     if row < 8 * axes:
         return VECTOR_OF_BOX[row // (2 * axes)]
     more = row - 8 * axes
     if more <= H_MIN:
         return -1
-    if more >= STATE_ROWS:
+    if more >= LAW_ROWS:
         return -2
     return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, ACROSS_MID, LONG, P)[more - FEED_NODE]
 
@@ -314,7 +310,7 @@ def slopes(limits, lin, dx, du, out):
             if not limits.on[i, r]:
                 continue
             if of[r] == -2:
-                row, total = lin.state[i, r - more - STATE_ROWS], 0.0
+                row, total = lin.laws[i, r - more - LAW_ROWS], 0.0
                 for k in range(3 * axes):
                     total += row[k] * dx[i, k]
                 for k in range(axes + 1):

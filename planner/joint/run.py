@@ -34,14 +34,16 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
-from planner.feedrate.constraints.limits import Limits
+from planner.feedrate.constraints.limits import JERK, Limits
 from planner.geometry.build import feed_groups, path_per_length
 from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.geometry.word_feed import ROTARY, goes_by
+from planner.joint.laws import PUSH
 from planner.joint.leg_shapes import edges_of, shapes_of
-from planner.joint.state_limits import bounds_of
-from planner.machine import LINEAR_AXES, Machine
+from planner.joint.own_laws import RunLaws, laws_of
+from planner.machine import Machine
+from planner.machine.user_limit import QUANTITIES
 
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
@@ -79,8 +81,7 @@ class TubeRun:
                                    machine allow [mm/s2]; inf where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes; the jerk is inf where nothing limits it
-    state                        : (K,) other limits of velocity and acceleration (state_limits.py)
-    linear                       : (A,) 1 for x, y and z, else 0
+    laws                         : other limits (own_laws.py)
     reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
     word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with
                                    them, else 0
@@ -108,8 +109,7 @@ class TubeRun:
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
-    state: FloatArray
-    linear: FloatArray
+    laws: RunLaws
     reserved: FloatArray
     word: FloatArray
     counts: FloatArray
@@ -128,10 +128,9 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
-        for name in ("velocity", "acceleration", "linear", "counts"):
+        for name in ("velocity", "acceleration", "counts"):
             freeze(self, name, np.float64, (axes,))
         freeze(self, "jerk", np.float64, (axes,), finite=False)
-        freeze(self, "state", np.float64, (None,), finite=False)
         freeze(self, "word", np.float64, (legs, None), finite=False)
 
     def __len__(self) -> int:
@@ -141,7 +140,8 @@ class TubeRun:
     def jerk_scale(self) -> FloatArray:
         """(A,) the jerk limits; without them what takes an axis to its full acceleration in `SHARP` of the
         time in which that moves it by the least budget [mm/s3]."""
-        acceleration = np.minimum(self.acceleration, self.state.min(initial=np.inf))
+        pushed = min((law.bound for law in self.laws.laws if law.kind == PUSH), default=np.inf)
+        acceleration = np.minimum(self.acceleration, pushed)
         shaped = SHARP * np.sqrt(self.budget.min() / acceleration.max())
         return np.where(np.isfinite(self.jerk), self.jerk, acceleration / shaped)
 
@@ -212,7 +212,6 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
     """The runs between full stops, in order; without limits of the jerk if it is not `jerk_limited`. Raises
     InputError if the machine lacks an axis of the toolpath."""
     limits = Limits.of(machine, toolpath.axes)
-    linear = np.isin(toolpath.axes, LINEAR_AXES).astype(np.float64)
     edges = edges_of(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
     for begin, end in pairwise(stops):
@@ -245,8 +244,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             velocity=limits.velocity[moves],
             acceleration=limits.acceleration[moves],
             jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),
-            state=bounds_of(limits, moves),
-            linear=linear[moves],
+            laws=_laws(toolpath, limits, moves, first, (word, counts), jerk_limited),
             reserved=budgets.reserved,
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
@@ -257,6 +255,32 @@ def _kept_as_it_is(toolpath: Toolpath, run: slice) -> str:
     if toolpath.held[run].any():
         return "a thread is cut in step with the spindle"
     return "G61 asks for the exact path" if toolpath.exact[run].any() else ""
+
+
+def _laws(
+    toolpath: Toolpath,
+    limits: Limits,
+    moves: Array,
+    first: Array,
+    words: tuple[FloatArray, FloatArray],
+    jerk_limited: bool,
+) -> RunLaws:
+    """The laws of the run over the segments first[0] : first[-1], on which the axes in `moves` (all,) move;
+    words: `TubeRun.word`, and `counts` over all axes."""
+    segments = slice(first[0], first[-1])
+    return RunLaws(
+        laws=tuple(
+            law
+            for law in laws_of(limits, moves, bool(words[0].shape[1]), words[1])
+            if jerk_limited or law.limit is None or QUANTITIES[law.quantity] != JERK.name
+        ),
+        axes=toolpath.axes,
+        axis=np.flatnonzero(moves),
+        still=toolpath.start[first[0]],
+        word=words[0],
+        edges=np.cumsum(toolpath.length[segments])[:-1],
+        block=toolpath.block[segments],
+    )
 
 
 def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:

@@ -11,15 +11,15 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.joint.motion import Steps
+from planner.joint.own_laws import Where, motion_at
 from planner.joint.run import TubeRun
-from planner.joint.state_limits import STATE_LIMITS, state_shares
 
 NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place on an arc, from the node's
 
 
 def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatArray:
-    """(N, 3 A + K + 3) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal
-    acceleration, the K limits of the state, tolerance.
+    """(N, 3 A + 3 + ..) shares of the limits [-]: jerk, acceleration and velocity of each axis, feed, normal
+    acceleration, tolerance, the laws with a name of their own.
 
     leg   : (N,) of each step
     place : (N+1,) of the nodes along the run [mm]
@@ -37,7 +37,8 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
     vertex = leg[begins]
     at = np.linalg.norm(p[begins] - run.vertex[vertex], axis=1) / run.vertex_budget[vertex]
     used[begins] = np.maximum(used[begins], at)
-    state = state_shares(run.state, run.linear, speed, push)
+    state = np.stack([p, v, a], axis=1)
+    laws = run.laws.shares(Where(leg, (place[:-1] + place[1:]) / 2.0), motion_at(state, j, steps.h / 2.0))
     return np.column_stack(
         [
             np.abs(j) / run.jerk,
@@ -45,8 +46,8 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
             np.abs(speed) / run.velocity,
             np.maximum(np.sqrt(square) / run.feed[leg], run.word_share(leg, speed)),
             np.linalg.norm(across, axis=1) / run.across_max[leg],
-            state if len(run.state) else np.zeros((len(h), len(STATE_LIMITS))),
             used,
+            laws[:, run.laws.named],
         ]
     )
 

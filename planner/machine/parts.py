@@ -75,6 +75,8 @@ class Record(BaseModel):
 class Axis(Record):
     """Limits of one axis: velocity [mm/s], acceleration [mm/s2], jerk [mm/s3]; in degrees for rotary axes.
 
+    power   : of its drive, speed times acceleration, for each kg that it moves [W/kg], or None; of a rotary
+              axis for each kg m2 of its moment of inertia [W/(kg m2)]
     wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction
               (LinuxCNC's WRAPPED_ROTARY)
     """
@@ -82,6 +84,7 @@ class Axis(Record):
     velocity: AxisLimit
     acceleration: AxisLimit
     jerk: Positive
+    power: Positive | None = None
     wrapped: bool = False
 
 

@@ -69,7 +69,8 @@ class Place:
 
 
 class OwnLimit(Protocol):
-    """The protocol of a limit, for planner and judge."""
+    """The protocol of a limit, for planner and judge. Built-in ones may have `bounded`, those of `QUANTITIES`
+    that they bound, and `searched`, False where the joint search cannot keep them."""
 
     name: str  # what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
     unit: str  # of q

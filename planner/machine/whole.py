@@ -38,6 +38,7 @@ ALL_AXES = LINEAR_AXES + ROTARY_AXES + PARALLEL_AXES
 # workpiece of 100 mm.
 ROTARY_RADIUS = 50.0
 TANGENTIAL = "tangential"  # what the acceleration of x, y and z together is called: "acceleration.tangential"
+MM2_PER_M2 = 1e6  # 1 W/kg is 1 m2/s3
 EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
@@ -179,6 +180,13 @@ class Machine(Record):
                 )
         scale = [RAD_PER_DEG * self.radius if letter in ROTARY_AXES else 1.0 for letter in axes]
         return np.array([getattr(self.axes[letter], quantity) for letter in axes]) * scale
+
+    def powers(self, axes: tuple[str, ...]) -> FloatArray:
+        """(A,) limits of the drives' power over the mass that each moves [mm2/s3], of rotary axes at
+        `radius`; inf where none is named."""
+        named = [self.axes[letter].power or np.inf for letter in axes]
+        scale = [self.radius**2 if letter in ROTARY_AXES else MM2_PER_M2 for letter in axes]
+        return np.array(named) * scale
 
     @property
     def radius(self) -> float:

@@ -57,7 +57,8 @@ def is_searched(job: Job, settings: Settings) -> bool:
 
     if job.real[0].fir is not None and job.machine.fir != job.real[0].fir:  # a share of tolerance and filters
         return False
-    return searchable(job) and _least_steps(job) <= settings.effort.search.steps_max
+    known = searchable(job, jerk_limited=settings.order.jerk_limited)
+    return known and _least_steps(job) <= settings.effort.search.steps_max
 
 
 def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:

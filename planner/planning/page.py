@@ -64,6 +64,11 @@ class Method(ABC):
     keeps_tangential: ClassVar[bool] = True
 
     @property
+    def keeps_power(self) -> bool:
+        """Whether its motions keep the limits of the drives' power."""
+        return False
+
+    @property
     def keeps_tolerance(self) -> bool:
         """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the
         verdict says the rest."""
@@ -95,6 +100,13 @@ class Method(ABC):
             raise InputError(
                 f"the machine limits the tangential acceleration to {machine.tangential_acceleration:g} mm/s2, which {self!r} does not "
                 "keep; plan with method optimal, second-order, bezier or stop, or leave tangential_acceleration out of the machine"
+            )
+        limited = np.isfinite(Limits.of(machine, job.toolpath.axes).power)
+        if limited.any() and not self.keeps_power:
+            letter = job.toolpath.axes[int(limited.argmax())]
+            raise InputError(
+                f"the machine limits the power of axis {letter} to {machine.axes[letter].power:g} W/kg, which {self!r} does not keep; "
+                f"plan with method optimal or tube, or leave power out of [axes.{letter}]"
             )
         best = within_tolerance(job, self)
         for share, seen in self.ways if _filters_cost_time(best, job, self) else ():

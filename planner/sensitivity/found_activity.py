@@ -21,7 +21,6 @@ from planner.joint.motion import Steps
 from planner.joint.parts import FoundRun
 from planner.joint.shares import shares
 from planner.joint.splice import Spliced, SplicedRun
-from planner.joint.state_limits import STATE_LIMITS
 from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST
@@ -30,8 +29,7 @@ from planner.sensitivity.records import GridHistory
 TOLERANCE = "tolerance"
 STANDS = 1e-9  # shorter standstills are rounding of times [s]
 SEEN = 1e-3  # period of a trajectory that is looked at at given times only [s]
-OF_STATE = range(price.STATE, price.STATE + len(STATE_LIMITS))
-PRICE_OF = (price.FEED, price.NORMAL, *OF_STATE, price.ROOM)  # of the shares behind those of the axes
+PRICE_OF = (price.FEED, price.NORMAL, price.ROOM)  # of the shares behind those of the axes
 
 
 @dataclass
@@ -77,7 +75,8 @@ def found_history(
         return None
     axes = toolpath.axes
     own = (*(kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes),)
-    own = (*own, FEED.name, CHORD_ERROR.name, *(limit.name for limit in STATE_LIMITS), TOLERANCE)
+    of_laws = (one.run.laws.laws[m].name for one in found for m in one.run.laws.named)
+    own = (*own, FEED.name, CHORD_ERROR.name, TOLERANCE, *dict.fromkeys(of_laws))
     known = [each.active_names[:-2] for each in (start, *alone.values()) if each is not None]
     others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)
@@ -135,15 +134,18 @@ def _of_steps(
     used = shares(run, own, leg, place[lo : hi + 1]) >= 1.0 - HELD
     moving, many = len(run.axis), len(toolpath.axes)
     column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
-    column = np.append(column, 3 * many + np.arange(len(PRICE_OF)))
+    named = run.laws.named
+    of_laws = [rows.names.index(run.laws.laws[m].name) for m in named]
+    column = np.concatenate([column, 3 * many + np.arange(len(PRICE_OF)), of_laws]).astype(np.int64)
     reached = np.zeros((hi - lo, len(rows.names)), dtype=bool)
     reached[:, column] = used
     reached[:, -2] = ~used.any(axis=1)
     paid = np.zeros(used.shape)
     if found.price is not None:
-        of = [*range(3 * moving), *(3 * moving + column for column in PRICE_OF)]
+        behind = (*PRICE_OF, *(price.LAWS + m for m in named))
+        of = [*range(3 * moving), *(3 * moving + column for column in behind)]
         paid = -found.price[lo:hi, of]
-        paid[:, -1] -= found.price[lo:hi, 3 * moving + price.VERTEX]
+        paid[:, 3 * moving + PRICE_OF.index(price.ROOM)] -= found.price[lo:hi, 3 * moving + price.VERTEX]
     active = column[np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)]
     active = np.where(reached[:, -2], len(rows.names) - 2, active)
     t = begin + before + np.append(0.0, np.cumsum(own.h))

@@ -25,9 +25,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint import price
+from planner.joint.own_laws import Where, motion_at
 from planner.joint.parts import FoundRun
 from planner.joint.run import budgets_of
-from planner.joint.state_limits import STATE_LIMITS
 from planner.machine import Machine
 from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, price_list
 from planner.sensitivity.records import PlacePrices, PriceList
@@ -45,13 +45,13 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + K + 5) of joint/price.py, and the same without feed and velocities where
+    step, alone          : (N, 3 A + 5 + M) of joint/price.py, and the same without feed and velocities where
                            these hold together
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
     def __init__(self, toolpath: Toolpath, found: FoundRun, step: FloatArray, place: FloatArray):
-        """step : (N, 3 A + K + 5) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
+        """step : (N, 3 A + 5 + M) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
         self.found, self.step, axes = found, step, len(found.run.axis)
         assert found.steps is not None
         least = TIED * found.steps.h
@@ -82,6 +82,19 @@ class RunPrices:
         worth something [s]."""
         axes = self.found.run.axis
         return float(self.alone[:, quantity * len(axes) + np.flatnonzero(axes == axis)].sum())
+
+    def of_laws(self) -> dict[str, tuple[float, float]]:
+        """Of laws that bound the motion somewhere, by name: the least bound, and dT/d(ln limit) [s]."""
+        steps, laws, found = self.found.steps, self.found.run.laws, {}
+        assert steps is not None
+        state = np.stack([steps.position, steps.velocity, steps.acceleration], axis=1)
+        motion = motion_at(state, steps.jerk, steps.h / 2.0)
+        least = laws.bounds(Where(self.leg, self.middle), motion, np.array(laws.named, dtype=np.int64))
+        for column, m in enumerate(laws.named):
+            if np.isfinite(least[:, column]).any():
+                slope = float(self.of(price.LAWS + m).sum())
+                found[laws.laws[m].name] = float(least[:, column].min()), slope
+        return found
 
     def feed_saves(self, ratio: float) -> FloatArray:
         """(N,) time saved by `ratio` of the feed, as far as the axes can follow it in the direction that the
@@ -143,10 +156,10 @@ def _of_limits(
             limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
             if kind is ACCELERATION:
                 slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name)(STEP))
-    for k, state in enumerate(STATE_LIMITS):
-        if (value := getattr(machine, state.key)) is not None:
-            limit[state.name] = value
-            slope[state.name] = fsum(float(run.of(price.STATE + k).sum()) for run in runs)
+    for run in runs:
+        for name, (least, cost) in run.of_laws().items():
+            limit[name] = min(least, limit.get(name, np.inf))
+            slope[name] = slope.get(name, 0.0) + cost
     return limit, slope
 
 
@@ -205,7 +218,7 @@ def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -
         axes = len(run.found.run.axis)
         jerk, acceleration, velocity = (run.step[:, q * axes : (q + 1) * axes].sum(axis=1) for q in range(3))
         every = velocity + run.of(price.FEED) + acceleration + run.of(price.NORMAL) + jerk
-        every = every + sum(run.of(price.STATE + k) for k in range(len(STATE_LIMITS)))
+        every = every + sum(run.of(price.LAWS + m) for m in run.found.run.laws.named)
         np.add.at(feed, run.segment, run.feed_saves(1.0 + MORE_LIMIT))
         np.add.at(limits, run.segment, -share * every)
     return PlacePrices(feed=feed, limits=limits, tolerance=by_joint)

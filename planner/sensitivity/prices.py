@@ -25,6 +25,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
+from planner.feedrate.constraints.limits import POWER as DRIVE_POWER
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.sensitivity.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
 
@@ -37,7 +38,7 @@ TOLERANCE = "tolerance"
 # acceleration, with jerk.
 POWER = {
     **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
-    **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0},
+    **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0, DRIVE_POWER.name: 1.0 / 3.0},
 }
 WITHIN = 0.1  # how far a change foretold to 10 % more of a limit may be off [-] (benchmarks/solvers/found_prices.py)
 ROUNDING = 1e-9  # of sums over steps [-]

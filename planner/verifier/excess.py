@@ -83,8 +83,8 @@ OF_CHORDS = frozenset({Kind.CONTOUR, Kind.VERTEX, Kind.CORNER_BUDGET})
 
 # The quantities of limits.py by `Spans.column`, and the power of how much slower a motion is by which each
 # gets less.
-NAMES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration")
-POWERS = (1, 2, 3, 1, 2)
+NAMES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration", "power")
+POWERS = (1, 2, 3, 1, 2, 3)
 APART = 3  # samples: those that are not further apart are of one span
 SPANS_MAX = 20_000  # of a reading; a motion with more is broken everywhere
 

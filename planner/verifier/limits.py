@@ -37,6 +37,7 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.pieces import RATIO_ROUNDING
+from planner.verifier.power import units_of
 from planner.verifier.worst import (
     COLUMN,
     DIFFERENCE,
@@ -53,7 +54,7 @@ FEED_AT_REST = 1e-6
 NORMAL_NAME, TANGENTIAL_NAME = "normal_acceleration", "acceleration.tangential"
 UNITS = ("/s", "/s2", "/s3")
 
-# Rows of `Worst`: six groups of one row per axis, then some of their own, then three per user limit.
+# Rows of `Worst`: six groups of one row per axis, then some of their own, then the power of each axis, and three per user limit.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
 GROUPS = 6
 FEED, NORMAL, CHORD, TANGENTIAL = range(4)
@@ -73,6 +74,8 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
         time_rounding=given.time_rounding,
         normal=normal_limit(machine),
         tangential=machine.tangential_acceleration or math.inf,
+        power=np.array([machine.axes[letter].power or math.inf for letter in axes]),
+        power_unit=units_of(machine, axes),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         user=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
@@ -107,6 +110,10 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
     ]
     rows += [("", "")] * (GROUPS * len(limits.axes) - len(rows))
     rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm"), (TANGENTIAL_NAME, "mm/s2")]
+    rows += [
+        (f"power.{letter}" if np.isfinite(most) else "", "W/kg" if length == "mm" else "W/(kg m2)")
+        for letter, length, most in zip(limits.axes, unit, limits.power, strict=True)
+    ]
     return rows + [
         (f"{quantity}.{limit.name}", limit.unit + per)
         for limit in limits.user

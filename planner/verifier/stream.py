@@ -20,6 +20,7 @@ from planner.verifier.kernel import kernel
 from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
 from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
+from planner.verifier.power import look_at_power
 from planner.verifier.stops import AtStop
 from planner.verifier.switches import Bounds, Chords
 from planner.verifier.tangential import look_at_tangential
@@ -122,7 +123,9 @@ class Watch:
         block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
         look_at_axes(block, limits, seen.worst)
         look_at_tangential(block, limits, seen.worst)
-        look_at_user_limits(block, limits, seen.worst, GROUPS * len(limits.axes) + ROWS_ALONE)
+        power = GROUPS * len(limits.axes) + ROWS_ALONE
+        look_at_power(block, limits, seen.worst, power)
+        look_at_user_limits(block, limits, seen.worst, power + len(limits.axes))
         self._travelled = float(block.travelled_to()[-1])
 
     def _take_feeds(

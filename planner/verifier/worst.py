@@ -142,6 +142,8 @@ class Limits:
     # normal and tangential: of the normal and of the tangential acceleration [mm/s2], or inf
     normal: float
     tangential: float
+    power: FloatArray  # (A,) of the drives [W/kg], [W/(kg m2)], or inf
+    power_unit: FloatArray  # (A,) of them in 1 mm2/s3
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited [mm/s2]
     jerk_limited: bool
     user: tuple[Any, ...] = ()  # the user's limits (user_limits.py)

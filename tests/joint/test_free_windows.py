@@ -10,8 +10,8 @@ from benchmarks.jobs import problems, random_lines
 from benchmarks.solvers import tube_solvers
 from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
-from planner.joint import own, rows
-from planner.joint.checks import watched_shares, worst_shares
+from planner.joint import laws, own, rows
+from planner.joint.checks import normal_shares, worst_shares
 from planner.joint.curvature import Barrier
 from planner.joint.guess import guess_from
 from planner.joint.motion import integrated
@@ -21,7 +21,6 @@ from planner.joint.problem import window_of
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.run import tube_runs_of
 from planner.joint.solvers import SOLVERS
-from planner.joint.state_limits import ROWS
 from planner.motion.vertex_times import passing_times
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.tube import TubeMethod
@@ -45,7 +44,7 @@ def linear_of(window, x, u):
         tangent=np.zeros((steps, 3, axes)),
         place=window.place.copy(),
         radius=np.zeros((steps, 3)),
-        state=np.zeros((steps, kinds - rows.count(axes), 4 * axes + 1)),
+        laws=np.zeros((steps, kinds - rows.count(axes), 4 * axes + 1)),
     )
     rows.put_rows(window.legs, window.limits, x, u, lin)
     return lin
@@ -54,10 +53,11 @@ def linear_of(window, x, u):
 # --- its pieces ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned", "own", "powered"])
 def test_slopes_are_the_differences_of_the_rows(name):
     """Of all rows whose vector is what moves; the radii of the feed are kept, and so are the tangents of order and arcs."""
-    window = window_of(*begun(name), 0, len(begun(name)[1]), MISSED)
+    run, guess = begun(name)
+    window = window_of(run, guess, 0, len(guess), MISSED, which=np.arange(len(run.laws)))
     x, u = window.x.copy(), window.u.copy()
     rng = np.random.default_rng(2)
     dx, du = 1e-6 * rng.normal(size=x.shape), 1e-6 * rng.normal(size=u.shape)
@@ -69,9 +69,12 @@ def test_slopes_are_the_differences_of_the_rows(name):
     exact = window.limits.on.copy()
     kept = [more + rows.FEED_ROWS + k for k in range(3)]
     kept += [more + row for row in (rows.ORDER_NODE, rows.ORDER_MID, rows.ARC)]
-    # the state's rows keep the speed that they are over: exact where they hold
-    state = slice(more + rows.STATE_ROWS, more + rows.STATE_ROWS + ROWS * window.limits.state.shape[1])
-    exact[:, state] &= np.abs(at.g[:, state]) < 1e-4
+    # those of the tangential acceleration keep the speed that they are over: exact where they hold
+    for kind, lo, hi in zip(
+        window.limits.laws.kind, *(window.limits.laws.first[k:] for k in (0, 1)), strict=False
+    ):
+        pushed = slice(more + rows.LAW_ROWS + lo, more + rows.LAW_ROWS + hi)
+        exact[:, pushed] &= (kind != laws.PUSH) | (np.abs(at.g[:, pushed]) < 1e-4)
     exact[:, kept] = False
     assert exact.any(axis=0).sum() > 12
     np.testing.assert_allclose(slope[exact], ((after.g - before.g) / 2)[exact], rtol=2e-3, atol=2e-9)
@@ -239,7 +242,7 @@ def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monk
     found = again.steps
     state = np.stack([found.position, found.velocity, found.acceleration], axis=1)
     state = np.concatenate([state, [[run.vertex[-1], np.zeros(len(run.axis)), np.zeros(len(run.axis))]]])
-    assert watched_shares(own.keeps_of(run), guess.leg, found.h, state, found.jerk).max() <= 1.0
+    assert normal_shares(own.keeps_of(run), guess.leg, found.h, state, found.jerk).max() <= 1.0
 
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):

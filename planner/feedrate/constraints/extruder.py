@@ -29,6 +29,7 @@ class ExtruderLimit(PathLimit):
 
     name = "extruder"
     of_extruder = True  # judged by what the extruder does, not by this bound
+    searched = False  # the extruder follows the programmed path, not the way inside the tolerance
 
     def __init__(self, limits: FloatArray, ratio: FloatArray):
         with np.errstate(divide="ignore"):

@@ -24,6 +24,7 @@ from planner.feedrate.constraints.filter_error import FilterError
 from planner.feedrate.constraints.limit import AxisLimit, Limit, RowLimit
 from planner.feedrate.constraints.normal_limit import NormalAcceleration
 from planner.feedrate.constraints.phase_lag import PhaseLag
+from planner.feedrate.constraints.power import DrivePower
 from planner.feedrate.constraints.programmed_feed import ProgrammedFeed
 from planner.feedrate.constraints.tangential import TangentialAcceleration, binding
 from planner.machine import Machine
@@ -33,6 +34,7 @@ FEED, VELOCITY = ProgrammedFeed(), AxisVelocity()
 ACCELERATION, JERK = AxisAcceleration(), AxisJerk()
 CHORD_ERROR, FILTER_ERROR = ChordError(), FilterError()
 NORMAL, TANGENTIAL = NormalAcceleration(), TangentialAcceleration()
+POWER = DrivePower()
 LIMITS: tuple[Limit, ...] = (
     FEED,
     VELOCITY,
@@ -43,6 +45,7 @@ LIMITS: tuple[Limit, ...] = (
     ACCELERATION,
     JERK,
     TANGENTIAL,
+    POWER,
 )
 ROWS: tuple[RowLimit, ...] = (ACCELERATION, JERK)  # as rows of the problem, in the order of their indices
 OF_AXES: tuple[AxisLimit, ...] = (VELOCITY, ACCELERATION, JERK)  # with a limit for every axis
@@ -55,6 +58,7 @@ class Limits:
     axes                         : their letters
     velocity, acceleration, jerk : (A,) of the axes, in mm or rad
     normal, tangential           : normal and tangential acceleration [mm/s2]; inf where nothing limits them
+    power                        : (A,) of the drives [mm2/s3]; inf where nothing limits it
     along                        : those with rows like an axis: built-in ones that can bind, and the user's
     """
 
@@ -64,6 +68,7 @@ class Limits:
     jerk: FloatArray
     normal: float
     tangential: float
+    power: FloatArray
     along: tuple[OwnLimit, ...]
 
     @classmethod
@@ -78,6 +83,7 @@ class Limits:
             jerk=JERK.of(machine, axes),
             normal=largest_normal(machine),
             tangential=binding(machine, axes, acceleration),
+            power=POWER.of(machine, axes),
             along=(*built_in, *machine.own),
         )
 

@@ -38,7 +38,7 @@ def binding(machine: Machine, axes: tuple[str, ...], acceleration: FloatArray) -
 class _Row(PathLimit):
     """The acceleration along the path of x, y and z, at most `largest` [mm/s2]."""
 
-    name, counts = TANGENTIAL, LINEAR_AXES
+    name, counts, bounded = TANGENTIAL, LINEAR_AXES, ("acceleration",)
 
     def __init__(self, largest: float):
         self.largest = largest

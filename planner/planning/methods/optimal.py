@@ -54,6 +54,14 @@ class OptimalMethod(Method):
 
     ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
 
+    @property
+    def keeps_power(self) -> bool:
+        return self._joint
+
+    @property
+    def _joint(self) -> bool:
+        return self.corner == AUTO and self.solver == OWN and self.rounds is None
+
     def plan_job(self, job: Job) -> Plan:
         effort = EFFORTS[effort_name(self.effort)]
         search = dataclasses.replace(effort.search, smooth=self.smooth)
@@ -64,7 +72,7 @@ class OptimalMethod(Method):
             bezier=BezierCorner(sigma2=SIGMA2),
             effort=dataclasses.replace(effort, search=search),
             rounds=self.rounds,
-            joint=self.corner == AUTO and self.solver == OWN and self.rounds is None,
+            joint=self._joint,
         )
         made = shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)
         if self.smooth and (self.shaped or not is_searched(job, settings)):

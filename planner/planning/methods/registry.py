@@ -24,7 +24,7 @@ from planner.base.names import (
     users_of,
 )
 from planner.corners.smooth import CornerShape
-from planner.machine import Machine, load_machine
+from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.machine.kinematics import at_tip
 from planner.machine.kinematics.limits import WIDE
 from planner.machine.user_limit import OwnLimit
@@ -123,6 +123,10 @@ def plan(
         raise InputError("reading: the program is read already; give the settings to read_program")
     machine = limited(machine, program.limits)
     chain = chain_of(program, machine)
+    if chain is not None and np.isfinite(machine.powers(LINEAR_AXES)).any():
+        raise InputError(
+            "the machine limits the power of linear axes, which no method keeps on a path of the tool's tip; leave power out of them"
+        )
     used = machine if chain is None else at_tip(machine, chain, wide=WIDE if joints else None)
     made = method.plan(program, used, tolerance, progress, log)
     if chain is not None:

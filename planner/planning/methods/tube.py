@@ -43,6 +43,10 @@ class TubeMethod(Method):
     start: Method = field(default_factory=lambda: OptimalMethod(effort=QUICK))
     solver: str | TubeSolver = "own"
 
+    @property
+    def keeps_power(self) -> bool:
+        return True
+
     def plan_job(self, job: Job) -> Plan:
         solver = tube_solver(self.solver)
         with job.stage("geometry"):

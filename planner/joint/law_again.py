@@ -1,0 +1,62 @@
+"""A window that is searched once more, as what was found exceeds laws (own_laws.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.joint.guess import CutMotion, Guess
+from planner.joint.own_laws import Where
+from planner.joint.run import TubeRun
+from planner.machine.user_limit import QUANTITIES
+
+# Where a run has laws, so often. A share above 1 by more than this comes of places that the motion slid to [-].
+TOLD, SLID = 6, 0.01
+PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itself [-]
+# Power of a share by which a law is lowered, and on so many steps beside.
+TIGHTER_BESIDE, BESIDE = 1.5, 3
+LITTLE = 1e-3  # [-]
+JERK = QUANTITIES.index("jerk")
+
+
+def lost(over: FloatArray) -> bool:
+    """Whether more tries do not help, by the shares `over` (N, 2 + M): of the normal acceleration, and of laws that are far off."""
+    return bool((over[:, :2] > 1.0).any() or (over[:, 2:] > 1.0 + SLID).any())
+
+
+def tightened(over: FloatArray, told: Array) -> FloatArray:
+    """(N, M) by what laws are divided where their shares `over` (N, M) are above 1: by half as much again, and
+    beside there too, where it goes next; everywhere by the little that is left once they were `told` (M,)."""
+    above = np.maximum(over, 1.0)
+    more = above**TIGHTER_BESIDE
+    for back in range(1, BESIDE + 1):
+        more[back:] = np.maximum(more[back:], above[:-back])
+        more[:-back] = np.maximum(more[:-back], above[back:])
+    left = above.max(axis=0)
+    return np.maximum(more, np.where(told & (left < 1.0 + LITTLE), left, 1.0))
+
+
+def law_shares(run: TubeRun, cut: CutMotion, node: Array) -> FloatArray:
+    """(n, M) shares that a cut motion uses at nodes `node` (n,) of the laws that do not depend on its jerk, which is free
+    there; 0 of the others."""
+    state = cut.state[node]
+    motion = np.concatenate([state, np.zeros_like(state[:, :1])], axis=1)
+    free = [law.quantity == JERK for law in run.laws.laws]
+    return np.where(free, 0.0, run.laws.shares(Where(cut.leg[node], cut.place[node, 0]), motion))
+
+
+def strain(run: TubeRun, guess: Guess) -> FloatArray:
+    """(N,) the largest share of a limit or of the tolerance that a motion uses at the beginning of each
+    step."""
+    leg: Array = guess.leg
+    p, v, a = (guess.state[:-1, k] for k in range(3))
+    far = np.linalg.norm(p - run.points(leg, guess.place[:, 0] - run.offset[leg]), axis=1) / run.room[leg]
+    shares = (
+        far,
+        (np.abs(v) / run.velocity).max(axis=1),
+        np.linalg.norm(v, axis=1) / run.feed[leg],
+        run.word_share(leg, v),
+        (np.abs(a) / run.acceleration).max(axis=1),
+        *law_shares(run, guess, np.arange(len(leg))).T,
+    )
+    return np.max(shares, axis=0)

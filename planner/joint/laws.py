@@ -1,0 +1,340 @@
+"""Limits of the search beside those of its axes and its feed: laws, the rows of a step that each has, and their
+derivatives by p, v, a, j and h.
+
+    SPEED         |v| <= V              of some axes: the feed in the axes that F goes by, the user's limits
+    PUSH          |a.t| <= A_t          t = v/|v|
+    JOLT          |d3s/dt3| <= J_t      d3s/dt3 = j.t + |a - (a.t) t|^2/|v|, the change of a.t
+    POWER         |v_k a_k| <= P        of one axis
+    JOINT_SPEED, JOINT_PUSH, JOINT_JOLT     the same three of a function q of the position
+    PIN           n.(p - P) <= 0        a node stays on its side of where a bound jumps (own_laws.py)
+
+On a step a is linear and v a parabola, with the Bezier ordinates b0, b1 and w0, w1, w2. Rows are those of
+ordinates where there are any, so that they hold on the whole step: rows at places instead are made use of
+between them, by a motion that weaves inside the tolerance.
+
+SPEED has w0.w0 where a leg begins, w0.w1, (2 w1.w1 + w0.w2)/3, w1.w2 and w2.w2, over the ordinates of V^2.
+
+PUSH: with the directions e0, e1 of the velocity at the ends e(q) = (1-q) e0 + q e1 is no longer than 1, so
+that a.v <= A_t v.e(q) is enough. Both sides are cubics with the ordinates
+
+    a.v     b0.w0,   (b1.w0 + 2 b0.w1)/3,   (2 b1.w1 + b0.w2)/3,   b1.w2
+    v.e     w0.e0,   (w0.e1 + 2 w1.e0)/3,   (2 w1.e1 + w2.e0)/3,   w2.e1
+
+exact at the nodes, and less by the cosine of half the turn between them. A row is (a.v - A_t v.e)/(A_t d),
+with v.e kept in d: the share of the limit, less 1. From rest and to rest they are 0 for every motion, and are
+no rows. POWER has those of a.v alone. The last ordinate is the first one of the next step.
+
+JOLT and JOINT_JOLT have rows at both ends of a step; JOINT_SPEED the ordinate in the middle instead of the
+second end, JOINT_PUSH the middle. About a place P that the node had before, with d = p - P, g = q',
+H = q'' there and the third derivative T along the motion,
+
+    q' = (g + H d).v,     q'' = (g + H d).a + v.H v,     q''' = (g + H d).j + 3 v.H a + T v^3.
+
+Bounds V, A, J are those at both ends of a step, each times 1 + tilt.d there. Where the motion slides away
+from P they are not the user's any more: what is found is looked at exactly, and searched once more about its own places.
+
+Of the curvature the model has what is positive of that of SPEED, of the products a.v, of |a - (a.t) t|^2/|v|
+and of v.H v: without it windows take many more iterations, or do not converge.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
+
+SPEED, PUSH, JOLT, POWER, JOINT_SPEED, JOINT_PUSH, JOINT_JOLT, PIN = range(8)
+ROWS_OF = (5, 6, 4, 6, 4, 4, 4, 1)  # upper before lower, where there are both
+REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
+TILTED_LEAST = 0.1  # what 1 + tilt.d is at least [-]
+
+
+class LawRows(NamedTuple):
+    """M laws of N steps, in the units of the problem; Q functions of the position."""
+
+    kind: Array  # (M,)
+    first: Array  # (M+1,) of their rows
+    counts: FloatArray  # (M, A) 1 for the axes that count, else 0
+    node: FloatArray  # (N, M) bound at the step's node, the smaller one of both sides
+    begin: FloatArray  # (N, M) bound where the step begins
+    end: FloatArray  # (N, M) and where it ends
+    tilt: FloatArray  # (N, M, A) d(ln bound)/dp
+    at: FloatArray  # (N+1, A) P
+    joint: Array  # (M,) which function
+    gradient: FloatArray  # (N+1, Q, A) g
+    bend: FloatArray  # (N+1, Q, A, A) H
+    convex: FloatArray  # (N+1, 2, Q, A, A) what is positive of H, and of -H
+    third: FloatArray  # (N+1, Q) T |v|^3 of the motion before
+    heading: FloatArray  # (N+1, A) v/|v|^2 of that; 0 at rest
+    pin: FloatArray  # (N, A) n
+    pinned: FloatArray  # (N,) n.P
+
+    def exact(self) -> Array:
+        """(M - 1,) of the laws before `PIN`: whether their rows are theirs wherever the motion slides."""
+        return (self.kind[:-1] <= POWER) & ~self.tilt[:, :-1].any(axis=(0, 2))
+
+
+@njit(cache=True, error_model="numpy")
+def _ordinates(x, u, linear, rest, work, value, slope):
+    """The first three ordinates of a.v and of v.e of a step with the node x (3 A,) and the controls u (A+1,),
+    value (2, 3), and their derivatives by p, v, a, j and h, slope (2, 3, 4 A + 1). work (5, A)."""
+    axes = len(u) - 1
+    h, (e0, e1, w0, w1, w2) = u[axes], work
+    square0, square1 = rest * rest, rest * rest
+    for k in range(axes):
+        v, a, j = linear[k] * x[axes + k], linear[k] * x[2 * axes + k], linear[k] * u[k]
+        w0[k], w1[k], w2[k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * j)
+        square0, square1 = square0 + w0[k] * w0[k], square1 + w2[k] * w2[k]
+    size0, size1 = np.sqrt(square0), np.sqrt(square1)
+    value[:] = 0.0
+    for k in range(axes):
+        e0[k], e1[k] = w0[k] / size0, w2[k] / size1
+        b0, b1 = linear[k] * x[2 * axes + k], linear[k] * (x[2 * axes + k] + h * u[k])
+        value[0, 0] += b0 * w0[k]
+        value[0, 1] += (b1 * w0[k] + 2.0 * b0 * w1[k]) / 3.0
+        value[0, 2] += (2.0 * b1 * w1[k] + b0 * w2[k]) / 3.0
+        value[1, 0] += w0[k] * e0[k]
+        value[1, 1] += (w0[k] * e1[k] + 2.0 * w1[k] * e0[k]) / 3.0
+        value[1, 2] += (2.0 * w1[k] * e1[k] + w2[k] * e0[k]) / 3.0
+    slope[:] = 0.0
+    for r in range(3):
+        # what turns with e0 and with e1: the ordinates that they are multiplied by
+        along0, along1 = 0.0, 0.0
+        for k in range(axes):
+            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
+            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
+            along0, along1 = along0 + by0 * e0[k], along1 + by1 * e1[k]
+        for k in range(axes):
+            a, j = linear[k] * x[2 * axes + k], linear[k] * u[k]
+            b0, b1 = a, a + h * j
+            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
+            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
+            for side in range(2):
+                n0, n1, n2, m0, m1 = 0.0, 0.0, 0.0, 0.0, 0.0
+                if side == 0:
+                    if r == 0:
+                        n0, m0 = b0, w0[k]
+                    elif r == 1:
+                        n0, n1, m0, m1 = b1 / 3.0, 2.0 * b0 / 3.0, 2.0 * w1[k] / 3.0, w0[k] / 3.0
+                    else:
+                        n1, n2, m0, m1 = 2.0 * b1 / 3.0, b0 / 3.0, w2[k] / 3.0, 2.0 * w1[k] / 3.0
+                else:
+                    n0 = e0[k] if r == 0 else e1[k] / 3.0 if r == 1 else 0.0
+                    n1 = 0.0 if r == 0 else 2.0 / 3.0 * (e0[k] if r == 1 else e1[k])
+                    n2 = e0[k] / 3.0 if r == 2 else 0.0
+                    n0 += (by0 - along0 * e0[k]) / size0
+                    n2 += (by1 - along1 * e1[k]) / size1
+                row = slope[side, r]
+                row[axes + k] = linear[k] * (n0 + n1 + n2)
+                row[2 * axes + k] = linear[k] * (h * (0.5 * n1 + n2) + m0 + m1)
+                row[3 * axes + k] = linear[k] * h * (0.5 * h * n2 + m1)
+                row[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
+
+
+@njit(cache=True, error_model="numpy")
+def square_at(begin, end, r):
+    """The r-th ordinate of degree 4 of the square of what goes from `begin` to `end`."""
+    if begin == end or r == 0:
+        return begin * begin
+    if r == 4:
+        return end * end
+    if r == 2:
+        return (begin * begin + 4.0 * begin * end + end * end) / 6.0
+    return 0.5 * (begin + end) * (begin if r == 1 else end)
+
+
+@njit(cache=True, error_model="numpy")
+def _put_speed(laws, i, m, x, u, f, by, g, out):
+    """The rows of SPEED, as `put_law_rows`; f (2,) are the bound's 1 + tilt.d at both ends of the step, `by`
+    (2, 4 A + 1) their derivatives."""
+    axes = len(u) - 1
+    h, begin, end = u[axes], laws.begin[i, m], laws.end[i, m]
+    for r in range(ROWS_OF[SPEED]):
+        square = square_at(begin, end, r)
+        per = 0.5 / square
+        for k in range(axes):
+            a, j, counts = x[2 * axes + k], u[k], laws.counts[m, k]
+            w0, w1 = x[axes + k], x[axes + k] + 0.5 * h * a
+            w2 = w0 + h * (a + 0.5 * h * j)
+            n0 = 2.0 * w0 if r == 0 else w1 if r == 1 else w2 / 3.0 if r == 2 else 0.0
+            n1 = w0 if r == 1 else 4.0 / 3.0 * w1 if r == 2 else w2 if r == 3 else 0.0
+            n2 = w0 / 3.0 if r == 2 else w1 if r == 3 else 2.0 * w2 if r == 4 else 0.0
+            g[r] += 0.5 * per * counts * (n0 * w0 + n1 * w1 + n2 * w2)
+            out[r, axes + k] = per * counts * (n0 + n1 + n2)
+            out[r, 2 * axes + k] = per * counts * h * (0.5 * n1 + n2)
+            out[r, 3 * axes + k] = per * counts * 0.5 * h * h * n2
+            out[r, 4 * axes] += per * counts * (0.5 * n1 * a + n2 * (a + h * j))
+        # of the ordinate of (begin f0 + (end f1 - begin f0) q)^2, its shares of begin^2, begin end and end^2
+        both = 0.5 if r in (1, 3) else 4.0 / 6.0 if r == 2 else 0.0
+        first, last = (0.0, 0.0, 1.0 / 6.0, 0.5, 1.0)[4 - r], (0.0, 0.0, 1.0 / 6.0, 0.5, 1.0)[r]
+        if begin == end and f[0] == 1.0 and f[1] == 1.0:
+            g[r] -= 0.5
+        else:
+            v0, v1 = begin * f[0], end * f[1]
+            g[r] -= per * (first * v0 * v0 + both * v0 * v1 + last * v1 * v1)
+        of_first = per * begin * (2.0 * first * begin * f[0] + both * end * f[1])
+        of_last = per * end * (2.0 * last * end * f[1] + both * begin * f[0])
+        for k in range(4 * axes + 1):
+            out[r, k] -= of_first * by[0, k] + of_last * by[1, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _put_pushed(laws, i, m, x, u, rest, f, by, g, out):
+    """The rows of PUSH and of POWER, as `_put_speed`."""
+    axes = len(u) - 1
+    work, value, slope = np.empty((5, axes)), np.empty((2, 3)), np.empty((2, 3, 4 * axes + 1))
+    _ordinates(x, u, laws.counts[m], rest, work, value, slope)
+    if laws.kind[m] == POWER:
+        value[1], slope[1] = 1.0, 0.0
+    for r in range(3):
+        begin, end = laws.node[i, m] if r == 0 else laws.begin[i, m], laws.end[i, m]
+        bound = begin * f[0] + (end * f[1] - begin * f[0]) * r / 3.0
+        plain = begin + (end - begin) * r / 3.0
+        per = 1.0 / (plain * max(value[1, r], rest if laws.kind[m] == PUSH else 1.0))
+        of_first, of_last = per * value[1, r] * begin * (1.0 - r / 3.0), per * value[1, r] * end * r / 3.0
+        for side in range(2):
+            row, sign = 3 * side + r, 1.0 - 2.0 * side
+            g[row] = per * (sign * value[0, r] - bound * value[1, r])
+            for k in range(4 * axes + 1):
+                out[row, k] = per * (sign * slope[0, r, k] - bound * slope[1, r, k])
+                out[row, k] -= of_first * by[0, k] + of_last * by[1, k]
+
+
+@njit(cache=True, error_model="numpy")
+def seen_at(x, u, t, y):
+    """y (3, A) = position, velocity and acceleration at the time t of a step."""
+    axes = len(u) - 1
+    for k in range(axes):
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        y[0, k] = x[k] + t * (v + t * (0.5 * a + t * j / 6.0))
+        y[1, k] = v + t * (a + 0.5 * t * j)
+        y[2, k] = a + t * j
+
+
+@njit(cache=True, error_model="numpy")
+def chained(u, part, y, by, out):
+    """out (4 A + 1,) += the derivatives of what has those by position, velocity, acceleration and jerk, `by`
+    (4, A), at a part of a step, where its motion is y (3, A)."""
+    axes = len(u) - 1
+    t = part * u[axes]
+    for k in range(axes):
+        p, v, a = by[0, k], by[1, k], by[2, k]
+        out[k] += p
+        out[axes + k] += t * p + v
+        out[2 * axes + k] += t * (0.5 * t * p + v) + a
+        out[3 * axes + k] += t * (t * (t * p / 6.0 + 0.5 * v) + a) + by[3, k]
+        out[4 * axes] += part * (p * y[1, k] + v * y[2, k] + a * u[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _jolt(y, j, counts, rest, by):
+    """j.t + |a - (a.t) t|^2/|v| of y (3, A) and j (A,), and its derivatives into `by` (4, A)."""
+    vv, av, aa, jv = rest * rest, 0.0, 0.0, 0.0
+    for k in range(y.shape[1]):
+        v, a = counts[k] * y[1, k], counts[k] * y[2, k]
+        vv, av, aa, jv = vv + v * v, av + a * v, aa + a * a, jv + j[k] * v
+    s = np.sqrt(vv)
+    for k in range(y.shape[1]):
+        v, a = y[1, k], y[2, k]
+        turned = (jv + aa - 3.0 * av * av / vv) * v + 2.0 * av * a
+        by[0, k], by[1, k] = 0.0, counts[k] * (j[k] - turned / vv) / s
+        by[2, k], by[3, k] = counts[k] * 2.0 * (a - av / vv * v) / s, counts[k] * v / s
+    return (jv + aa - av * av / vv) / s
+
+
+@njit(cache=True, error_model="numpy")
+def _of_joint(laws, n, other, m, order, y, j, by):
+    """The derivative of that order of a function of the position by the time, as nodes n and `other` have it
+    on the mean, and its derivatives into `by` (4, A)."""
+    q, axes = laws.joint[m], y.shape[1]
+    value, along = 0.0, 0.0
+    by[:] = 0.0
+    for k in range(axes):
+        along += laws.heading[n, k] * y[1, k]
+    for k in range(axes):
+        g, hv, ha, hj = 0.5 * (laws.gradient[n, q, k] + laws.gradient[other, q, k]), 0.0, 0.0, 0.0
+        for c in range(axes):
+            bend = 0.5 * (laws.bend[n, q, k, c] + laws.bend[other, q, k, c])
+            g += bend * (y[0, c] - 0.5 * (laws.at[n, c] + laws.at[other, c]))
+            hv, ha, hj = hv + bend * y[1, c], ha + bend * y[2, c], hj + bend * j[c]
+        if order == 1:
+            value += g * y[1, k]
+            by[0, k], by[1, k] = hv, g
+        elif order == 2:
+            value += g * y[2, k] + hv * y[1, k]
+            by[0, k], by[1, k], by[2, k] = ha, 2.0 * hv, g
+        else:
+            value += g * j[k] + 3.0 * hv * y[2, k]
+            by[0, k], by[2, k], by[3, k] = hj, 3.0 * hv, g
+            by[1, k] = 3.0 * ha + 3.0 * laws.third[n, q] * along * along * laws.heading[n, k]
+    return value + laws.third[n, q] * along**3 if order == 3 else value
+
+
+@njit(cache=True, error_model="numpy")
+def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
+    """The rows of laws that are watched at places of a step, as `_put_speed`; `of_f` is its `by`."""
+    axes, kind = len(u) - 1, laws.kind[m]
+    y, by = np.empty((3, axes)), np.zeros((4, axes))
+    for place in range(2):
+        part = 0.5 * place if kind in (JOINT_PUSH, JOINT_SPEED) else 1.0 * place
+        seen_at(x, u, part * u[axes], y)
+        row = out[2 * place]
+        if kind == JOLT:
+            value = _jolt(y, u, laws.counts[m], rest, by)
+        elif kind == JOINT_SPEED and place:  # at the middle, with the ordinate w1 as the velocity
+            speed = y[1].copy()
+            for k in range(axes):
+                y[1, k] = x[axes + k] + 0.5 * u[axes] * x[2 * axes + k]
+            value = _of_joint(laws, i, i + 1, m, 1, y, u, by)
+            for k in range(axes):
+                row[axes + k], row[2 * axes + k] = by[1, k], 0.5 * u[axes] * by[1, k]
+                row[4 * axes] += 0.5 * by[1, k] * x[2 * axes + k]
+            y[1], by[1] = speed, 0.0
+        else:
+            first = i if kind == JOINT_PUSH else i + place
+            value = _of_joint(laws, first, i + place, m, kind - JOINT_SPEED + 1, y, u, by)
+        chained(u, part, y, by, row)
+        bound, at = laws.end[i, m] if place else laws.begin[i, m], place
+        if place == 0 and kind in (JOINT_SPEED, JOINT_PUSH):
+            bound = laws.node[i, m]
+        for k in range(4 * axes + 1):
+            row[k] /= bound
+            out[2 * place + 1, k] = -row[k] - of_f[at, k]
+            row[k] -= of_f[at, k]
+        g[2 * place], g[2 * place + 1] = value / bound - f[at], -value / bound - f[at]
+
+
+@njit(cache=True, error_model="numpy")
+def put_law_rows(limits, i, x, u, g, out):
+    """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g, and their derivatives by p,
+    v, a, j and h into out (.., 4 A + 1)."""
+    laws, axes = limits.laws, len(u) - 1
+    if len(laws.kind) == 0:
+        return
+    f, by, y, tilt = np.empty(2), np.zeros((2, 4 * axes + 1)), np.empty((3, axes)), np.zeros((4, axes))
+    for m in range(len(laws.kind)):
+        own, slope = g[laws.first[m] : laws.first[m + 1]], out[laws.first[m] : laws.first[m + 1]]
+        own[:], slope[:], f[:], by[:] = 0.0, 0.0, 1.0, 0.0
+        if laws.tilt[i, m].any():
+            for end in range(2):
+                seen_at(x, u, end * u[axes], y)
+                for k in range(axes):
+                    tilt[0, k] = laws.tilt[i, m, k]
+                    f[end] += tilt[0, k] * (y[0, k] - laws.at[i + end, k])
+                chained(u, 1.0 * end, y, tilt, by[end])
+                f[end] = max(f[end], TILTED_LEAST)
+        rest = REST * limits.pace[i]
+        if laws.kind[m] == SPEED:
+            _put_speed(laws, i, m, x, u, f, by, own, slope)
+        elif laws.kind[m] == PUSH or laws.kind[m] == POWER:
+            _put_pushed(laws, i, m, x, u, rest, f, by, own, slope)
+        elif laws.kind[m] == PIN:
+            own[0] = limits.aside - laws.pinned[i] / limits.room_node[i]
+            for k in range(axes):
+                slope[0, k] = laws.pin[i, k] / limits.room_node[i]
+                own[0] += slope[0, k] * x[k]
+        else:
+            _put_ends(laws, i, m, x, u, rest, f, by, own, slope)

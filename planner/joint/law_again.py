@@ -13,9 +13,9 @@ from planner.machine.user_limit import QUANTITIES
 # Where a run has laws, so often. A share above 1 by more than this comes of places that the motion slid to [-].
 TOLD, SLID = 6, 0.01
 PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itself [-]
-# Power of a share by which a law is lowered, and on so many steps beside.
-TIGHTER_BESIDE, BESIDE = 1.5, 3
-LITTLE = 1e-3  # [-]
+# Power of a share by which a law is lowered, by this at least [-] (what slides on is above it by some 1e-6
+# every time), and on so many steps beside.
+TIGHTER_BESIDE, LOWERED, BESIDE = 1.5, 1e-5, 3
 JERK = QUANTITIES.index("jerk")
 
 
@@ -24,16 +24,15 @@ def lost(over: FloatArray) -> bool:
     return bool((over[:, :2] > 1.0).any() or (over[:, 2:] > 1.0 + SLID).any())
 
 
-def tightened(over: FloatArray, told: Array) -> FloatArray:
+def tightened(over: FloatArray) -> FloatArray:
     """(N, M) by what laws are divided where their shares `over` (N, M) are above 1: by half as much again, and
-    beside there too, where it goes next; everywhere by the little that is left once they were `told` (M,)."""
-    above = np.maximum(over, 1.0)
+    beside there too, where it goes next."""
+    above = np.where(over > 1.0, np.maximum(over, 1.0 + LOWERED), 1.0)
     more = above**TIGHTER_BESIDE
     for back in range(1, BESIDE + 1):
         more[back:] = np.maximum(more[back:], above[:-back])
         more[:-back] = np.maximum(more[:-back], above[back:])
-    left = above.max(axis=0)
-    return np.maximum(more, np.where(told & (left < 1.0 + LITTLE), left, 1.0))
+    return more
 
 
 def law_shares(run: TubeRun, cut: CutMotion, node: Array) -> FloatArray:

@@ -72,10 +72,6 @@ class LawRows(NamedTuple):
     pin: FloatArray  # (N, A) n
     pinned: FloatArray  # (N,) n.P
 
-    def exact(self) -> Array:
-        """(M - 1,) of the laws before `PIN`: whether their rows are theirs wherever the motion slides."""
-        return (self.kind[:-1] <= POWER) & ~self.tilt[:, :-1].any(axis=(0, 2))
-
 
 @njit(cache=True, error_model="numpy")
 def _ordinates(x, u, linear, rest, work, value, slope):

@@ -265,7 +265,7 @@ class _Search:
         for prox, missed in tries:
             pull = PULL
             tight, begun = np.ones((hi - lo, 2 + len(run.laws))), Window(self.guess, lo, hi)
-            needed, told = near(run.laws, begun), np.zeros(len(run.laws), dtype=bool)
+            needed = near(run.laws, begun)
             for number in range(TOLD if len(run.laws) else TIGHTENED):
                 if self._stopped:
                     return False
@@ -285,14 +285,12 @@ class _Search:
                 if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                     break
                 pull = PULL_AGAIN if run.laws.moved else PULL
-                # rows that are far off are asked for about other places first
-                settled = np.zeros(len(run.laws), dtype=bool)
-                settled[which] = window.limits.laws.exact()
                 of_laws = over[:, 2:]
-                settled |= needed & (told | (of_laws.max(axis=0) < 1.0 + SLID))
+                # rows that are far off are asked for about other places first
+                near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
                 tight[:, :2] *= np.where(over[:, :2] > 1.0, over[:, :2] * TIGHTER, 1.0)
-                tight[:, 2:] *= np.where(settled, tightened(of_laws, told), 1.0)
-                told, needed = needed.copy(), needed | (of_laws > NEAR).any(axis=0)
+                tight[:, 2:] *= np.where(near_enough, tightened(of_laws), 1.0)
+                needed |= (of_laws > NEAR).any(axis=0)
         return False
 
     def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window) -> FloatArray | None:

@@ -19,7 +19,7 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.axis_acceleration import JUMP
 from planner.feedrate.constraints.limit import RowPoint
-from planner.feedrate.constraints.limits import JERK, LIMITS, ROWS, TANGENTIAL, Limits
+from planner.feedrate.constraints.limits import JERK, LIMITS, POWER, ROWS, TANGENTIAL, Limits
 from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.constraints.own_axes import own_inside
 from planner.feedrate.sampling.samples import sample_path
@@ -203,6 +203,16 @@ def test_the_judge_finds_the_tangential_acceleration_used_up():
     assert used == [pytest.approx(1.0, abs=CLOSE)]
 
 
+def test_the_judge_finds_the_power_of_a_drive_used_up():
+    """Round the circle v_x a_x is v^3/2R at most."""
+    machine = machine_with()
+    driven = {name: axis.model_copy(update={"power": 0.0108}) for name, axis in machine.axes.items()}
+    machine = machine.model_copy(update={"axes": driven})
+    speed = float(np.cbrt(2.0 * RADIUS * POWER.of(machine, ("x",))[0]))
+    check = judge(steady(speed), circle().toolpath(machine), machine).limits["power.x"]
+    assert (check.ratio, check.unit) == (pytest.approx(1.0, abs=CLOSE), POWER.unit)
+
+
 @pytest.mark.parametrize("columns", [("velocity", "acceleration", "jerk"), ()], ids=["columns", "positions"])
 def test_the_judge_finds_a_tangential_acceleration_beyond_its_limit(columns):
     """By a twentieth, also where positions are all that it has: then it takes off what the curve may hide."""
@@ -256,6 +266,7 @@ def test_a_limit_is_named_in_one_file():
         "velocity",
         "acceleration",
         "jerk",
+        "power",
     } | {JUMP}
     with_axes = tuple(f"{name}." for name in ("velocity", "acceleration", "jerk", JUMP))
     quoted = re.compile("[\"'](" + "|".join([*single, *map(re.escape, with_axes)]) + ")")

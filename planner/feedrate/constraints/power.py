@@ -21,7 +21,7 @@ REACHABLE = 1.0 - 1e-12  # of velocity times acceleration: rounding [-]
 class DrivePower(AxisLimit):
     """|v a| <= P, on machines that name P."""
 
-    name, unit, order = "power", "mm2/s3", 3
+    name, unit, order = "power", "W/kg", 3
 
     @classmethod
     def of(cls, machine: Machine, axes: tuple[str, ...]) -> FloatArray:

@@ -9,6 +9,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 FloatArray = NDArray[np.float64]
+# Axes that a vector in a record of a kernel has room for: a kernel is compiled for each kind of record, half a
+# minute of them for another number of axes.
+ROOMS = (3, 9)
+
+
+def room(axes: int) -> int:
+    """How many numbers a vector over `axes` axes takes in a record; those beyond are 0."""
+    return next((room for room in ROOMS if axes <= room), axes)
+
+
+def read_only(array: Array) -> Array:
+    """The array, not to be written: a kernel is compiled once more for one that can be."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def freeze(

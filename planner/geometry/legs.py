@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze, room
 from planner.base.kernels import njit
 from planner.geometry.curves import curve_point, curve_tangent
 from planner.geometry.toolpath import Joint, Toolpath
@@ -53,7 +53,8 @@ class Legs:
 
 
 def leg_dtype(axes: int) -> np.dtype:
-    """Record of one leg over `axes` axes; formulas and meaning of the fields: geometry/toolpath.py.
+    """Record of one leg over `axes` axes, with `room` for more; formulas and meaning of the fields:
+    geometry/toolpath.py.
 
     On a curve, which is `round` as well, start, direction, center and e1 are its control points, the first
     numbers of e2 and drift the weights of the inner two, and radius and rate those of an arc that turns as
@@ -62,7 +63,7 @@ def leg_dtype(axes: int) -> np.dtype:
     vectors = ("start", "direction", "center", "e1", "e2", "drift")
     flags = [("round", np.bool_), ("curve", np.bool_)]
     scalars = [*flags, ("length", np.float64), ("radius", np.float64), ("rate", np.float64)]
-    return np.dtype([*scalars, *((name, np.float64, (axes,)) for name in vectors)])
+    return np.dtype([*scalars, *((name, np.float64, (room(axes),)) for name in vectors)])
 
 
 def legs_of(toolpath: Toolpath) -> Legs:
@@ -79,10 +80,14 @@ def legs_of(toolpath: Toolpath) -> Legs:
     arc, straight = toolpath.arc[first[:-1]], line[first[:-1]]
     chord = np.linalg.norm(end - start, axis=1)
     length = np.where(straight, chord, toolpath.length[first[:-1]])
-    table = np.zeros(len(length), leg_dtype(len(toolpath.axes)))
-    table["length"], table["start"], table["round"] = length, start, ~straight
-    table["direction"][straight] = (end - start)[straight] / chord[straight, None]
-    for name in ("center", "e1", "e2", "drift", "radius", "rate"):
+    axes = len(toolpath.axes)
+    table = np.zeros(len(length), leg_dtype(axes))
+    table["length"], table["round"] = length, ~straight
+    table["start"][:, :axes] = start
+    table["direction"][straight, :axes] = (end - start)[straight] / chord[straight, None]
+    for name in ("center", "e1", "e2", "drift"):
+        table[name][arc >= 0, :axes] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
+    for name in ("radius", "rate"):
         table[name][arc >= 0] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
     _set_curves(table, toolpath, first[:-1])
     return Legs(first=first, offset=offset, length=length, table=table)
@@ -94,7 +99,7 @@ def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
     leg = np.flatnonzero(toolpath.curve[segment] >= 0)
     row, bend = toolpath.curve[segment[leg]], toolpath.curvature[segment[leg]]
     for k, name in enumerate(("start", "direction", "center", "e1")):
-        table[name][leg] = toolpath.curves.points[row, k]
+        table[name][leg, : len(toolpath.axes)] = toolpath.curves.points[row, k]
     table["curve"][leg] = True
     table["e2"][leg, 0], table["drift"][leg, 0] = toolpath.curves.weight[row].T
     table["radius"][leg], table["rate"][leg] = 1.0 / bend, bend

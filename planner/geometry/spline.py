@@ -10,15 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze, room
 from planner.base.kernels import njit
 
 DEGREE = 5  # of every span: r''' is continuous where spans meet, so that jerk is, and r'''' jumps
 
 
 def span_dtype(axes: int) -> np.dtype:
-    """Record of one span over `axes` axes (module text)."""
-    return np.dtype([("begin", np.float64), ("width", np.float64), ("coef", np.float64, (DEGREE + 1, axes))])
+    """Record of one span over `axes` axes, with `room` for more (module text)."""
+    coef = ("coef", np.float64, (DEGREE + 1, room(axes)))
+    return np.dtype([("begin", np.float64), ("width", np.float64), coef])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

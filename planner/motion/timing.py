@@ -26,7 +26,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze, read_only
 from planner.base.errors import InputError
 from planner.base.search import nearest
 from planner.base.sizes import SIZES
@@ -249,7 +249,7 @@ def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
     grid = Grid(**fields, passed=samples.path.passed)
     if samples not in _inverses:
         _inverses[samples] = inverses(samples.table, grid, axes)
-    *columns, segment = sample(samples.table, law.columns, grid, _inverses[samples], times, axes)
+    *columns, segment = sample(samples.table, law.columns, grid, _inverses[samples], read_only(times), axes)
     names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
     return Trajectory(
         axes=toolpath.axes,

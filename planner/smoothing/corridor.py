@@ -48,7 +48,9 @@ def find_corridor(path: SmoothPath, runs: SplineRuns, tol: Array) -> Corridor:
     at = path.legs.first
     of_leg = np.minimum.reduceat(np.minimum(tol[:-1], tol[1:]), at[:-1])
     place = np.concatenate([[0.0], np.cumsum(path.legs.length)])
-    return Corridor(*_corridor(path.legs.table, place, of_leg, _feed_changes(path), runs))
+    return Corridor(
+        *_corridor(path.legs.table, place, of_leg, _feed_changes(path), runs, len(path.toolpath.axes))
+    )
 
 
 def _feed_changes(path: SmoothPath) -> FeedChanges:
@@ -112,9 +114,9 @@ def _extent(runs, q, leg, length):
 
 
 @njit(cache=True, error_model="numpy")
-def _corridor(legs, starts, tol, changes, runs):
+def _corridor(legs, starts, tol, changes, runs, axes):
     """Columns of `Corridor`; starts, tol (R,) place along the legs and tolerance of each leg [mm]."""
-    first, axes = _vertices(runs, legs, tol, changes), legs[0].start.shape[0]
+    first = _vertices(runs, legs, tol, changes)
     total = first[-1]
     place, turn = np.empty(total), np.zeros(total)
     point, along = np.empty((total, axes)), np.zeros((total, axes))

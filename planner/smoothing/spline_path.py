@@ -239,7 +239,7 @@ def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
     for q in kept:
         cut, coef = _polynomials(splines, int(q))
         table = np.zeros(len(coef), span_dtype(axes))
-        table["begin"], table["width"], table["coef"] = cut[:-1], np.diff(cut), coef
+        table["begin"], table["width"], table["coef"][..., :axes] = cut[:-1], np.diff(cut), coef
         tables.append(table)
     count = splines.span_first[kept + 1] - splines.span_first[kept]
     of_span = np.repeat(splines.fits, np.diff(splines.span_first))

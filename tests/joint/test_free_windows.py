@@ -8,6 +8,7 @@ from starts import MACHINE, PROGRAMS, begun
 
 from benchmarks.jobs import problems, random_lines
 from benchmarks.solvers import tube_solvers
+from planner.base.arrays import read_only
 from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
 from planner.joint import laws, own, rows
@@ -153,7 +154,7 @@ def test_shares_are_those_of_a_fine_sampling():
     h, jerk = rng.uniform(1e-3, 4e-3, steps), run.jerk * rng.uniform(-1.0, 1.0, (steps, 2))
     begin = np.array([[0.0, 0.0], [20.0, 15.0], [0.0, 0.0]])
     state = integrated(begin, h, jerk)
-    leg = np.zeros(steps, np.int64)
+    leg = read_only(np.zeros(steps, np.int64))
     limit, tube = worst_shares(own.keeps_of(run), leg, h, state, jerk, np.zeros((steps, 3)))
     t = np.linspace(0.0, 1.0, 2001)[:, None, None] * h[None, :, None]
     p, v, a = (state[:-1, k] for k in range(3))

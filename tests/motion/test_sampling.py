@@ -7,6 +7,7 @@ import pytest
 from whole_plans import smooth_path
 
 from benchmarks.jobs import problems
+from planner.base.arrays import read_only
 from planner.corners.elements import ElementTable, element_length, element_point
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import sample_path
@@ -49,9 +50,8 @@ def nearly_a_cusp() -> tuple[ElementTable, Grid]:
     length = element_length(*table, element, 0.0, 1.0, 0.5, np.empty((4, 3)))
     ends = np.array([0.0, 1.0]), np.array([1.0, 1.0])
     piece, s = np.array([0, 2]), np.array([0.0, length])
-    return table, Grid(
-        piece, s, np.full(2, element), *ends, np.zeros(2, dtype=np.int64), np.array([0.0, 1.0])
-    )
+    columns = piece, s, np.full(2, element), *ends, np.zeros(2, dtype=np.int64)
+    return table, Grid(*map(read_only, columns), np.array([0.0, 1.0]))
 
 
 CASES = {name: (samples.table, grid_of(samples)) for name, samples in PATHS.items()} | {
@@ -69,7 +69,7 @@ def test_samples_lie_where_their_arc_length_says(name):
     interval = interval[:: max(1, len(interval) // LOOKED_AT)]
     h = grid.s[interval + 1] - grid.s[interval]
     times = (grid.s[interval, None] + h[:, None] * SHARES).ravel()
-    position, velocity, *_, s, _, _ = sample(table, even_law(grid), grid, inverse, times, axes)
+    position, velocity, *_, s, _, _ = sample(table, even_law(grid), grid, inverse, read_only(times), axes)
     np.testing.assert_allclose(s, times, rtol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(velocity, axis=1), 1.0, rtol=1e-12)
     work, out = np.empty((2, 4, axes)), np.empty((4, axes))
@@ -90,7 +90,8 @@ def even_law(grid: Grid) -> tuple[object, ...]:
     """1 mm/s all along."""
     run = np.repeat(np.arange(len(grid.piece) - 1), np.diff(grid.piece))
     one = np.ones(len(grid.s))
-    return grid.s, grid.s, one, 0.0 * one, 0.0 * one, run, float(grid.s[-1]) + 1.0
+    columns = map(read_only, (grid.s, grid.s, one, 0.0 * one, 0.0 * one, run))
+    return *columns, float(grid.s[-1]) + 1.0
 
 
 @pytest.mark.parametrize("name", list(CASES))
@@ -100,10 +101,10 @@ def test_a_sample_does_not_depend_on_the_others_of_its_lot(name):
     axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
     inverse, law = inverses(table, grid, axes), even_law(grid)
     times = np.linspace(0.0, grid.s[-1], 3 * LANES + 5)
-    together = sample(table, law, grid, inverse, times, axes)
+    together = sample(table, law, grid, inverse, read_only(times), axes)
     for n, time in enumerate(times):
         for whole, single in zip(
-            together, sample(table, law, grid, inverse, np.array([time]), axes), strict=True
+            together, sample(table, law, grid, inverse, read_only(np.array([time])), axes), strict=True
         ):
             assert np.array_equal(whole[n], single[0])
 

@@ -176,7 +176,7 @@ FOUND_LAWS = (
     28340,
 )
 # By method second-order on splines, as they were found: a search of path and feed takes a hundred times as long there.
-ON_SPLINES = {44666, 74537}
+ON_SPLINES, SPLINES = (44666, 74537), {"geometry": "spline"}
 # The same, of draws of before: as `python -m benchmarks campaign --show SEED` writes a job.
 FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(encoding="utf-8"))
 
@@ -184,10 +184,8 @@ FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(en
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20, *FOUND, *FOUND_LAWS])
 def test_jobs_of_the_campaign_are_as_they_should_be(seed: int) -> None:
-    if seed in ON_SPLINES:
-        row = row_of(dataclasses.replace(job(seed), settings={"geometry": "spline"}))
-    else:
-        row = outcome(seed)
+    on_splines = seed in ON_SPLINES
+    row = row_of(dataclasses.replace(job(seed), settings=SPLINES)) if on_splines else outcome(seed)
     assert not wrongs(row), row
 
 

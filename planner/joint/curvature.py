@@ -30,7 +30,7 @@ class Barrier(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _add_vector(W, axes, alpha, e, G):
+def add_vector(W, axes, alpha, e, G):
     """W += J'GJ for one vector y with dy = J d."""
     h = 4 * axes
     for k in range(axes):
@@ -120,4 +120,4 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
         for k in range(axes):
             G[m, k, k] += flat
     for m in range(VECTORS):
-        _add_vector(W, axes, lin.alpha[i, m], lin.e[i, m], G[m])
+        add_vector(W, axes, lin.alpha[i, m], lin.e[i, m], G[m])

@@ -6,17 +6,30 @@ from __future__ import annotations
 import numpy as np
 
 from planner.base.kernels import njit
-from planner.joint.laws import JOINT_PUSH, JOLT, POWER, PUSH, REST, SPEED, chained, seen_at, square_at
+from planner.joint.curvature import add_vector
+from planner.joint.laws import (
+    JOINT_PUSH,
+    JOLT,
+    POWER,
+    PRODUCT,
+    PUSH,
+    REST,
+    SPEED,
+    chained,
+    ordinates,
+    seen_at,
+    square_at,
+)
 
-# Of the curvature of the rows of SPEED: row, weight, and the shares of w0, w1 and w2 in the vector that it is of.
-_CURVED = np.array(
+# w.w as squares: row, weight, and the shares of w0, w1 and w2 in the vector that is squared.
+_SQUARES = np.array(
     [
-        (0, 1.0, 1.0, 0.0, 0.0),
-        (1, 1.0, 0.5, 0.5, 0.0),
-        (2, 2.0 / 3.0, 0.0, 1.0, 0.0),
-        (2, 1.0 / 3.0, 0.5, 0.0, 0.5),
-        (3, 1.0, 0.0, 0.5, 0.5),
-        (4, 1.0, 0.0, 0.0, 1.0),
+        (0, 1, 1, 0, 0),
+        (1, 1, 0.5, 0.5, 0),
+        (2, 2 / 3, 0, 1, 0),
+        (2, 1 / 3, 0.5, 0, 0.5),
+        (3, 1, 0, 0.5, 0.5),
+        (4, 1, 0, 0, 1),
     ]
 )
 SLOW = 0.1  # of a step's pace: below that the time over which power is squared out does not fall [-]
@@ -45,29 +58,16 @@ def add_law_curvature(W, limits, i, x, u, z):
 def _curve_speed(W, laws, i, m, x, u, z):
     """That of SPEED: squares of sums of ordinates."""
     axes = len(u) - 1
-    h = u[axes]
-    for term in range(len(_CURVED)):
-        row, share, c0, c1, c2 = _CURVED[term]
-        by, of_v, of_a, of_j = (
-            z[int(row)] * share / square_at(laws.begin[i, m], laws.end[i, m], int(row)),
-            c0 + c1 + c2,
-            h * (0.5 * c1 + c2),
-            0.5 * h * h * c2,
-        )
+    h, alpha, e, square = u[axes], np.zeros(4), np.empty(axes), np.zeros((axes, axes))
+    for term in range(len(_SQUARES)):
+        row, share, c0, c1, c2 = _SQUARES[term]
+        r = int(row)
+        alpha[1], alpha[2], alpha[3] = c0 + c1 + c2, h * (0.5 * c1 + c2), 0.5 * h * h * c2
         for k in range(axes):
-            weight, a = by * laws.counts[m, k], x[2 * axes + k]
-            of_h = 0.5 * c1 * a + c2 * (a + h * u[k])
-            v, b, j, last = axes + k, 2 * axes + k, 3 * axes + k, 4 * axes
-            W[v, v] += weight * of_v * of_v
-            W[b, v] += weight * of_a * of_v
-            W[b, b] += weight * of_a * of_a
-            W[j, v] += weight * of_j * of_v
-            W[j, b] += weight * of_j * of_a
-            W[j, j] += weight * of_j * of_j
-            W[last, v] += weight * of_h * of_v
-            W[last, b] += weight * of_h * of_a
-            W[last, j] += weight * of_h * of_j
-            W[last, last] += weight * of_h * of_h
+            a = x[2 * axes + k]
+            e[k] = 0.5 * c1 * a + c2 * (a + h * u[k])
+            square[k, k] = laws.counts[m, k] * z[r] * share / square_at(laws.begin[i, m], laws.end[i, m], r)
+        add_vector(W, axes, alpha, e, square)
 
 
 @njit(cache=True, error_model="numpy")
@@ -75,23 +75,18 @@ def _curve_pushed(W, laws, i, m, x, u, rest, z):
     """That of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4: of PUSH across the motion, the first
     square."""
     axes = len(u) - 1
-    h, w, square = u[axes], np.empty((3, axes)), np.zeros(3)
+    h, w, b, bound, pushed = (
+        u[axes],
+        np.empty((3, axes)),
+        np.empty((2, axes)),
+        laws.begin[i, m],
+        laws.kind[m] == PUSH,
+    )
     alpha, e, across = np.zeros(4), np.empty(axes), np.empty((axes, axes))
-    for k in range(axes):
-        counts = laws.counts[m, k]
-        v, a = counts * x[axes + k], counts * x[2 * axes + k]
-        w[0, k], w[1, k], w[2, k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * counts * u[k])
-        for c in range(3):
-            square[c] += w[c, k] ** 2
-    for which in range(5):
-        r, c, n = (
-            (0, 1, 1, 2, 2)[which],
-            (0, 0, 1, 1, 2)[which],
-            (0, 1, 0, 1, 0)[which],
-        )  # of the row, w and b
-        share = (1.0, 1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)[which]
-        bound, pushed = laws.begin[i, m], laws.kind[m] == PUSH
-        moving = square[c] + (rest * rest if pushed else (SLOW / REST * rest) ** 2)
+    ordinates(x, u, laws.counts[m], w, b)
+    for term in range(len(PRODUCT)):
+        r, n, c, share = int(PRODUCT[term, 0]), int(PRODUCT[term, 1]), int(PRODUCT[term, 2]), PRODUCT[term, 3]
+        moving = (w[c] ** 2).sum() + (rest * rest if pushed else (SLOW / REST * rest) ** 2)
         time = np.sqrt(moving) / bound if pushed else moving / bound
         for side in range(2):
             by = 0.5 * share * z[3 * side + r] / (bound * bound if pushed else bound / time)
@@ -102,18 +97,8 @@ def _curve_pushed(W, laws, i, m, x, u, rest, z):
                 e[k] = n * j + per * (0.5 * a if c == 1 else a + h * j if c == 2 else 0.0)
                 for s in range(axes):
                     one = laws.counts[m, k] if s == k else 0.0
-                    turned = w[c, k] * w[c, s] / moving if pushed else 0.0
-                    across[k, s] = by * (one - turned)
-            for k in range(axes):
-                along = 0.0
-                for s in range(axes):
-                    along += across[k, s] * e[s]
-                W[4 * axes, 4 * axes] += e[k] * along
-                for s in range(1, 4):
-                    W[4 * axes, s * axes + k] += alpha[s] * along
-                    for t in range(1, s + 1):
-                        for s2 in range(axes):
-                            W[s * axes + k, t * axes + s2] += alpha[s] * alpha[t] * across[k, s2]
+                    across[k, s] = by * (one - (w[c, k] * w[c, s] / moving if pushed else 0.0))
+            add_vector(W, axes, alpha, e, across)
 
 
 @njit(cache=True, error_model="numpy")
@@ -151,17 +136,8 @@ def _curve_joint(W, laws, i, m, u, z):
     """That of v.H v."""
     axes, q = len(u) - 1, laws.joint[m]
     for row in range(4):
-        if z[row] == 0.0:
-            continue
-        place, t = row // 2, 0.5 * u[axes] * (row // 2)
-        weight = 2.0 * z[row] / (laws.end[i, m] if place else laws.node[i, m])
-        for k in range(axes):
-            for c in range(axes):
-                by = weight * laws.convex[i + place, row % 2, q, k, c]
-                if c <= k:
-                    W[axes + k, axes + c] += by
-                    W[2 * axes + k, 2 * axes + c] += t * t * by
-                    W[3 * axes + k, 3 * axes + c] += 0.25 * t**4 * by
-                W[2 * axes + k, axes + c] += t * by
-                W[3 * axes + k, axes + c] += 0.5 * t * t * by
-                W[3 * axes + k, 2 * axes + c] += 0.5 * t**3 * by
+        if z[row] != 0.0:
+            place, t = row // 2, 0.5 * u[axes] * (row // 2)
+            weight = 2.0 * z[row] / (laws.end[i, m] if place else laws.node[i, m])
+            alpha = np.array([0.0, 1.0, t, 0.5 * t * t])
+            add_vector(W, axes, alpha, np.zeros(axes), weight * laws.convex[i + place, row % 2, q])

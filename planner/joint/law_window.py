@@ -102,8 +102,6 @@ def law_rows(
     narrow : (N, M) by what their bounds are multiplied [-]
     """
     lo, hi, axes, many = window.lo, window.hi, len(laws.axis), window.hi - window.lo
-    if not len(which):
-        return _none(many, axes), np.empty((many, 0), dtype=bool)
     kind = laws.kinds(which, window.state[lo])
     pin, pinned = _pin(laws, window, which, units)
     steps = np.arange(lo, hi)
@@ -143,13 +141,11 @@ def law_rows(
     heading = np.divide(
         state[:, 1] * length / second, speed, out=np.zeros_like(state[:, 1]), where=speed > 0.0
     )
-    kind, counts = (
-        np.append(kind, rows.PIN),
-        np.vstack([[laws.laws[m].counts for m in which], np.zeros(axes)]),
-    )
-    one = np.ones((many, 1))
+    one = np.ones((many, min(len(which), 1)))  # the column of `PIN`
+    kind = np.concatenate([kind, np.full(one.shape[1], rows.PIN)])
+    counts = np.array([*(laws.laws[m].counts for m in which), np.zeros(axes)])[: len(kind)]
     begin, end = np.hstack([begin, one]), np.hstack([end, one])
-    first = np.append(0, np.cumsum([rows.ROWS_OF[k] for k in kind]))
+    first = np.append(0, np.cumsum(np.array(rows.ROWS_OF)[kind]))
     found = LawRows(
         kind=kind,
         first=first,
@@ -157,7 +153,7 @@ def law_rows(
         node=np.minimum(begin, np.vstack([begin[:1], end[:-1]])),
         begin=begin,
         end=end,
-        tilt=np.concatenate([tilt, np.zeros((many, 1, axes))], axis=1),
+        tilt=np.concatenate([tilt, np.zeros((*one.shape, axes))], axis=1),
         at=(state[:, 0] - units.origin) / length,
         joint=np.append(joint, 0),
         gradient=_stacked([model[0] for model in models], (many + 1, axes)) * length,
@@ -181,28 +177,6 @@ def _convex(bend: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(bend)
     parts = np.stack([np.maximum(values, 0.0), np.maximum(-values, 0.0)], axis=1)
     return np.einsum("nka,nsa,nca->nskc", vectors, parts, vectors)
-
-
-def _none(steps: int, axes: int) -> LawRows:
-    number, no, nodes = np.empty(0, dtype=np.int64), np.empty((steps, 0)), steps + 1
-    return LawRows(
-        kind=number,
-        first=np.zeros(1, dtype=np.int64),
-        counts=np.empty((0, axes)),
-        node=no,
-        begin=no,
-        end=no,
-        tilt=np.empty((steps, 0, axes)),
-        at=np.empty((nodes, axes)),
-        joint=number,
-        gradient=np.empty((nodes, 0, axes)),
-        bend=np.empty((nodes, 0, axes, axes)),
-        convex=np.empty((nodes, 2, 0, axes, axes)),
-        third=np.empty((nodes, 0)),
-        heading=np.empty((nodes, axes)),
-        pin=np.empty((steps, axes)),
-        pinned=np.empty(steps),
-    )
 
 
 def _present(laws: LawRows, window: Window, free: Array) -> Array:

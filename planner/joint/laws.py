@@ -50,6 +50,14 @@ SPEED, PUSH, JOLT, POWER, JOINT_SPEED, JOINT_PUSH, JOINT_JOLT, PIN = range(8)
 ROWS_OF = (5, 6, 4, 6, 4, 4, 4, 1)  # upper before lower, where there are both
 REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
 TILTED_LEAST = 0.1  # what 1 + tilt.d is at least [-]
+# Bezier ordinates of w.w, and of b.w or e.w: row, ordinates of both factors, share.
+SQUARE = np.array(
+    [(0, 0, 0, 1), (1, 0, 1, 1), (2, 1, 1, 2 / 3), (2, 0, 2, 1 / 3), (3, 1, 2, 1), (4, 2, 2, 1)]
+)
+PRODUCT = np.array([(0, 0, 0, 1), (1, 1, 0, 1 / 3), (1, 0, 1, 2 / 3), (2, 1, 1, 2 / 3), (2, 0, 2, 1 / 3)])
+# Of degree 4 of a square of what is linear: shares of that of its beginning (of its end the other way round)
+# and of beginning times end.
+FIRST, BOTH = (1.0, 0.5, 1.0 / 6.0, 0.0, 0.0), (0.0, 0.5, 4.0 / 6.0, 0.5, 0.0)
 
 
 class LawRows(NamedTuple):
@@ -74,105 +82,64 @@ class LawRows(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _ordinates(x, u, linear, rest, work, value, slope):
-    """The first three ordinates of a.v and of v.e of a step with the node x (3 A,) and the controls u (A+1,),
-    value (2, 3), and their derivatives by p, v, a, j and h, slope (2, 3, 4 A + 1). work (5, A)."""
+def ordinates(x, u, counts, w, b):
+    """w (3, A) and b (2, A) of the axes that count, of a step with the node x (3 A,) and the controls u
+    (A+1,)."""
     axes = len(u) - 1
-    h, (e0, e1, w0, w1, w2) = u[axes], work
-    square0, square1 = rest * rest, rest * rest
+    h = u[axes]
     for k in range(axes):
-        v, a, j = linear[k] * x[axes + k], linear[k] * x[2 * axes + k], linear[k] * u[k]
-        w0[k], w1[k], w2[k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * j)
-        square0, square1 = square0 + w0[k] * w0[k], square1 + w2[k] * w2[k]
-    size0, size1 = np.sqrt(square0), np.sqrt(square1)
-    value[:] = 0.0
+        v, a, j = counts[k] * x[axes + k], counts[k] * x[2 * axes + k], counts[k] * u[k]
+        w[0, k], w[1, k], w[2, k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * j)
+        b[0, k], b[1, k] = a, a + h * j
+
+
+@njit(cache=True, error_model="numpy")
+def _multiply(table, one, other, value, of_one, of_other):
+    """The ordinates of a product into value (R,), by those of its factors, one (.., A) and other (.., A), and
+    their derivatives by these into of_one (R, .., A) and of_other (R, .., A)."""
+    for term in range(len(table)):
+        r, c, d, share = int(table[term, 0]), int(table[term, 1]), int(table[term, 2]), table[term, 3]
+        for k in range(one.shape[1]):
+            value[r] += share * one[c, k] * other[d, k]
+            of_one[r, c, k] += share * other[d, k]
+            of_other[r, d, k] += share * one[c, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _through(x, u, of_w, of_b, by, out):
+    """out (4 A + 1,) += `by` times the derivatives of what has those by w and b, of_w (3, A) and of_b (2, A)."""
+    axes = len(u) - 1
+    h = u[axes]
     for k in range(axes):
-        e0[k], e1[k] = w0[k] / size0, w2[k] / size1
-        b0, b1 = linear[k] * x[2 * axes + k], linear[k] * (x[2 * axes + k] + h * u[k])
-        value[0, 0] += b0 * w0[k]
-        value[0, 1] += (b1 * w0[k] + 2.0 * b0 * w1[k]) / 3.0
-        value[0, 2] += (2.0 * b1 * w1[k] + b0 * w2[k]) / 3.0
-        value[1, 0] += w0[k] * e0[k]
-        value[1, 1] += (w0[k] * e1[k] + 2.0 * w1[k] * e0[k]) / 3.0
-        value[1, 2] += (2.0 * w1[k] * e1[k] + w2[k] * e0[k]) / 3.0
-    slope[:] = 0.0
-    for r in range(3):
-        # what turns with e0 and with e1: the ordinates that they are multiplied by
-        along0, along1 = 0.0, 0.0
-        for k in range(axes):
-            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
-            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
-            along0, along1 = along0 + by0 * e0[k], along1 + by1 * e1[k]
-        for k in range(axes):
-            a, j = linear[k] * x[2 * axes + k], linear[k] * u[k]
-            b0, b1 = a, a + h * j
-            by0 = w0[k] if r == 0 else 2.0 / 3.0 * w1[k] if r == 1 else w2[k] / 3.0
-            by1 = 0.0 if r == 0 else w0[k] / 3.0 if r == 1 else 2.0 / 3.0 * w1[k]
-            for side in range(2):
-                n0, n1, n2, m0, m1 = 0.0, 0.0, 0.0, 0.0, 0.0
-                if side == 0:
-                    if r == 0:
-                        n0, m0 = b0, w0[k]
-                    elif r == 1:
-                        n0, n1, m0, m1 = b1 / 3.0, 2.0 * b0 / 3.0, 2.0 * w1[k] / 3.0, w0[k] / 3.0
-                    else:
-                        n1, n2, m0, m1 = 2.0 * b1 / 3.0, b0 / 3.0, w2[k] / 3.0, 2.0 * w1[k] / 3.0
-                else:
-                    n0 = e0[k] if r == 0 else e1[k] / 3.0 if r == 1 else 0.0
-                    n1 = 0.0 if r == 0 else 2.0 / 3.0 * (e0[k] if r == 1 else e1[k])
-                    n2 = e0[k] / 3.0 if r == 2 else 0.0
-                    n0 += (by0 - along0 * e0[k]) / size0
-                    n2 += (by1 - along1 * e1[k]) / size1
-                row = slope[side, r]
-                row[axes + k] = linear[k] * (n0 + n1 + n2)
-                row[2 * axes + k] = linear[k] * (h * (0.5 * n1 + n2) + m0 + m1)
-                row[3 * axes + k] = linear[k] * h * (0.5 * h * n2 + m1)
-                row[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
+        a, j = x[2 * axes + k], u[k]
+        n1, n2, m1 = by * of_w[1, k], by * of_w[2, k], by * of_b[1, k]
+        out[axes + k] += by * of_w[0, k] + n1 + n2
+        out[2 * axes + k] += h * (0.5 * n1 + n2) + by * of_b[0, k] + m1
+        out[3 * axes + k] += h * (0.5 * h * n2 + m1)
+        out[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
 
 
 @njit(cache=True, error_model="numpy")
 def square_at(begin, end, r):
     """The r-th ordinate of degree 4 of the square of what goes from `begin` to `end`."""
-    if begin == end or r == 0:
-        return begin * begin
-    if r == 4:
-        return end * end
-    if r == 2:
-        return (begin * begin + 4.0 * begin * end + end * end) / 6.0
-    return 0.5 * (begin + end) * (begin if r == 1 else end)
+    return FIRST[r] * begin * begin + BOTH[r] * begin * end + FIRST[4 - r] * end * end
 
 
 @njit(cache=True, error_model="numpy")
 def _put_speed(laws, i, m, x, u, f, by, g, out):
     """The rows of SPEED, as `put_law_rows`; f (2,) are the bound's 1 + tilt.d at both ends of the step, `by`
     (2, 4 A + 1) their derivatives."""
-    axes = len(u) - 1
-    h, begin, end = u[axes], laws.begin[i, m], laws.end[i, m]
+    axes, begin, end = len(u) - 1, laws.begin[i, m], laws.end[i, m]
+    w, b, of_w, none = np.empty((3, axes)), np.empty((2, axes)), np.zeros((5, 3, axes)), np.zeros((2, axes))
+    ordinates(x, u, laws.counts[m], w, b)
+    _multiply(SQUARE, w, w, g, of_w, of_w)
+    v0, v1 = begin * f[0], end * f[1]
     for r in range(ROWS_OF[SPEED]):
-        square = square_at(begin, end, r)
-        per = 0.5 / square
-        for k in range(axes):
-            a, j, counts = x[2 * axes + k], u[k], laws.counts[m, k]
-            w0, w1 = x[axes + k], x[axes + k] + 0.5 * h * a
-            w2 = w0 + h * (a + 0.5 * h * j)
-            n0 = 2.0 * w0 if r == 0 else w1 if r == 1 else w2 / 3.0 if r == 2 else 0.0
-            n1 = w0 if r == 1 else 4.0 / 3.0 * w1 if r == 2 else w2 if r == 3 else 0.0
-            n2 = w0 / 3.0 if r == 2 else w1 if r == 3 else 2.0 * w2 if r == 4 else 0.0
-            g[r] += 0.5 * per * counts * (n0 * w0 + n1 * w1 + n2 * w2)
-            out[r, axes + k] = per * counts * (n0 + n1 + n2)
-            out[r, 2 * axes + k] = per * counts * h * (0.5 * n1 + n2)
-            out[r, 3 * axes + k] = per * counts * 0.5 * h * h * n2
-            out[r, 4 * axes] += per * counts * (0.5 * n1 * a + n2 * (a + h * j))
-        # of the ordinate of (begin f0 + (end f1 - begin f0) q)^2, its shares of begin^2, begin end and end^2
-        both = 0.5 if r in (1, 3) else 4.0 / 6.0 if r == 2 else 0.0
-        first, last = (0.0, 0.0, 1.0 / 6.0, 0.5, 1.0)[4 - r], (0.0, 0.0, 1.0 / 6.0, 0.5, 1.0)[r]
-        if begin == end and f[0] == 1.0 and f[1] == 1.0:
-            g[r] -= 0.5
-        else:
-            v0, v1 = begin * f[0], end * f[1]
-            g[r] -= per * (first * v0 * v0 + both * v0 * v1 + last * v1 * v1)
-        of_first = per * begin * (2.0 * first * begin * f[0] + both * end * f[1])
-        of_last = per * end * (2.0 * last * end * f[1] + both * begin * f[0])
+        per = 0.5 / square_at(begin, end, r)
+        g[r] = per * (g[r] - square_at(v0, v1, r))
+        _through(x, u, of_w[r], none, per, out[r])
+        of_first = per * begin * (2.0 * FIRST[r] * v0 + BOTH[r] * v1)
+        of_last = per * end * (2.0 * FIRST[4 - r] * v1 + BOTH[r] * v0)
         for k in range(4 * axes + 1):
             out[r, k] -= of_first * by[0, k] + of_last * by[1, k]
 
@@ -181,10 +148,27 @@ def _put_speed(laws, i, m, x, u, f, by, g, out):
 def _put_pushed(laws, i, m, x, u, rest, f, by, g, out):
     """The rows of PUSH and of POWER, as `_put_speed`."""
     axes = len(u) - 1
-    work, value, slope = np.empty((5, axes)), np.empty((2, 3)), np.empty((2, 3, 4 * axes + 1))
-    _ordinates(x, u, laws.counts[m], rest, work, value, slope)
+    value, slope = np.zeros((2, 3)), np.zeros((2, 3, 4 * axes + 1))
+    w, b, e = np.empty((3, axes)), np.empty((2, axes)), np.empty((2, axes))
+    of_w, of_b, size = np.zeros((3, 3, axes)), np.zeros((3, 2, axes)), np.empty(2)
+    ordinates(x, u, laws.counts[m], w, b)
+    _multiply(PRODUCT, b, w, value[0], of_b, of_w)
+    for r in range(3):
+        _through(x, u, of_w[r], of_b[r], 1.0, slope[0, r])
     if laws.kind[m] == POWER:
-        value[1], slope[1] = 1.0, 0.0
+        value[1] = 1.0
+    else:
+        for end in range(2):
+            size[end] = np.sqrt(rest * rest + (w[2 * end] ** 2).sum())
+            e[end] = w[2 * end] / size[end]
+        of_w[:], of_b[:] = 0.0, 0.0
+        _multiply(PRODUCT, e, w, value[1], of_b, of_w)
+        for r in range(3):
+            for end in range(2):  # by the directions, which turn with w0 and w2
+                along = (of_b[r, end] * e[end]).sum()
+                of_w[r, 2 * end] += (of_b[r, end] - along * e[end]) / size[end]
+                of_b[r, end] = 0.0
+            _through(x, u, of_w[r], of_b[r], 1.0, slope[1, r])
     for r in range(3):
         begin, end = laws.node[i, m] if r == 0 else laws.begin[i, m], laws.end[i, m]
         bound = begin * f[0] + (end * f[1] - begin * f[0]) * r / 3.0
@@ -273,7 +257,7 @@ def _of_joint(laws, n, other, m, order, y, j, by):
 def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
     """The rows of laws that are watched at places of a step, as `_put_speed`; `of_f` is its `by`."""
     axes, kind = len(u) - 1, laws.kind[m]
-    y, by = np.empty((3, axes)), np.zeros((4, axes))
+    y, by, w, b = np.empty((3, axes)), np.zeros((4, axes)), np.empty((3, axes)), np.empty((2, axes))
     for place in range(2):
         part = 0.5 * place if kind in (JOINT_PUSH, JOINT_SPEED) else 1.0 * place
         seen_at(x, u, part * u[axes], y)
@@ -281,13 +265,12 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
         if kind == JOLT:
             value = _jolt(y, u, laws.counts[m], rest, by)
         elif kind == JOINT_SPEED and place:  # at the middle, with the ordinate w1 as the velocity
+            ordinates(x, u, np.ones(axes), w, b)
             speed = y[1].copy()
-            for k in range(axes):
-                y[1, k] = x[axes + k] + 0.5 * u[axes] * x[2 * axes + k]
+            y[1] = w[1]
             value = _of_joint(laws, i, i + 1, m, 1, y, u, by)
-            for k in range(axes):
-                row[axes + k], row[2 * axes + k] = by[1, k], 0.5 * u[axes] * by[1, k]
-                row[4 * axes] += 0.5 * by[1, k] * x[2 * axes + k]
+            w[:], b[:], w[1] = 0.0, 0.0, by[1]
+            _through(x, u, w, b, 1.0, row)
             y[1], by[1] = speed, 0.0
         else:
             first = i if kind == JOINT_PUSH else i + place

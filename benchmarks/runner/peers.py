@@ -53,11 +53,17 @@ def along_splines(solver: str) -> Callable[[Program, Machine, float | None], Pla
     name, _, effort = solver.partition(":")
 
     def planned(program: Program, machine: Machine, tolerance: float | None) -> Plan:
-        own = name if name == SEQUENTIAL_CONVEX else _copp(linear=name == COPP_LP)
+        own = _convex() if name == SEQUENTIAL_CONVEX else _copp(linear=name == COPP_LP)
         method = OptimalMethod(corner="spline", rounds=0, solver=own, effort=effort or NORMAL)
         return method.plan(program, machine, tolerance)
 
     return planned
+
+
+def _convex() -> ThirdOrderSolver:
+    from benchmarks.solvers.sequential_convex import ExactMotion, SequentialConvex
+
+    return ExactMotion(solver=SequentialConvex())
 
 
 def _copp(*, linear: bool) -> ThirdOrderSolver:

@@ -17,7 +17,7 @@ from typing import Any
 from benchmarks.record import markdown, write_results
 from benchmarks.solvers import copp_solver
 from benchmarks.solvers.random_paths import long_path
-from planner.feedrate.reference.exact_motion import ExactMotion
+from benchmarks.solvers.sequential_convex import ExactMotion, SequentialConvex
 from planner.feedrate.solvers import OWN, THIRD_ORDER, ThirdOrderSolver
 
 SIZES = (300, 1_000, 3_000, 10_000)
@@ -68,7 +68,8 @@ def main() -> None:
 
 def _solvers() -> dict[str, ThirdOrderSolver]:
     """The planner's, and where it is installed the package copp."""
-    found = {name: _unlimited(solver) for name, solver in THIRD_ORDER.items()}
+    others = {"sequential-convex": ExactMotion(solver=SequentialConvex())}
+    found = {name: _unlimited(solver) for name, solver in (THIRD_ORDER | others).items()}
     if copp_solver.copp() is None:
         print(copp_solver.INSTALL, flush=True)
         return found

@@ -55,7 +55,7 @@ METHODS: dict[str, MethodName] = {
         home="planner.planning.methods.optimal:OptimalMethod",
         shapes=True,
         joints=True,
-        solvers=("own", "ipopt", "fatrop", "sequential-convex"),
+        solvers=("own", "ipopt", "fatrop"),
     ),
     SECOND_ORDER: MethodName(
         home="planner.planning.methods.second_order:SecondOrderMethod",

@@ -4,8 +4,6 @@
                    toppra              the package of that name, to compare with (feedrate/toppra_adapter.py)
     third order    own                 our interior-point kernel (feedrate/jerk/)
                    ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
-                   sequential-convex   the problem in the path domain as a sequence of convex ones, by casadi and ipopt
-                                       (feedrate/reference/sequential_convex.py), brought onto constant jerks
                                        (exact_motion.py)
 
 A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one
@@ -25,9 +23,7 @@ from planner.base.errors import InputError
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.exact_motion import ExactMotion
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
 
@@ -53,7 +49,6 @@ THIRD_ORDER: dict[str, ThirdOrderSolver] = {
     OWN: JerkLimited(),
     "ipopt": JerkLimitedNLP(solver="ipopt"),
     "fatrop": JerkLimitedNLP(solver="fatrop"),
-    "sequential-convex": ExactMotion(solver=SequentialConvex()),
 }
 
 

@@ -10,12 +10,12 @@ import pytest
 from random_problems import in_units, line, reversed_problem
 from scipy.integrate import quad
 
+from benchmarks.solvers.near_rest import NEAR
 from benchmarks.solvers.random_paths import nurbs, random_path
+from benchmarks.solvers.sequential_convex import SequentialConvex
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
-from planner.feedrate.reference.near_rest import NEAR
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.solution import FeedrateSolution, Status
 
 ROWS = 1e-6  # by which a row may exceed its limit [relative]

@@ -12,6 +12,7 @@ from whole_plans import smooth_path
 
 from benchmarks.jobs import problems
 from benchmarks.solvers.random_paths import random_path
+from benchmarks.solvers.sequential_convex import SequentialConvex
 from planner import plan
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
@@ -22,7 +23,6 @@ from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.reference.sequential_convex import SequentialConvex
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.solvers import (
@@ -86,7 +86,7 @@ def test_multipliers_of_casadi_are_those_of_the_own_kernel(name):
 
 
 @pytest.mark.usual_sizes  # windows of fewer points end elsewhere by up to 2e-4
-@pytest.mark.parametrize(("name", "most"), [("ipopt", 0.02), ("fatrop", 0.02), ("sequential-convex", 0.05)])
+@pytest.mark.parametrize(("name", "most"), [("ipopt", 0.02), ("fatrop", 0.02)])
 def test_sums_and_prices_are_near_where_formulations_differ(name, most, solved):
     own, other = solved[OWN], solved[name]
     for mine, theirs in zip(at_points(own), at_points(other), strict=True):
@@ -174,7 +174,7 @@ def test_names():
     assert tuple(THIRD_ORDER) == METHODS["optimal"].solvers
     assert tuple(SECOND_ORDER) == METHODS["second-order"].solvers
     assert third_order_solver("own") == JerkLimited()
-    with pytest.raises(InputError, match=r"no solver 'snopt'.*own, ipopt, fatrop, sequential-convex"):
+    with pytest.raises(InputError, match=r"no solver 'snopt'.*own, ipopt, fatrop$"):
         third_order_solver("snopt")
     with pytest.raises(InputError, match=r"toppra: method optimal does not use it; there are own, ipopt"):
         third_order_solver("toppra")
@@ -189,7 +189,6 @@ def test_names():
     [
         ("casadi", {"solver": "ipopt", "corner": "bezier"}),
         ("casadi", {"solver": "fatrop", "corner": "bezier"}),
-        ("casadi", {"solver": "sequential-convex", "corner": "bezier"}),
         ("casadi", {"method": "tube", "solver": "ipopt"}),
         ("toppra", {"method": "toppra", "solver": "toppra", "corner": "bezier"}),
     ],

@@ -1,25 +1,15 @@
 """From a profile of another transcription to one that can be delivered: constant jerk in time on every
 interval, within all limits.
 
-A solution in the path domain (sequential_convex.py) has a jerk that varies on its intervals. Two steps make a
-motion of it:
-
 1. The nearest profile with constant jerk on every interval and exact kinematics, by least squares over time
 (`ScaledWindow.near`). 2. Every piece is slowed down until all limits hold at its grid points. Slower by lam
-is a speed over lam, an acceleration over lam^2
-   and a jerk over lam^3, so the largest ratio to a limit says by how much.
-
-On the grids of the planner that costs some 0.1 to 1 % of the time, more where few points carry a motion that
-jerk limits all the way; it is in the sentence. The multipliers stay those of the other transcription, which
-has the same limits: they differ from those of the delivered profile by what the transcriptions differ, and
-the prices made of them too.
+is a speed over lam, an acceleration over lam^2 and a jerk over lam^3, so the largest ratio to a limit says by
+how much. The multipliers stay those of the other profile.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,44 +18,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.window import ScaledWindow
-from planner.feedrate.reference.piecewise import with_prices
-from planner.feedrate.reference.sequential_convex import SequentialConvex
-from planner.feedrate.solution import FeedrateSolution, Status, ratios_by_limit
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExactMotion:
-    """A solver whose profiles are brought onto constant jerk on every interval."""
-
-    solver: SequentialConvex  # makes the profiles
-
-    def solve(
-        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
-    ) -> FeedrateSolution:
-        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the
-        status of the whole."""
-        began = time.perf_counter()
-        found = self.solver.solve(problem, progress)
-        if not found.solved:
-            return found
-        exact = with_exact_kinematics(problem, found)
-        if exact is None:
-            return FeedrateSolution.failed(
-                problem,
-                Status.NUMERICAL_ERROR,
-                "no motion with constant jerk on every interval is near the profile found; refine the grid, or use solver own",
-                repr(self.solver),
-                time.perf_counter() - began,
-                found.iterations,
-            )
-        slower = slowed_to_limits(problem, exact)
-        later = slower.cycle_time / found.cycle_time - 1.0
-        sentence = (
-            f"{found.sentence}; with constant jerks between the points {100.0 * later:+.2g} % of the time"
-        )
-        return with_prices(
-            problem, replace(slower, sentence=sentence, solve_time=time.perf_counter() - began)
-        )
+from planner.feedrate.solution import FeedrateSolution, ratios_by_limit
 
 
 def polished(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:

@@ -33,8 +33,7 @@ class OptimalMethod(Method):
 
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
              settings of your own
-    solver : name of the solver, "own", "ipopt", "fatrop" or "sequential-convex" (feedrate/solvers.py), or a
-             solver
+    solver : name of the solver, "own", "ipopt" or "fatrop" (feedrate/solvers.py), or a solver
     effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which path and feed
              are searched together (planning/optimal/effort.py); that is with corner "auto", the own solver,
              no shaping, and `rounds` None

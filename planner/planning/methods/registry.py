@@ -49,7 +49,7 @@ class MethodSettings(TypedDict, total=False):
                "corners" where `corner` is given
     corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own
                (corners/own.py); None for "bezier"
-    solver   : "own", "ipopt", "fatrop" or "sequential-convex" for "optimal", "reachability" or "toppra" for
+    solver   : "own", "ipopt" or "fatrop" for "optimal", "reachability" or "toppra" for
                "second-order"; None for the first of them
     effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped;
                None for "normal"

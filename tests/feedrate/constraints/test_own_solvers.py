@@ -22,9 +22,7 @@ from planner.planning.methods.optimal import OptimalMethod
 
 CORNER = "G21 G90 G64 P0.05 F6000\nG1 X2\nX3 Y2\nM2\n"
 MILL = load_machine("mill")
-# Cycle times beside that of the own solver [-]. The path domain has a transcription of its own, and exact kinematics
-# cost something: without any limits of one's own 6e-3 on two lines like these.
-CLOSE = {"ipopt": 1e-4, "fatrop": 1e-4, "sequential-convex": 5e-3}
+CLOSE = {"ipopt": 1e-4, "fatrop": 1e-4}  # cycle times beside that of the own solver [-]
 
 
 class Jump(PathLimit):
@@ -85,8 +83,7 @@ def test_every_solver_has_its_test():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSE)
 def test_solvers_with_jerk_limits_keep_them_in_the_same_time(name, program):
-    limits = [Jump()] if name == "sequential-convex" else [Jump(), Arm()]  # it takes longest
-    own, other = (planned(program, limits, solver=solver) for solver in (OWN, name))
+    own, other = (planned(program, [Jump(), Arm()], solver=solver) for solver in (OWN, name))
     cycle_time = own.trajectory.cycle_time
     assert other.trajectory.cycle_time == pytest.approx(cycle_time, rel=CLOSE[name])
     for limit, price in own.prices.limits.items():  # multipliers come with all of them

@@ -1,5 +1,4 @@
-"""The jerk-limited feedrate problem once more, in the path domain: a sequence of convex problems, for
-comparison with nlp.py.
+"""The jerk-limited feedrate problem once more, in the path domain: a sequence of convex problems.
 
 Where nlp.py has time, this formulation has arc length: x = feed^2 and u = acceleration along the path at the
 points, w = du/ds on the intervals. There u goes from one point to the next along a given shape, and x with
@@ -47,11 +46,11 @@ grid helps only with its cube root.
 varies on it. Its `feed_sq`, `acc_s` and `duration` (the integral above) are those of this formulation,
 `jerk_s` is the time mean of the jerk on the interval, (u_{i+1} - u_i)/h. The rows above hold at the points to
 1e-6; those of `constraint_ratios`, which takes the jerk for constant, do not where it varies much on an
-interval. Compare it, do not deliver it.
+interval. `ExactMotion` makes a motion of it.
 
 On one grid its optimum differs from nlp.py's by the transcription: 3 % where few intervals make a motion,
 half of it or less with each halving of the spacing, 0.01 % on fine grids. Not convex as a whole, and no
-certificate of a global optimum. It takes 2 to 5 passes, each of which costs about one solution by nlp.py.
+certificate of a global optimum. It takes 2 to 5 passes.
 References: Debrouwere et al. 2013, doi 10.1109/TRO.2013.2277565 (the tangent of x^(-1/2)); Verscheure et al.
 2009, doi 10.1109/TAC.2009.2028959 (path domain); Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y
 (ipopt).
@@ -61,16 +60,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from benchmarks.solvers.near_rest import NODES, WEIGHTS, IntervalShape, beside_rest
 from planner.base.arrays import FloatArray
-from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.near_rest import NODES, WEIGHTS, IntervalShape, beside_rest
+from planner.feedrate.reference.exact_motion import slowed_to_limits, with_exact_kinematics
 from planner.feedrate.reference.piecewise import (
     INTERVALS_MIN,
     Found,
@@ -78,6 +78,7 @@ from planner.feedrate.reference.piecewise import (
     solve_pieces,
     too_few,
     too_large,
+    with_prices,
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
@@ -142,8 +143,6 @@ def _solve_piece(
 
     The columns are those of `piecewise.Found`; the jerk is the mean of each interval.
     """
-    ca = import_needed("casadi", "solver sequential-convex")
-
     here = slice(problem.piece[g], problem.piece[g + 1])
     ds = np.diff(problem.s[here])
     n, axes = len(ds), len(problem.axes)
@@ -314,3 +313,38 @@ def _options(settings: SequentialConvex) -> dict[str, Any]:
         "ipopt.constr_viol_tol": FEASIBILITY,
         "ipopt.acceptable_constr_viol_tol": VIOLATION_MAX,
     }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExactMotion:
+    """A solver whose profiles are brought onto constant jerk on every interval."""
+
+    solver: SequentialConvex  # makes the profiles
+
+    def solve(
+        self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
+    ) -> FeedrateSolution:
+        """Jerk-limited profile of all pieces, which must start and end at rest; a failure of any piece is the
+        status of the whole."""
+        began = time.perf_counter()
+        found = self.solver.solve(problem, progress)
+        if not found.solved:
+            return found
+        exact = with_exact_kinematics(problem, found)
+        if exact is None:
+            return FeedrateSolution.failed(
+                problem,
+                Status.NUMERICAL_ERROR,
+                "no motion with constant jerk on every interval is near the profile found; refine the grid, or use solver own",
+                repr(self.solver),
+                time.perf_counter() - began,
+                found.iterations,
+            )
+        slower = slowed_to_limits(problem, exact)
+        later = slower.cycle_time / found.cycle_time - 1.0
+        sentence = (
+            f"{found.sentence}; with constant jerks between the points {100.0 * later:+.2g} % of the time"
+        )
+        return with_prices(
+            problem, replace(slower, sentence=sentence, solve_time=time.perf_counter() - began)
+        )

@@ -157,19 +157,15 @@ class Job:
         made, stands = self._delivered(motion, not_limited, 0)
         if as_it_is or made.verdict.passed:
             return made
-        slower, mended, again = motion, made, 0
-        rounds, fewest = 1, np.inf
-        while rounds < mending.ROUNDS:
-            found = mending.mended(
-                slower, stands, mended.verdict, self.real[0].dt, min(again, mending.ROUNDS - 1)
-            )
+        slower, mended = motion, made
+        for again in range(mending.ROUNDS):
+            found = mending.mended(slower, stands, mended.verdict, self.real[0].dt, again)
             if found is None:
                 return made
             places = len(mended.verdict.excesses)
             self.tell("slower in places", found=found.end, before=slower.end, places=places)
-            rounds += places >= fewest  # a long motion shows new places in each round, fewer and fewer
-            slower, again, fewest = found, again + 1, min(fewest, places)
-            mended, stands = self._delivered(slower, not_limited, again)
+            slower = found
+            mended, stands = self._delivered(slower, not_limited, again + 1)
             if mended.verdict.passed:
                 break
         if not mended.verdict.passed:

@@ -134,7 +134,8 @@ def evaluate_corner(
 
     side : (n,) parameters that choose the branch where two pieces meet; None means w itself
     """
-    legs = legs_of(toolpath).table
+    path = legs_of(toolpath)
+    legs = path.table
     corners = np.zeros(len(legs) + 1, CORNER_DTYPE)
     corners["shape"], corners["params"][joint] = int(shape.shape), params
     corners["scale"][joint] = scale
@@ -148,7 +149,7 @@ def evaluate_corner(
         corner_point(legs, corners, joint, w[i], ref, one, two, by_w[i])
         by_s[i] = by_w[i]
         to_arc_length(by_s[i])
-    return Corner(by_w=by_w, by_s=by_s, vertex=legs[joint]["start"].copy())
+    return Corner(by_w=by_w, by_s=by_s, vertex=path.vector("start")[joint].copy())
 
 
 def dense_motion(motion: MotionInTime, dt: float) -> Iterator[Trajectory]:

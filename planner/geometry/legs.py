@@ -34,6 +34,7 @@ class Legs:
     offset: FloatArray  # (M,) place of each segment's start on its leg [mm]
     length: FloatArray  # (R,) range of the leg's parameter x [mm]
     table: Array  # (R,) records of `leg_dtype`, the same geometry for the kernels
+    axes: int
 
     def __post_init__(self) -> None:
         legs = len(self.length)
@@ -43,6 +44,10 @@ class Legs:
 
     def __len__(self) -> int:
         return len(self.length)
+
+    def vector(self, name: str) -> FloatArray:
+        """(R, A) a field of the records, "start", "direction" or another vector, of the legs' axes alone."""
+        return np.asarray(self.table[name][:, : self.axes])
 
     @property
     def place(self) -> FloatArray:
@@ -90,7 +95,7 @@ def legs_of(toolpath: Toolpath) -> Legs:
     for name in ("radius", "rate"):
         table[name][arc >= 0] = getattr(toolpath.arcs, name)[arc[arc >= 0]]
     _set_curves(table, toolpath, first[:-1])
-    return Legs(first=first, offset=offset, length=length, table=table)
+    return Legs(first=first, offset=offset, length=length, table=table, axes=axes)
 
 
 def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:

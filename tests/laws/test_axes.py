@@ -60,6 +60,14 @@ def test_u_and_v_move_like_x_and_y(method: str) -> None:
 NINE = "G21 F4000\nG1 X20 A40\nX40 Y10 A60 V3\nY30 B10 Z2\nA120 W4\nC30 U7\nX60 Y10 C60 B0\nX50 A0 U0\n"
 
 
+@pytest.mark.parametrize("method", ["kinematic", "bezier", "fir"])
+def test_axes_that_stand_still_change_nothing(method: str) -> None:
+    """On any number of axes, also where records of kernels have room for more of them."""
+    text = "G21 F6000\nG1 X20\nY15\nX40 Y30\nG0 X0\n"
+    times = [planned(text, machine_of(letters), method).cycle_time for letters in ("xyz", "xyzu", "xyzuvw")]
+    assert times[1:] == pytest.approx(times[:1] * 2, rel=1e-9)
+
+
 # All nine in two corners: method optimal takes a second and more for each.
 SHORT = "G21 F4000\nG1 X20 A40 U7\nX40 Y10 A60 B10 V3 W4\nY30 Z2 C30\n"
 

@@ -94,8 +94,8 @@ def along_axes(
     pieces: CornerPieces, path: Legs, toolpath: Toolpath
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Position, velocity, acceleration and jerk (L, A) of the axes at the start of every piece."""
-    vertex = np.vstack([path.table["start"], toolpath.end[-1:]])
-    direction = path.table["direction"]
+    vertex = np.vstack([path.vector("start"), toolpath.end[-1:]])
+    direction = path.vector("direction")
     joint, before, after = pieces.joint, pieces.before, pieces.after
     u1, u2 = direction[np.maximum(joint - 1, 0)], direction[np.minimum(joint, len(path) - 1)]
     position, velocity, acceleration, jerk = (

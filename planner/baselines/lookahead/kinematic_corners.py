@@ -63,7 +63,8 @@ def corner_passages(
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)
     bare = np.where(turns | (toolpath.joint[at] == Joint.STOP), JointKind.STOP, JointKind.PASS)
     k = np.flatnonzero(turns)
-    u1, u2 = path.table["direction"][k - 1], path.table["direction"][k]
+    direction = path.vector("direction")
+    u1, u2 = direction[k - 1], direction[k]
     feed = np.minimum(np.append(legs.v, np.inf), np.insert(legs.v, 0, np.inf))
     ways = [
         (JointKind.ZERO, *_zero_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),

@@ -48,8 +48,7 @@ class ArcError(ValueError):
 
 @dataclass(frozen=True)
 class Arc:
-    """centre : (3,), its axial coordinate the start's [mm]; sweep [rad], positive counter-clockwise about the
-    normal."""
+    """centre : (3,), axially at the start [mm];  sweep [rad], positive counter-clockwise about the normal."""
 
     centre: FloatArray
     sweep: float
@@ -65,8 +64,7 @@ class ArcWay(NamedTuple):
 
 
 def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> Arc:
-    """The arc about a given centre; all (3,) [mm]. Raises ArcError if start and end are not on one circle
-    about it."""
+    """The arc from start to end about a centre, all (3,) [mm]. Raises ArcError if it does not close."""
     fault = not_closed(start, end, centre, way.normal, way.unit)
     if fault:
         raise ArcError(fault)

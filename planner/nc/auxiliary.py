@@ -77,8 +77,7 @@ def take_default(state: State, default: float | None, block: Block, findings: Fi
 
 
 def check_feed(state: State, block: Block) -> None:
-    """See that the block has a feed: under G94 and G95 it is `state.feed` then. Raises WordFault if it has
-    none."""
+    """See that the block has a feed, in `state.feed` under G94 and G95. Raises WordFault if it has none."""
     word = block.motion_word()
     name = f"G{codes.number(10 * state.motion if state.motion <= 3 else state.motion)}"
     if state.feed_mode == "inverse time":
@@ -105,14 +104,12 @@ def check_feed(state: State, block: Block) -> None:
 
 
 def on_surface(state: State) -> bool:
-    """True if the feed depends on the diameter: a feed per turn (G95) under a constant surface speed
-    (G96)."""
+    """True if the feed depends on the diameter: G95 under a constant surface speed (G96)."""
     return state.spindle.surface_speed and state.feed_mode == "per turn" and state.feed_per_turn > 0
 
 
 def surface_feed(state: State, radius: float, word: int) -> float:
-    """The feed [mm/s] at a radius from the spindle's axis [mm]. Raises WordFault on the axis, if the speed
-    has no bound."""
+    """Feed [mm/s] at a radius [mm]. Raises WordFault on the axis, if the speed has no bound."""
     spindle = state.spindle
     per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
     turns = per_minute / (2.0 * math.pi * abs(radius)) if radius else math.inf
@@ -127,8 +124,7 @@ def surface_feed(state: State, radius: float, word: int) -> float:
 
 
 def surface_parts(state: State, start: float, end: float) -> list[float]:
-    """Where a straight move between two radii [mm] is divided, as parts of it, 1 included, so that the speed
-    of the spindle changes by at most `SURFACE_STEP` in each."""
+    """Parts, up to 1, of a straight move between radii [mm]: the speed changes by `SURFACE_STEP` in each."""
     largest = max(abs(start), abs(end))
     spindle = state.spindle
     per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)

@@ -44,8 +44,7 @@ def cubic_pieces(control: FloatArray, knots: FloatArray, degree: int) -> FloatAr
 
 
 def _blossom(control: FloatArray, knots: FloatArray, degree: int, a: float, b: float, i: int) -> FloatArray:
-    """(A+1,) control point i of the piece from a to b: the polar form at (a, ..., a, b, ..., b), i times b
-    (de Boor's algorithm)."""
+    """(A+1,) control point i of the piece from a to b: the polar form with i times b (de Boor)."""
     k = int(np.searchsorted(knots, a, side="right")) - 1
     points = control[k - degree : k + 1].copy()
     for r in range(1, degree + 1):

@@ -59,8 +59,7 @@ _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNOR
 
 
 def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
-    """Execute a `$` command at the start of a line into `block`, or Klipper's limit; False for what is none,
-    or is refused."""
+    """Execute `$` or Klipper's limit at the start of a line into `block`; False for none, or a refusal."""
     if block.g or block.m or block.value or ignored.strict:
         return False
     if words.text(word) != "$":
@@ -97,8 +96,7 @@ def _velocity_limit(words: Words, word: int, block: Block) -> bool:
 
 
 def homed(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
-    """Execute a G28 with bare letters from `word` on into `block`: `G28 X Y`, or all axes for `G28 W`; False
-    for anything else."""
+    """Execute a G28 with bare letters (`G28 X Y`, `G28 W` for all) into `block`; False for anything else."""
     if block.g.get("one-shot") != 280 or block.value or ignored.strict:
         return False
     data, at = words.data, int(words.at[word])
@@ -124,8 +122,7 @@ PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, no
 
 
 def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) -> Block | None:
-    """Read a row of words. Faults go to `report(word, message)`, what is assumed to `assumed`; None if the
-    row cannot be read as a whole, or holds nothing."""
+    """A row as a block, faults to `report(word, message)`; None if it cannot be read, or holds nothing."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
     owned = ""  # letters that belong to a setting

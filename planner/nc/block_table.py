@@ -100,8 +100,7 @@ class BlockTable:
         self.blocks += 1
 
     def _add_further(self, kind: Kind, state: State) -> None:
-        """The further axes of the block that is being added; its feed, if none of them and of x, y, z is
-        linear and moves."""
+        """The further axes of the block, and its feed where no linear axis moves."""
         block, k, columns = self.block, self.blocks, state.further.columns
         block.further[k] = state.further.position[columns]
         if kind != Kind.LINE:
@@ -118,8 +117,7 @@ class BlockTable:
         self.add(Kind.ARC, line, state)
 
     def add_spline(self, points: FloatArray, weights: FloatArray, line: int, state: State) -> None:
-        """Append a spline that ends at the state's position: control points (K, 4, 3) [mm] and weights (K, 4)
-        of its pieces."""
+        """Append a spline to the state's position: points (K, 4, 3) [mm] and weights (K, 4) of its pieces."""
         self.splines += [(self.blocks, p, w) for p, w in zip(points, weights, strict=True)]
         self.add(Kind.SPLINE, line, state)
 

@@ -92,15 +92,13 @@ class Cutter:
         return self._open.side.last
 
     def begin_beside(self, tangent: complex) -> None:
-        """The tool stands beside the programmed place already, normal to the first move, whose unit tangent
-        is given."""
+        """The tool stands beside the programmed place already, normal to the first unit tangent."""
         state = self._state
         state.actual = self._at(self._beside(self._plane(state.position), tangent), state.position)
         self._placed = True
 
     def line(self, target: FloatArray, kind: Kind, line: int) -> None:
-        """A straight move to `target` (3,), the programmed end. Raises CutterFault if the tool cannot
-        follow."""
+        """A straight move to `target` (3,), as programmed. Raises CutterFault if the tool cannot follow."""
         state = self._state
         start, end = self._plane(state.position), self._plane(target)
         length = abs(end - start)
@@ -148,8 +146,7 @@ class Cutter:
         self._add(side, target, Kind.ARC, line, sweep)
 
     def fix(self) -> None:
-        """The place is fixed: a stop, G40 or the end of the program. Raises CutterFault if the last move
-        would gouge."""
+        """The place is fixed: a stop, G40, the end. Raises CutterFault if the last move would gouge."""
         if self._open is not None:
             self._settle(self._open)
             self._open.fixed, self._open.row = True, -1

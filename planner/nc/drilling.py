@@ -65,8 +65,7 @@ class Hole:
 
 @dataclass(frozen=True)
 class CycleStep:
-    """One thing a cycle does: a move to (a, b, c), a dwell of so many seconds, a stop, or a spindle code (3,
-    4, 5)."""
+    """A move to (a, b, c), a dwell of so many seconds, a stop, or a spindle code (3, 4, 5)."""
 
     kind: Kind | None
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -161,8 +160,7 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
 
 
 def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:
-    """Raises WordFault for a peck or dwell that is impossible, and for a spindle that does not turn as it
-    must."""
+    """Raises WordFault for an impossible peck or dwell, and a spindle that does not turn as it must."""
     code, word = state.motion, block.motion_word()
     name = f"G{codes.number(code)}"
     if code in PECKING and not words["Q"] > 0:

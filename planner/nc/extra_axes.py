@@ -63,6 +63,5 @@ def _vector(given: dict[str, float]) -> FloatArray:
 
 
 def rotary_feed(feed: float, unit: float) -> float:
-    """The feed of a block that moves rotary axes alone [rad/s], of the feed in force [mm/s] and mm per
-    programmed unit."""
+    """Feed [rad/s] of a block of rotary axes alone, by that in force [mm/s] and mm per programmed unit."""
     return feed / unit * RAD_PER_DEG

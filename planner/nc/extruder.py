@@ -32,8 +32,7 @@ _WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 91
 
 
 class _Fed(NamedTuple):
-    """Extruder words by row: how much (R,) [mm], 0 on most, and the feed in force (R,) [mm/s], 0 before the
-    first F."""
+    """Extruder words by row: amount (R,) [mm], 0 on most; feed in force (R,) [mm/s], 0 before the first F."""
 
     amount: FloatArray
     feed: FloatArray
@@ -135,8 +134,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
 
 @njit(cache=True, error_model="numpy")
 def _fed(letter, value, first, with_moves):
-    """Filament fed by each row (R,) [mm], NaN beside a G code that is none of `with_moves` and G92; the feed
-    in force (R,) [mm/s]."""
+    """Filament by row (R,) [mm], NaN beside G codes not in `with_moves`; feed in force (R,) [mm/s]."""
     rows = len(first) - 1
     amount, feeds = np.zeros(rows), np.zeros(rows)
     absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0

@@ -120,8 +120,7 @@ class Findings:
             self._notes.setdefault((True, text), [line, 0])[1] += 1
 
     def notes(self, more: Sequence[Said]) -> Notes:
-        """Assumptions and notes, each once, with its first line and how often, and `more`; in the order of
-        the lines."""
+        """Assumptions and notes, each once with its first line and how often, and `more`, by line."""
         found = [
             Said(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
             for (changes, text), (line, times) in self._notes.items()
@@ -210,8 +209,7 @@ class IgnoredWords:
         return name in self.reading.ignore
 
     def may_stand(self, letter: str, value: float, *, absolute: bool) -> bool:
-        """True if a word of an axis that is not planned leaves it where it is; its first word says where that
-        is."""
+        """True if a word of an axis that is not planned leaves it where its first word put it."""
         if not absolute:
             return value == 0.0
         code = ord(letter)

@@ -57,8 +57,7 @@ class DwellWords:
         return found
 
     def in_seconds(self, words: Words) -> Words:
-        """The words of a chunk of Fanuc's with their dwells in seconds; a number with a point is in seconds
-        already."""
+        """The words of a chunk of Fanuc's with dwells in seconds, which numbers with a point are already."""
         times = [w for w in self.find(words) if words.text(w)[:1] in ("P", "p") and "." not in words.text(w)]
         if not times:
             return words

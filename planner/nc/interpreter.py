@@ -45,8 +45,7 @@ _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of
 
 
 class OpenArc(NamedTuple):
-    """An arc that does not close: its line, whether it would with its centre read the other way, whether I J
-    K are not all 0."""
+    """An arc that does not close: its line, whether it would `otherwise`, whether I J K are not all 0."""
 
     line: int
     otherwise: bool
@@ -134,8 +133,7 @@ class Interpreter:
         return self._dwells.in_seconds(words) if self.state.fanuc else words
 
     def execute(self, words: Words) -> None:
-        """Execute all rows: ordinary ones by the compiled loop (plain.py), all others word by word. Faults
-        are kept, none is raised."""
+        """Execute all rows, plain ones by the compiled loop (plain.py). Faults are kept, none is raised."""
         row, rows, self._words = 0, len(words.line), words
         self.table.begin(len(words.letter))
         while row < rows and not self.ended:

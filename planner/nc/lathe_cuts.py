@@ -66,8 +66,7 @@ class LatheThread:
 
 @dataclass(frozen=True)
 class Pass:
-    """A move of the cycle to `end` (z + i x): fast, or in step with the spindle, `pitch` along it in each
-    turn."""
+    """A move of the cycle to `end` (z + i x): fast, or in step with the spindle by `pitch` a turn."""
 
     end: complex
     pitch: float = 0.0

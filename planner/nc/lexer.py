@@ -47,8 +47,7 @@ class Unreadable(IntEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Words:
-    """W words on R rows; a row is a source line with at least one word. An expanded program has rows of one
-    line many times."""
+    """W words on R rows, source lines with a word; an expanded program has rows of one line many times."""
 
     # (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number follows it
     letter: Array
@@ -91,8 +90,7 @@ class Words:
         return len(before.decode("utf-8", "replace")) + 1
 
     def text(self, word: int) -> str:
-        """The word as it is written, up to the next word, comment or end of line; one character of what is
-        unreadable."""
+        """The word as written, up to what follows it; one character of what is unreadable."""
         at = int(self.at[word])
         if self.letter[word] == FAULT and self.value[word] != Unreadable.NUMBER:
             return self.data[at : at + 4].decode("utf-8", "replace")[:1]

@@ -104,8 +104,7 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
 
 
 def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """All axes, or those of the block, go to the position of G28 or G30; in a rotated work system those of
-    the system."""
+    """All axes, or the block's (in its rotated system), go to the position of G28 or G30."""
     code, word = block.g["one-shot"], block.at["one-shot"]
     if code not in state.homes:
         findings.assume(
@@ -130,8 +129,7 @@ def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -
 
 
 def go_to_switches(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """Homing ($H, or G28 with bare letters on 3-D printers): `block.homing` goes to the position of G28, or
-    to machine zero."""
+    """Homing ($H, bare G28 of 3-D printers): `block.homing` goes to the position of G28, or machine zero."""
     if not block.homing:
         return
     home = state.homes.get(280, np.zeros(3))
@@ -190,8 +188,7 @@ class Mover:
         self.splines = SplineReader()
 
     def execute(self, block: Block) -> None:
-        """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault under
-        compensation."""
+        """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
         state = self.state
         self._take_code(block)
         if block.g.get("one-shot") in COVET_AXES:

@@ -19,17 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc import codes
-from planner.nc.arcs import (
-    AXES,
-    IN_PLANE,
-    Arc,
-    ArcError,
-    ArcWay,
-    arc_from_centre,
-    arc_from_radius,
-    not_closed,
-)
+from planner.nc import arcs, codes
 from planner.nc.settings import Setting
 from planner.nc.state import REFUSED_MOTION, State
 
@@ -84,15 +74,13 @@ class Block:
         return min(self.at[letter] for letter in letters if letter in self.at)
 
     def motion_word(self) -> int:
-        """Index of the word that makes the block move: its motion code, else its first coordinate, or its
-        first word."""
+        """Index of the word that makes the block move: motion code, first coordinate, or first word."""
         if "motion" in self.at:
             return self.at["motion"]
         return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
 
     def fault(self, message: str, at: str = "") -> WordFault:
-        """A fault of the word of a letter or modal group; of the one that makes the block move if none is
-        given."""
+        """A fault of the word of a letter or modal group, else of the one that makes the block move."""
         return WordFault(self.at[at] if at else self.motion_word(), message)
 
 
@@ -115,8 +103,7 @@ _ROUNDING = {
 
 
 class ArcFault(WordFault):
-    """The words of an arc contradict each other; `otherwise` if it would close with its centre read the other
-    way (G90.1, G91.1)."""
+    """The words of an arc contradict each other; `otherwise`: not with the other of G90.1, G91.1."""
 
     def __init__(self, word: int, message: str, *, otherwise: bool):
         super().__init__(word, message)
@@ -124,8 +111,7 @@ class ArcFault(WordFault):
 
 
 def is_move(state: State, block: Block) -> bool:
-    """True if the block moves. A motion code alone does not, except for an arc, which then lacks its
-    words."""
+    """True if the block moves: by more than a motion code, except for an arc, which lacks its words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))
     return arc or block.has(state.letters)
 
@@ -163,12 +149,11 @@ def _rotated_target(state: State, block: Block) -> FloatArray:
     return end
 
 
-def arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
-    """The arc of a block to `end` (3,) [mm], and the index of its normal axis. Raises WordFault if its words
-    are missing or contradict each other."""
+def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
+    """The arc of a block to `end` (3,) [mm], and the index of its normal axis. Raises WordFault."""
     try:
         return _arc(state, block, end)
-    except ArcError as fault:
+    except arcs.ArcError as fault:
         raise ArcFault(block.motion_word(), str(fault), otherwise=_CLOSES_IF in str(fault)) from fault
 
 
@@ -183,61 +168,61 @@ def plane_of(state: State) -> tuple[int, bool]:
     axis = int(np.abs(normal).argmax())
     if abs(normal[axis]) != 1.0:
         angle = state.work_system().rotation
-        raise ArcError(
+        raise arcs.ArcError(
             f"an arc in G{17 + 2 - state.normal} while the work system is rotated by {angle:g} degrees is not supported; "
             "only quarter turns are"
         )
     return axis, bool(normal[axis] < 0)
 
 
-def _arc(state: State, block: Block, end: FloatArray) -> tuple[Arc, int]:
+def _arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
     turned, opposite = plane_of(state)
     start, normal, unit = state.position, state.normal, state.unit
-    a, b = IN_PLANE[normal]
-    plane = f"{AXES[a]} {AXES[b]}"
+    a, b = arcs.IN_PLANE[normal]
+    plane = f"{arcs.AXES[a]} {arcs.AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
-    way = ArcWay(turned, (state.motion == 2) != opposite, turns, unit)
+    way = arcs.ArcWay(turned, (state.motion == 2) != opposite, turns, unit)
     along = block.value.get("IJK"[normal])  # many programs write K0 in G17
     if along is not None and (along != 0.0 or state.strict):
-        raise ArcError(
+        raise arcs.ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )
     if "R" in block.value:
         if block.has("IJK"):
-            raise ArcError("R and I J K on one line both define the centre; write one of them")
+            raise arcs.ArcError("R and I J K on one line both define the centre; write one of them")
         if not block.has("XYZ"[a] + "XYZ"[b]):
-            raise ArcError(f"an arc with R needs an end point in the {plane} plane")
-        return arc_from_radius(start, end, block.value["R"] * unit, way), turned
+            raise arcs.ArcError(f"an arc with R needs an end point in the {plane} plane")
+        return arcs.arc_from_radius(start, end, block.value["R"] * unit, way), turned
     if not block.has("IJK"):
-        raise ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
+        raise arcs.ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
     centre = _centre(state, block, absolute=state.absolute_centre)
     try:
-        return arc_from_centre(start, end, centre, way), turned
-    except ArcError as fault:
-        raise ArcError(f"{fault}; {_remedy(state, block, end, turned)}") from fault
+        return arcs.arc_from_centre(start, end, centre, way), turned
+    except arcs.ArcError as fault:
+        raise arcs.ArcError(f"{fault}; {_remedy(state, block, end, turned)}") from fault
 
 
-def arc_length(start: FloatArray, end: FloatArray, arc: Arc, normal: int) -> float:
+def arc_length(start: FloatArray, end: FloatArray, arc: arcs.Arc, normal: int) -> float:
     """Length of an arc from start to end (3,), the rise along its axis included [mm]."""
     return math.hypot(arc_radius(start, arc, normal) * arc.sweep, end[normal] - start[normal])
 
 
-def arc_radius(start: FloatArray, arc: Arc, normal: int) -> float:
+def arc_radius(start: FloatArray, arc: arcs.Arc, normal: int) -> float:
     """Radius of an arc from start (3,) [mm]."""
-    a, b = IN_PLANE[normal]
+    a, b = arcs.IN_PLANE[normal]
     return math.hypot(start[a] - arc.centre[a], start[b] - arc.centre[b])
 
 
 def _centre(state: State, block: Block, *, absolute: bool) -> FloatArray:
     centre = state.programmed() if state.rotated else state.position.copy()
     origin = np.zeros(3) if state.rotated else state.offset
-    for axis in IN_PLANE[state.normal]:
+    for axis in arcs.IN_PLANE[state.normal]:
         letter = "IJK"[axis]
         if letter in block.value:
             length = block.value[letter] * state.unit
             centre[axis] = length + (origin[axis] if absolute else centre[axis])
         elif absolute:
-            raise ArcError(f"{letter} is missing; with absolute centres (G90.1) both are needed")
+            raise arcs.ArcError(f"{letter} is missing; with absolute centres (G90.1) both are needed")
     return state.machine(centre) if state.rotated else centre
 
 
@@ -245,9 +230,9 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     """True if I J K are meant the other way: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
-    except ArcError:
+    except arcs.ArcError:
         return "correct the centre or the end point"
-    if not_closed(state.position, end, other, normal, state.unit):
+    if arcs.not_closed(state.position, end, other, normal, state.unit):
         return "correct the centre or the end point"
     way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
     return f"{_CLOSES_IF} {way} before it"
@@ -268,8 +253,7 @@ def used_in_force(state: State) -> set[str]:
 
 
 def check_words(state: State, block: Block) -> None:
-    """Words that neither a code of the line nor the motion code in force uses. Raises WordFault for the
-    first."""
+    """Raises WordFault for the first word that no code of the line or in force uses."""
     if state.motion == REFUSED_MOTION or block.partial:
         return
     used = block.own | used_in_force(state)

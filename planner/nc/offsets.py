@@ -58,8 +58,7 @@ def refuse(state: State, block: Block, where: str) -> None:
 
 
 def move(state: State, block: Block) -> None:
-    """Move the further axes to where the words of a block lead. Raises WordFault for a place of a wrapped
-    axis beyond a turn."""
+    """Move the further axes to the block's places. Raises WordFault for a wrapped axis beyond a turn."""
     further = state.further
     in_machine = block.g.get("one-shot") == 530
     offset = _zeros() if in_machine else further.offset(state.system)
@@ -174,8 +173,7 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
 
 
 def system_of(block: Block) -> int:
-    """The code of the work system that a block names. Raises WordFault for a G54.1 without a P that there
-    is."""
+    """The code of the work system that a block names. Raises WordFault for a G54.1 without a valid P."""
     code = block.g["work offset"]
     if code != 541:
         return code
@@ -195,8 +193,7 @@ def take_system(state: State, block: Block, findings: Findings) -> None:
 
 
 def assume_origin(state: State, what: str, block: Block, findings: Findings) -> None:
-    """Say that `what` goes by machine coordinates where those of G54 are not known: without it G54 may be
-    anywhere."""
+    """Say that `what` goes by machine coordinates where those of G54 are not known."""
     if state.system == 540 and 540 not in state.systems:
         text = f"{what} is in machine coordinates, and G54 has no offset in the machine file: 0"
         findings.assume(text, block.line, block.at["one-shot"])
@@ -306,8 +303,7 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
 
 
 def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
-    """(3,) the tool's offset [mm] with which the place has the block's coordinates: in the system in force
-    (L10), or in G59.3 without G92 (L11)."""
+    """(3,) tool offset [mm] for the block's coordinates, in force (L10) or in G59.3 without G92 (L11)."""
     system = state.work_system(_FIXTURE if kind == 11 else 0)
     place = system.turn(state.position - system.origin, -1.0)
     if kind == 10:

@@ -62,8 +62,7 @@ class _Others(NamedTuple):
 
 
 class _Counts(NamedTuple):
-    """State that plain rows change besides the position: how far they are read and stored, and the modal
-    motion and feed."""
+    """State that plain rows change: how far they are read and stored, modal motion and feed."""
 
     row: int
     blocks: int
@@ -127,8 +126,7 @@ def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
 def _run(
     rows, begin, fixed, position, place, block, event, refused_word, others
 ):  # pragma: no cover - compiled
-    """Execute rows from `begin` on: moves the position, fills the columns of blocks and events and
-    `refused_word`, and says how far."""
+    """Execute rows from `begin` on into the columns, the position and `refused_word`; says how far."""
     letter, value, line, first, frame = rows
     absolute, unit, feed_factor, path_control, tolerance, offset, column, rotary, further_offset, wrapped = (
         fixed

@@ -131,8 +131,7 @@ class Origins:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SplineTable:
-    """The splines of a program over A axes: K rational Bezier cubics (nc/bezier.py) in the order of the
-    program."""
+    """K rational Bezier cubics (nc/bezier.py) over A axes, in the order of the program."""
 
     block: Array  # (K,) block of each, not decreasing: a block has one after the other
     # (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it
@@ -265,13 +264,11 @@ class Program:
         return f"<Program {self.source}: {len(self):,} blocks, axes {' '.join(self.axes)}>"
 
     def place(self, block: int) -> str:
-        """Where a block comes from: its line, and of an expanded program the calls that led to it, innermost
-        first."""
+        """Where a block comes from: its line, and the calls that led to it, innermost first."""
         return f"line {self.line[block]}" + self.called(int(self.frame[block]) if self.frames else 0)
 
     def called(self, frame: int) -> str:
-        """The calls that led to a frame, innermost first, behind the line of a block; empty for the main
-        program."""
+        """The calls that led to a frame, innermost first; empty for the main program."""
         text = ""
         while frame > 0:
             at = self.frames[frame]

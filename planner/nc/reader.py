@@ -18,17 +18,7 @@ from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter, OpenArc
-from planner.nc.language.detect import (
-    LATHE_NOTE,
-    dialect_of,
-    has_further_systems,
-    has_two_axes,
-    is_plotter_file,
-    is_turned,
-    language_of,
-    refuse_models,
-    without_leader,
-)
+from planner.nc.language import detect
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
 from planner.nc.program import Program
@@ -101,9 +91,9 @@ def interpret(
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     if are_points(data):
         return read_points(data, source), ()
-    refuse_models(data, source)
+    detect.refuse_models(data, source)
     _check_text(data, source)
-    if is_plotter_file(data, source):
+    if detect.is_plotter_file(data, source):
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
 
         return read_drawing(data, machine, source, reading)
@@ -130,27 +120,27 @@ def execute(
     Raises InputError if there is no word in it.
     """
     interpreter = Interpreter(machine, source, reading)
-    language = language_of(data) if reading.dialect == AUTO else reading.dialect
+    language = detect.language_of(data) if reading.dialect == AUTO else reading.dialect
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
         interpreter.state.seconds_meant = True
         return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
     if language != SIEMENS and not reading.strict:
-        data, leader = without_leader(data)
+        data, leader = detect.without_leader(data)
         if leader:
             interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    dialect = SIEMENS if language == SIEMENS else dialect_of(words, reading)
-    if is_turned(words, dialect, reading, machine):
+    dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading)
+    if detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE
-        interpreter.findings.assume(LATHE_NOTE, int(words.line[0]))
+        interpreter.findings.assume(detect.LATHE_NOTE, int(words.line[0]))
     elif dialect != SIEMENS and not reading.strict:
-        interpreter.two_axes = has_two_axes(words)
+        interpreter.two_axes = detect.has_two_axes(words)
     interpreter.state.fanuc = (
-        reading.dialect == FANUC or dialect in (FANUC, LATHE) or has_further_systems(words)
+        reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.has_further_systems(words)
     )
     interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
     interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
@@ -181,8 +171,7 @@ def _with_note(program: Program, open_arcs: Sequence[OpenArc]) -> Program:
 
 
 def load(path: str | Path) -> bytes:
-    """The bytes of a program file, or of the standard input for "-". Raises InputError if it cannot be
-    read."""
+    """The bytes of a program file, or of the standard input for "-". Raises InputError."""
     try:
         if str(path) == STDIN:
             return standard_input()

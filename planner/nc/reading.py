@@ -64,8 +64,7 @@ class Reading:
         object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
 
     def changed(self) -> dict[str, Any]:
-        """The settings that are not the usual ones, ready for JSON; `Reading.saved` makes the record of them
-        again."""
+        """The settings that are not the usual ones, ready for JSON; `Reading.saved` reads them."""
         return {
             field.name: list(value) if isinstance(value := getattr(self, field.name), tuple) else value
             for field in dataclasses.fields(self)

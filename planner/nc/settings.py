@@ -125,8 +125,7 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A command that sets something: its name ("M204", "$110", `VELOCITY_LIMIT`), its values by letter or
-    key, in small letters, and the word that it stands at."""
+    """A command that sets something ("M204", "$110"): values by letter or key in small letters; its word."""
 
     name: str
     values: dict[str, float]
@@ -205,8 +204,7 @@ def _said_of(number: int) -> Assumption:
 
 
 def may_be_ignored(name: str) -> bool:
-    """True if a code can be left out because the user knows it to be harmless: not a G code that is read or
-    moves the axes, not the end of a program, not a call."""
+    """True if a code can be left out: no G code that is read or moves, no end of a program, no call."""
     letter, number = name[0], name[1:]
     if letter not in "GM" or not number[:1].isdigit():
         return True

@@ -267,8 +267,7 @@ def _order(block: Block, letter: str) -> int:
 
 
 def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray:
-    """(3,) the control point of a line of G6.2 [mm]; coordinates that it does not name are those of the point
-    before."""
+    """(3,) control point of a line of G6.2 [mm], with the coordinates of the one before where not named."""
     if not state.absolute:
         raise WordFault(_any_word(block), "control points of G6.2 with G91 are not read; write G90 before it")
     here = state.position

@@ -85,8 +85,7 @@ class Spindle:
 
 @dataclass(slots=True)
 class CycleSeries:
-    """Canned cycles one after the other: the motion code, the words of that code in force, and the level
-    before the first of them, all as programmed."""
+    """Canned cycles in a row: motion code, words in force, level before the first, all as programmed."""
 
     code: int
     words: dict[str, float]
@@ -190,8 +189,7 @@ class State:
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of the machine for a program: offsets, positions and tools, all zero without a machine; a feed
-    [mm/s] where the program gives none."""
+    """Settings of the machine for a program, all zero without one; a feed [mm/s] where it gives none."""
 
     path_control: PathControl = PathControl.BLEND
     systems: dict[int, FloatArray] = field(default_factory=dict)

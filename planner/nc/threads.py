@@ -112,8 +112,7 @@ def passes(thread: Thread) -> Iterator[Cut]:
 
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
-    """The thread of a G76 from where the machine stands to z = `end` [mm]. Raises WordFault for words that
-    are missing or wrong."""
+    """The thread of a G76 from the present place to z = `end` [mm]. Raises WordFault for its words."""
     word, value = block.motion_word(), block.value
     for letter, what in _NEEDED.items():
         if letter not in value:
@@ -233,8 +232,7 @@ def _say(state: State, block: Block, findings: Findings) -> None:
 
 
 def _feed(state: State, block: Block, pitch: float) -> float:
-    """The feed [mm/s] of so many programmed units in a turn. Raises WordFault if the spindle has no speed
-    that is known."""
+    """Feed [mm/s] of programmed units in a turn. Raises WordFault if the spindle's speed is not known."""
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
     if spindle.surface_speed:
         raise block.fault(

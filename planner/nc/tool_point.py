@@ -50,8 +50,7 @@ _JOINT_PLACES = {280: "G28", 300: "G30", 530: "G53"}  # one-shots whose coordina
 
 
 class Switch(NamedTuple):
-    """On or off from a block on: the word that switched it on, "" where it is off, and the tool's length
-    [mm]."""
+    """From a block on: the word that switched it on, "" where it is off, and the tool's length [mm]."""
 
     block: int
     line: int
@@ -72,8 +71,7 @@ class ToolPointSwitch:
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
     def take(self, state: State, table: BlockTable, block: Block) -> None:
-        """Follow the words of a block. Raises WordFault for G43.4 on a machine without kinematics, and for a
-        tool off its axis."""
+        """Follow the words of a block. Raises WordFault without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
             raise block.fault(
@@ -290,8 +288,7 @@ class _Pieces:
         )
 
     def _chords(self, begin: FloatArray, end: FloatArray) -> FloatArray:
-        """(n, A) ends in p of the chords of a straight line of the joints; the path leaves none of them by
-        more than `within`."""
+        """(n, A) ends in p of chords of a straight line of the joints, left by at most `within`."""
         count = 1
         while True:
             share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]

@@ -37,8 +37,7 @@ class ContourFault(ValueError):
 
 @dataclass(frozen=True)
 class Leg:
-    """A move of a profile to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or
-    clockwise (-1) in (z, x)."""
+    """A move to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or not (-1)."""
 
     end: complex
     turning: int = 0
@@ -51,8 +50,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Contour:
-    """A profile: where the tool stands before it, whether its first move is fast, and its legs; the first
-    leads to its first point."""
+    """A profile: where the tool stands before it, whether its first move is fast, its legs."""
 
     start: complex
     fast: bool
@@ -88,8 +86,7 @@ def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterato
 def pattern_repeat(
     contour: Contour, passes: int, shift: complex, allowance: complex
 ) -> Iterator[TurningStep]:
-    """The moves of G73: `passes` times along the profile, the first moved by `shift` more than the last.
-    Raises ContourFault."""
+    """The moves of G73: `passes` times along the profile, the first off by `shift`. Raises ContourFault."""
     if not 1 <= passes <= PASSES_MAX:
         raise ContourFault(f"G73 makes 1 to {PASSES_MAX} passes, not {passes}")
     for n in range(passes):
@@ -135,8 +132,7 @@ def _along(contour: Contour, by: complex) -> Iterator[TurningStep]:
 
 
 def _reached(legs: list[Leg], level: float, out: float) -> float:
-    """The real part at which a profile, from its first point on, first reaches a level; its end if it never
-    does."""
+    """The real part where a profile first reaches a level, behind its first point; else its end."""
     start = legs[0].end
     for leg in legs[1:]:
         if (leg.end.imag - level) * out >= 0.0:
@@ -180,8 +176,7 @@ def _require_one_way(contour: Contour) -> None:
 
 
 def _directions(start: complex, leg: Leg) -> list[complex]:
-    """Directions of a leg at its ends, and of an arc in the middle of every part of it between two
-    quadrants."""
+    """Directions of a leg at its ends, and of an arc in the middle of its part of each quadrant."""
     if not leg.turning:
         return [leg.end - start]
     from_centre = start - leg.centre

@@ -93,8 +93,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
 
 
 class _FeedModes(NamedTuple):
-    """(R,) the feed mode in force on each row, G93, G94 or G95; and the index of a row's own word for it, or
-    -1."""
+    """(R,) G93, G94 or G95 in force on each row, and the index of its own word for it, or -1."""
 
     in_force: Array
     word: Array
@@ -158,8 +157,7 @@ def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new:
 
 
 def round_down(value: float) -> str:
-    """A positive number in `SIGNIFICANT` digits at most, not above `value`, without exponent: 1234.56 ->
-    "1234"."""
+    """A positive number in `SIGNIFICANT` digits, not above `value`: 1234.56 -> "1234"."""
     place = math.floor(math.log10(value)) + 1 - SIGNIFICANT  # of the last digit
     digits = math.floor(value * 10.0**-place * (1.0 + 1e-12))  # 0.3 is 0.3, not 0.2999
     text = f"{digits * 10**place}" if place >= 0 else f"{digits / 10**-place:.{-place}f}".rstrip("0")
@@ -203,8 +201,7 @@ def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
 
 
 def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list[Edit]:
-    """Replace the number of the row's F word, or append an F word to the row's words, and behind them the
-    word of a feed mode."""
+    """Replace the row's F number, or append an F word, and the word of a feed mode behind it."""
     last = int(words.first[row + 1]) - 1
     at, end = int(words.at[last]), _end(words, last)
     tight = words.data[at - 1 : at].isalnum() or words.data[at - 1 : at] == b"."  # written X1Y2

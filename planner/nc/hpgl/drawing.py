@@ -51,8 +51,7 @@ class ScalingError(ValueError):
 
 @dataclass(frozen=True)
 class Scaling:
-    """plotter units = origin + factor * user units; p1, p2 are the scaling points in plotter units, None
-    where unknown."""
+    """plotter units = origin + factor * user units;  p1, p2 : scaling points, None for unknown."""
 
     p1: Point | None = None
     p2: Point | None = None
@@ -65,8 +64,7 @@ class Scaling:
         return self.origin[0] + self.factor[0] * x, self.origin[1] + self.factor[1] * y
 
     def handedness(self) -> float:
-        """1 where a left turn stays one, -1 where the scaling mirrors. Raises ScalingError where circles
-        become ellipses."""
+        """1 where a left turn stays one, -1 where it is mirrored. Raises ScalingError for ellipses."""
         fx, fy = self.factor
         if abs(abs(fx) - abs(fy)) > SAME_FACTOR * abs(fx):
             raise ScalingError(
@@ -167,8 +165,7 @@ PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
 
 
 class Drawing:
-    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and where in the source they stand
-    [bytes]."""
+    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and places in the source [bytes]."""
 
     def __init__(self) -> None:
         self.kind: list[Kind] = []
@@ -180,8 +177,7 @@ class Drawing:
         self.events: list[tuple[int, int, str, float]] = []
 
     def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
-        """Append a block that ends at `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source
-        [bytes]."""
+        """Append a block to `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source [bytes]."""
         self.kind.append(kind)
         self.end.append(end)
         self.feed.append(feed)

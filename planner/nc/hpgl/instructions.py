@@ -26,8 +26,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Form:
-    """How an instruction that is read is written: `name` with numbers, of which there may be `counts` (None:
-    any even number)."""
+    """How an instruction is written: its name, its numbers, their possible `counts` (None: any even one)."""
 
     name: str
     numbers: str
@@ -146,8 +145,7 @@ Report = Callable[[int, int, str], None]  # from, to, message
 
 @dataclass(slots=True)
 class Instruction:
-    """One instruction: its two letters, its numbers, where it starts and ends in the source, and its text, if
-    it takes any."""
+    """One instruction: its name and numbers, where it starts and ends in the source, its text if any."""
 
     name: str
     numbers: list[float]
@@ -181,8 +179,7 @@ def instructions(data: bytes, report: Report, note: Callable[[str], None]) -> It
 
 
 def _passed_over(data: bytes, at: int, report: Report, note: Callable[[str], None]) -> int:
-    """Where to go on after what is no instruction: device control is left out with a note, everything else is
-    a fault."""
+    """Where to go on after what is no instruction: device control is noted, everything else is a fault."""
     control = _CONTROL.match(data, at)
     if control:
         note("device control (ESC sequences, @PJL lines) is left out")

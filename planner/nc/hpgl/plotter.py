@@ -228,8 +228,7 @@ class _Run:
         self._turn(centre, sweep, end, it.at)
 
     def _arc_through(self, it: Instruction) -> None:
-        """An arc through a point to an end; a straight line where the three points lie on one, a circle where
-        it ends at its start."""
+        """An arc through a point to an end: straight where they lie on a line, a circle at its start."""
         self.scaling.handedness()
         through = self._point(*it.numbers[:2], absolute=it.name == "AT")
         end = self._point(*it.numbers[2:4], absolute=it.name == "AT")

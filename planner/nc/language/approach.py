@@ -159,15 +159,13 @@ class Approach(ContourWay):
 
 @dataclass
 class Departure(ContourWay):
-    """DEP. end : (3,) of LCT and of the tool axis in the program's coordinates [mm], or None; raised : its Z
-    was given."""
+    """DEP. end : (3,) of LCT and the tool axis, as programmed [mm], or None;  raised : its Z was given."""
 
     end: FloatArray | None = None
     raised: bool = False
 
     def rows(self, offset: OffsetMoves, end: FloatArray | None) -> tuple[list[TravelRow], FloatArray]:
-        """The way from the contour, and where it ends (3,). `end` is in the work system. Raises
-        ValueError."""
+        """The way from the contour to `end` in the work system, and where it ends (3,). Raises ValueError."""
         place, tangent = offset.place, offset.leaving
         normal = 1j * offset.side * tangent
         contour = in_plane(place, _NORMAL)

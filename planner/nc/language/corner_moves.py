@@ -180,8 +180,7 @@ class CornerMove:
     first: Move | None = None
 
     def joined(self, second: Move, normal: int) -> tuple[list[Move], Move]:
-        """The first move cut short with the corner behind it, and the second move cut short. Raises
-        ValueError."""
+        """The first move cut short with the corner behind it, and the second cut short. Raises ValueError."""
         first = self.first
         assert first is not None
         rises = any(move.begin[normal] != move.end[normal] for move in (first, second))

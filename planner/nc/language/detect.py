@@ -179,8 +179,7 @@ def _is_text(text: bytes) -> bool:
 
 
 def may_compute(words: Words) -> list[int]:
-    """Rows, ascending, that the lexer could not split, or that have an O word or a code that calls: what may
-    be of a language."""
+    """Rows, ascending, that may be of a language: not split by the lexer, with an O word or a call."""
     found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
     found += [words.find(letter, *numbers) for letter, numbers in _CALLS.items()]
     return words.rows_with(np.concatenate(found))
@@ -197,8 +196,7 @@ def computes(text: str) -> bool:
 
 
 def dialect_of(words: Words, reading: Reading) -> str | None:
-    """The language that a program computes in, or None if it does not. `Reading.dialect` decides where it is
-    given."""
+    """The language that a program computes in, or None; `Reading.dialect` decides where it is given."""
     found, end = None, _first_end(words)
     for row in may_compute(words):
         if row > end and found is None:
@@ -283,8 +281,7 @@ def _has(words: Words, letter: str) -> bool:
 
 
 def has_further_systems(words: Words) -> bool:
-    """True if a program with L words has G54.1, which of the controls that are read only Fanuc's and Haas'
-    know."""
+    """True if a program with L words has G54.1, which only Fanuc's and Haas' controls know."""
     return _has(words, "L") and len(words.find("G", G_FURTHER)) > 0
 
 

@@ -140,8 +140,7 @@ class _Files:
         return []
 
     def load(self, name: str) -> bool:
-        """Read the file name.ngc in the program's folder, or in a folder below it; False if there is none.
-        Raises ProgramFault."""
+        """Read a subprogram in the program's folder or below; False for none. Raises ProgramFault."""
         path = self._find(name)
         if path is None:
             return False

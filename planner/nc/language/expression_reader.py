@@ -17,8 +17,7 @@ OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets th
 
 
 def ranked(*names: str) -> dict[str, int]:
-    """Ranks of operators from 1, of texts of names with blanks between them; those of a higher rank bind
-    first."""
+    """Ranks of operators from 1, of texts of names with blanks between; higher ones bind first."""
     return {name: rank for rank, of_rank in enumerate(names, start=1) for name in of_rank.split()}
 
 
@@ -53,8 +52,7 @@ class ExpressionReader:
         raise NotImplementedError
 
     def expression(self, rank: int = 1) -> Expression:
-        """Values with operators of at least that rank between them; those of one rank are taken from left to
-        right."""
+        """Values with operators of at least that rank, those of one rank taken from left to right."""
         left, count = self.value(), 0
         while (its := self.ranks.get(operator := self.operator(), 0)) >= rank:
             self.skip(operator)

@@ -86,8 +86,7 @@ ARITHMETIC: dict[tuple[str, int], str] = {
 
 
 class BasicBlocks:
-    """The basic blocks of one procedure, while they are written: lines of Python, of which the last one says
-    which block is next, -1 for none."""
+    """The basic blocks of a procedure: lines of Python, the last one with the next block, -1 for none."""
 
     def __init__(self) -> None:
         self.blocks: list[list[tuple[str, tree.SourcePlace]]] = [[]]
@@ -120,8 +119,7 @@ class BasicBlocks:
         self.blocks.append([])
 
     def source(self, place: tree.SourcePlace) -> list[tuple[str, tree.SourcePlace]]:
-        """Lines of Python with their places, each block a function, and how these are run; `place` is that of
-        what no statement stands for."""
+        """Lines of Python with their places, a function for each block; `place` is that of all else."""
         self.end("-1", place)
         lines = []
         for k, block in enumerate(self.blocks[:-1]):

@@ -74,8 +74,7 @@ def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def heidenhain(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """Cycles 7, 8, 10, 11 and 26; `cycle` is the number. Letters behind I are incremental. Raises
-    ValueError."""
+    """Cycles 7, 8, 10, 11, 26 by `cycle`; letters behind I are incremental. Raises ValueError."""
     parts, cycle, unit = making.travel.parts, round(given["cycle"]), making.unit
     if cycle == 7:
         datum = parts.datum.copy()
@@ -187,8 +186,7 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _direction(making: Making) -> complex:
-    """Unit tangent of the last move at its end, in the program's plane. Raises ValueError where there is
-    none."""
+    """Unit tangent at the end of the last move in the program's plane. Raises ValueError for none."""
     travel, interpreter = making.travel, making.interpreter
     if travel.compensated:
         raise ValueError(
@@ -272,8 +270,7 @@ def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """A conversational move with a coordinate that the plane of the pole in force does not allow. Raises
-    ValueError."""
+    """A coordinate that the plane of the pole in force does not allow. Raises ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
 
 

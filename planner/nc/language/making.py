@@ -88,8 +88,7 @@ class Making:
         return float(x), float(y), float(z)
 
     def tool_radius(self) -> float:
-        """Radius of the loaded tool in the program's unit. Raises ValueError where the machine file gives no
-        diameter."""
+        """Radius of the loaded tool in the program's unit. Raises ValueError where it is not known."""
         found = self.travel.radius()
         if found == 0.0:
             number = self.interpreter.state.tool_loaded
@@ -99,16 +98,14 @@ class Making:
         return found / self.unit
 
     def assume(self, text: str) -> None:
-        """Keep what is assumed of the command and may change geometry or time. Raises ValueError where
-        nothing may be assumed."""
+        """Keep an assumption that may change geometry or time. Raises ValueError in strict reading."""
         if self.interpreter.findings.strict:
             raise ValueError(f"{text} (assumed without --strict)")
         self.interpreter.findings.assume(text, self.place.line)
 
 
 def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
-    """The rows of a cycle under G90; behind them G91, the motion code, and with `feed` the feed as they were
-    before."""
+    """The rows of a cycle under G90, then G91, the motion code and with `feed` the feed as before."""
     state, travel = making.interpreter.state, making.travel
     absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
     before = state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
@@ -126,8 +123,7 @@ def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
 
 
 def equal_steps(whole: float, most: float) -> int:
-    """The number of equal steps of at most `most` that a length is divided into; 1 where `most` is 0. Raises
-    ValueError."""
+    """How many equal steps of at most `most` make a length; 1 where `most` is 0. Raises ValueError."""
     if whole <= 0.0 or most <= 0.0:
         return 1
     count = whole / most
@@ -167,8 +163,7 @@ class HolePlan:
 
 
 def coarse_lead(size: float, unit: float) -> float:
-    """The lead of a metric thread by its size, in the program's unit. Raises ValueError for sizes without
-    one."""
+    """The lead of a metric thread in the program's unit. Raises ValueError for sizes without one."""
     if size not in _COARSE:
         raise ValueError(f"M{size:g} is no size of a metric coarse thread here; give the lead itself (PIT)")
     return _COARSE[int(size)] / unit
@@ -280,8 +275,7 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
 
 
 def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
-    """A bore milled on a helix: infeed per turn, once round on the ground, back to the middle. Raises
-    ValueError."""
+    """A bore on a helix: infeed per turn, once round on the ground, to the middle. Raises ValueError."""
     radius = making.tool_radius()
     size = diameter / 2.0 - radius
     if size <= 0.0:

@@ -82,8 +82,7 @@ class RoundedRectangle:
         return start, legs
 
     def to_wall(self) -> list[PocketLeg]:
-        """From the start of the core to where a straight leg to the start of a loop stays inside: none is
-        needed."""
+        """From the core's start to where a straight leg to a loop stays inside: none is needed."""
         return []
 
     def core(self) -> Path:
@@ -94,8 +93,7 @@ class RoundedRectangle:
 
 @dataclass(frozen=True)
 class ArcSlot:
-    """A slot of half width b along an arc about 0 with a radius, from an angle on, by a sweep,
-    counter-clockwise if positive [rad]."""
+    """A slot of half width b on an arc about 0, from an angle by a sweep, counter-clockwise [rad]."""
 
     radius: float
     b: float
@@ -308,8 +306,7 @@ class _Cutting:
 def _passes(
     cut: _Cutting, shape: PocketShape, paths: list[Path], bottom: float, infeed: float, feed: float
 ) -> Iterator[Row]:
-    """Passes of equal depth down to the bottom, each along all paths and back to the start, and up at the
-    end."""
+    """Passes of equal depth to the bottom, each along all paths and back to the start, and up at the end."""
     plan, start = cut.plan, paths[0][0]
     out = shape.to_wall()
     back = backwards(start, out)

@@ -21,8 +21,7 @@ RowWord = tuple[int, int, float | None]  # letter code, place, value
 
 @dataclass
 class _Tables:
-    """All rows that can be appended, of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed`
-    words have no value here."""
+    """All rows of all files. Word w of row r: first[r] <= w < first[r + 1]; `computed` ones have no value."""
 
     letter: Array
     value: FloatArray
@@ -53,8 +52,7 @@ class AppendedRows:
         self._tables: _Tables | None = None
 
     def add_file(self, words: Words, name: str) -> tuple[int, int]:
-        """Take a file's words into the tables; returns the number of its first row, and where its bytes begin
-        in `data`."""
+        """Take a file's words into the tables; returns its first row, and where its bytes begin in `data`."""
         self._settle()
         begin = len(self.data)
         if begin:
@@ -64,8 +62,7 @@ class AppendedRows:
         return self._rows - len(words.line), begin
 
     def add_row(self, line: int, words: Sequence[RowWord]) -> int:
-        """Make an entry of one row of (letter code, place, value), with None where the value is computed;
-        returns its number."""
+        """Make an entry of a row of (letter code, place, value or None for computed); returns its number."""
         self._new.append((line, words))
         row = self._rows + len(self._new) - 1
         return self.add_entry(row, row + 1)

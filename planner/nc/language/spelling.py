@@ -211,8 +211,7 @@ class LineReader(ExpressionReader):
     # --- words
 
     def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
-        """All words and assignments up to the end of the line; lengths written without a point are multiplied
-        by `scale`."""
+        """Words and assignments up to the end of the line; lengths without a point count `scale`."""
         words: list[tree.Word] = []
         assignments: list[tuple[tree.Parameter, tree.Expression]] = []
         while not self.ended:

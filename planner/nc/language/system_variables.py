@@ -261,8 +261,7 @@ class FanucVariables(SystemVariables):
     )
 
     def get(self, parameter: int | str, depth: int) -> float:
-        """The value of a parameter by its number; `depth` calls are open. Raises ValueError for what only the
-        control knows."""
+        """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
         assert isinstance(parameter, int)
         state, number = self.interpreter.state, parameter
         if 4201 <= number <= 4330:
@@ -297,8 +296,7 @@ class FanucVariables(SystemVariables):
         )
 
     def put(self, number: int, value: float | None) -> None:
-        """Assign to a parameter of the control: a work offset. Raises ValueError: an alarm, or a state that
-        is changed by codes."""
+        """Assign to a work offset. Raises ValueError for an alarm, and a state that codes change."""
         if number == 3000:
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:

@@ -24,8 +24,7 @@ class Travel(RowsThrough):
         return self.place.copy() if self.active else self.interpreter.state.programmed()
 
     def radius(self) -> float:
-        """Radius of the loaded tool [mm], 0 where neither the program nor the machine file gives one. Raises
-        ValueError."""
+        """Radius of the loaded tool [mm], 0 where none is given. Raises ValueError below 0."""
         tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
         found = (0.0 if tool is None else tool.diameter / 2.0) + self.oversize
         if found < 0.0:
@@ -33,8 +32,7 @@ class Travel(RowsThrough):
         return found
 
     def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
-        """Points of the program are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises
-        ValueError."""
+        """Points are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
@@ -81,8 +79,7 @@ class Travel(RowsThrough):
         return radius
 
     def approach(self, approach: Approach, assume: Callable[[str], None]) -> None:
-        """APPR: the contour begins at a point; the way to it is known with its first move. Raises
-        ValueError."""
+        """APPR: the contour begins at a point, and the way to it with its first move. Raises ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")

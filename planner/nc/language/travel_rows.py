@@ -112,8 +112,7 @@ def other_words(row: TravelRow, *, arc: bool) -> list[tuple[int, float, int]]:
 
 @dataclass
 class FrameParts:
-    """Heidenhain's: datum shift (3,) [mm], mirror (3,) of 1 and -1, rotation [degrees], scale (3,), centre of
-    the scale (3,) [mm]."""
+    """Heidenhain's: datum, mirror (1 or -1), rotation [degrees], scale and its centre; all (3,) [mm]."""
 
     datum: FloatArray = field(default_factory=lambda: np.zeros(3))
     mirror: FloatArray = field(default_factory=lambda: np.ones(3))

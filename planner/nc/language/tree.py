@@ -14,8 +14,7 @@ from typing import NamedTuple, Protocol
 
 
 class SourcePlace(NamedTuple):
-    """Where a statement stands: its file (0 for the main program), its 1-based line, and the byte offset of
-    its first letter."""
+    """A statement's file (0: the main program), line from 1, and byte offset of its first letter."""
 
     file: int
     line: int
@@ -158,8 +157,7 @@ class If(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """`while` asks before each turn, `do` after it, `repeat` counts; `name` is what Break and Continue
-    say."""
+    """`while` asks before a turn, `do` after it, `repeat` counts; Break and Continue say its name."""
 
     place: SourcePlace
     kind: str
@@ -230,8 +228,7 @@ class Modes(NamedTuple):
 
 
 class MadeRows(NamedTuple):
-    """Rows that Python makes of values while the program runs: a cycle, a change of frame
-    (`makers.MAKERS`)."""
+    """Rows that Python makes of values while the program runs, by a maker (`makers.MAKERS`)."""
 
     place: SourcePlace
     maker: str
@@ -246,8 +243,7 @@ def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRow
 
 @dataclass
 class OpenStatement:
-    """A branch or loop whose end has not come: its body so far, and of a branch the conditions and bodies
-    before it."""
+    """A branch or loop without its end: its body so far, and conditions and bodies before it."""
 
     kind: str
     place: SourcePlace
@@ -319,8 +315,7 @@ class Parser(Protocol):
     faults: list[ProgramFault]
 
     def parse(self) -> list[Procedure]:
-        """All procedures of the file, the main program under the empty name; lines that cannot be read are in
-        `faults`."""
+        """All procedures of the file, the main program under the empty name; `faults` has the rest."""
 
 
 class ProgramFault(Exception):

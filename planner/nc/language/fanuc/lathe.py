@@ -199,8 +199,7 @@ class LatheParser(LatheWords):
         self.body.append(Message(line.place, (text,)))
 
     def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
-        """A word of a cycle in the program's unit: in least increments where it is a number without a
-        point."""
+        """A word of a cycle in the program's unit: a number without a point is in least increments."""
         letter = word.letter
         in_increments = _INCREMENTS.get(cycle, "D")
         if (
@@ -228,8 +227,7 @@ _ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], 
 
 
 def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
-    """P, Q and R of the first block of G76: mmrraa is how often the full depth is cut, ten chamfers in leads,
-    and the tool's angle."""
+    """The first block of G76: P mmrraa has the cuts at full depth, ten chamfers in leads, the angle."""
     digits = first.get("P", Number(10_000.0))
     if not isinstance(digits, Number) or digits.value != int(digits.value) or not 0 <= digits.value < 1e6:
         raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")

@@ -13,34 +13,15 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
+from planner.nc import lathe_cuts, turning
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Notes
 from planner.nc.language.making import Maker, Making, Row
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.tree import SourcePlace
-from planner.nc.lathe_cuts import (
-    LatheThread,
-    Pass,
-    Pecking,
-    ThreadFault,
-    pecked,
-    single_cut,
-    single_thread,
-    thread_passes,
-)
 from planner.nc.lexer import Words
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
-from planner.nc.turning import (
-    SAME,
-    Contour,
-    ContourFault,
-    Leg,
-    Roughing,
-    TurningStep,
-    pattern_repeat,
-    stock_removal,
-)
 
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
@@ -97,8 +78,7 @@ class LatheCycles:
         return []
 
     def leave(self) -> SourcePlace | None:
-        """Go back to what was set aside for a profile that was not read to its end; returns where its cycle
-        stands, None for no such profile."""
+        """Take back what a profile without an end set aside; returns where its cycle stands, or None."""
         if self._aside is None:
             return None
         state, table, self.run.tee = self._aside
@@ -106,9 +86,8 @@ class LatheCycles:
         self._aside = None
         return self._place
 
-    def _contour(self) -> Contour:
-        """The blocks that were executed aside as a profile; the state is again what it was before them.
-        Raises ValueError."""
+    def _contour(self) -> turning.Contour:
+        """The blocks executed aside as a profile; the state is as before them. Raises ValueError."""
         interpreter = self.run.interpreter
         program, offset = interpreter.table.finish("", Notes()), interpreter.state.offset.copy()
         self.leave()
@@ -128,18 +107,18 @@ class LatheCycles:
             making.interpreter.findings.assume(
                 f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", making.place.line
             )
-        roughing = Roughing(
+        roughing = turning.Roughing(
             depth=abs(given["D"]) * unit,
             retract=abs(given["R"]) * unit if "R" in given else RETRACT,
             allowance=self._allowance(given),
             more=complex(given.get("K", 0.0), given.get("I", 0.0)) * unit,
         )
-        return self._rows(stock_removal(contour, roughing, facing=facing))
+        return self._rows(turning.stock_removal(contour, roughing, facing=facing))
 
     def _pattern(self, making: Making, given: Given) -> Iterable[Row]:
         contour = self._contour()
         shift = complex(given.get("K", 0.0), given.get("I", 0.0)) * self._unit
-        return self._rows(pattern_repeat(contour, round(given["D"]), shift, self._allowance(given)))
+        return self._rows(turning.pattern_repeat(contour, round(given["D"]), shift, self._allowance(given)))
 
     def _allowance(self, given: Given) -> complex:
         part = 0.5 if self.run.interpreter.state.diameters else 1.0
@@ -149,7 +128,7 @@ class LatheCycles:
         state, unit = self.run.interpreter.state, self._unit
         start = self._point(state.programmed())
         part = 0.5 if state.diameters else 1.0
-        thread = LatheThread(
+        thread = lathe_cuts.LatheThread(
             start=start,
             end=complex(given.get("Z", start.real / unit), part * given.get("X", start.imag / (part * unit)))
             * unit,
@@ -163,17 +142,19 @@ class LatheCycles:
             taper=given.get("I", 0.0) * unit,
             chamfer=given.get("E", 0.0) * given["F"] * unit,
         )
-        return self._passes("G76", start, thread_passes(thread))
+        return self._passes("G76", start, lathe_cuts.thread_passes(thread))
 
     def _single(self, given: Given, *, facing: bool) -> Iterable[Row]:
         start = self._here()
         taper = given.get("R", 0.0) * self._unit
-        return self._rows(single_cut(start, self._end(given, start), taper, facing=facing))
+        return self._rows(lathe_cuts.single_cut(start, self._end(given, start), taper, facing=facing))
 
     def _single_thread(self, making: Making, given: Given) -> Iterable[Row]:
         start = self._here()
         taper, lead = given.get("R", 0.0) * self._unit, given["F"] * self._unit
-        return self._passes("G92", start, single_thread(start, self._end(given, start), taper, lead))
+        return self._passes(
+            "G92", start, lathe_cuts.single_thread(start, self._end(given, start), taper, lead)
+        )
 
     def _pecking(self, making: Making, given: Given, *, grooving: bool) -> Iterable[Row]:
         start = self._here()
@@ -181,7 +162,7 @@ class LatheCycles:
             making.interpreter.findings.assume(
                 f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", making.place.line
             )
-        pecking = Pecking(
+        pecking = lathe_cuts.Pecking(
             start=start,
             end=self._end(given, start),
             peck=abs(given["K"]) * self._unit if "K" in given else math.inf,
@@ -189,7 +170,7 @@ class LatheCycles:
             retract=abs(given["R"]) * self._unit if "R" in given else RETRACT,
             relief=abs(given.get("D", 0.0)) * self._unit,
         )
-        return self._rows(pecked(pecking, grooving=grooving))
+        return self._rows(lathe_cuts.pecked(pecking, grooving=grooving))
 
     def _here(self) -> complex:
         """Where the tool stands; it is the start of the cycle too. Raises ValueError."""
@@ -211,12 +192,12 @@ class LatheCycles:
     def _unit(self) -> float:
         return self.run.interpreter.state.unit
 
-    def _rows(self, steps: Iterable[TurningStep]) -> list[Row]:
+    def _rows(self, steps: Iterable[turning.TurningStep]) -> list[Row]:
         rows, at = [], self._point(self._start)
         try:
             for step in steps:
                 leg = step.leg
-                if not leg.turning and abs(leg.end - at) < SAME:
+                if not leg.turning and abs(leg.end - at) < turning.SAME:
                     continue
                 if step.fast:
                     rows.append(self._fast(leg.end))
@@ -227,11 +208,11 @@ class LatheCycles:
                 else:
                     rows.append([("G", 1.0), *self._to(leg.end)])
                 at = leg.end
-        except ContourFault as fault:
+        except turning.ContourFault as fault:
             raise ValueError(str(fault)) from fault
         return rows
 
-    def _passes(self, cycle: str, at: complex, passes: Iterable[Pass]) -> Iterable[Row]:
+    def _passes(self, cycle: str, at: complex, passes: Iterable[lathe_cuts.Pass]) -> Iterable[Row]:
         """Moves of a thread. Raises ValueError for what contradicts itself in it."""
         rows: list[Row] = []
         try:
@@ -241,7 +222,7 @@ class LatheCycles:
                 elif abs(one.end - at) > 0.0:
                     rows.append(self._fast(one.end))
                 at = one.end
-        except ThreadFault as fault:
+        except lathe_cuts.ThreadFault as fault:
             raise ValueError(f"{cycle}: {fault}") from fault
         return rows
 
@@ -253,9 +234,8 @@ class LatheCycles:
         return [("X", part * point.imag / self._unit), ("Z", point.real / self._unit)]
 
 
-def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour:
-    """Blocks as a profile in programmed coordinates. Raises ValueError for what is no line or arc in the
-    plane."""
+def _contour_of(program: Program, offset: np.ndarray, start: complex) -> turning.Contour:
+    """Blocks as a profile in programmed coordinates. Raises ValueError for no line or arc in the plane."""
     legs, arcs = [], iter(zip(program.arc_center, program.arc_normal, program.arc_sweep, strict=True))
     for kind, end in zip(program.kind.tolist(), program.end, strict=True):
         for kinds, what in _WRONG.items():
@@ -267,12 +247,14 @@ def _contour_of(program: Program, offset: np.ndarray, start: complex) -> Contour
             if normal != 1 or abs(sweep) > 2.0 * math.pi:
                 raise ValueError("an arc of the profile lies in another plane than z x; write G18 before it")
             legs.append(
-                Leg(point, 1 if sweep > 0 else -1, complex(centre[2] - offset[2], centre[0] - offset[0]))
+                turning.Leg(
+                    point, 1 if sweep > 0 else -1, complex(centre[2] - offset[2], centre[0] - offset[0])
+                )
             )
         else:
-            legs.append(Leg(point))
+            legs.append(turning.Leg(point))
     if not legs:
         raise ValueError("the profile of the cycle has no moves")
     if legs[0].turning:
         raise ValueError("the first move of a profile is straight: G0 or G1 to its first point")
-    return Contour(start, int(program.kind[0]) == Kind.RAPID, tuple(legs))
+    return turning.Contour(start, int(program.kind[0]) == Kind.RAPID, tuple(legs))

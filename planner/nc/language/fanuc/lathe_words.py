@@ -182,8 +182,7 @@ class LatheWords(FanucParser):
         return [word("G", at, 96.0), *(word(c, at, speed) for c, speed in speeds if speed is not None)]
 
     def _single(self, words: Words, codes: set[str], line: SourceLine) -> bool:
-        """Read a line with such a cycle, or one that repeats the cut in force. False if it is none. Raises
-        ProgramFault."""
+        """Read a line with such a cycle, or a repeated cut; False if it is none. Raises ProgramFault."""
         letters = {word.letter for word in words}
         pecks = next((code for code in PECKS if code in codes), "")
         if pecks:

@@ -96,8 +96,7 @@ class FanucParser(FanucControl):
     # --- lines
 
     def _plain(self, rows: tree.PlainRows) -> None:
-        """Rows without a statement: labels that are used stand between them, and G66 calls after those that
-        move."""
+        """Rows without a statement, used labels between them, and G66 calls after those that move."""
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
             return

@@ -98,8 +98,7 @@ REFUSED = {
 
 
 def is_of_the_builder(code: int) -> bool:
-    """True if an M code, which is none of this control's, would be taken for one of RS274NGC or of a
-    printer."""
+    """True if an M code of the builder would be taken for one of RS274NGC or of a printer."""
     found = setting("M", 10 * code, "", "")
     of_printers = code > OWN_LAST and found is not None and found.what is not UNKNOWN_M
     return of_printers or (OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP)
@@ -179,8 +178,7 @@ class Definitions(Flow):
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
     def _tool_data(self, block: Block) -> Rows:
-        """TOOL DEF: with L or R the data of a tool, which count from its next call on; without them the tool
-        to have ready."""
+        """TOOL DEF: with L or R data from the next call on; without them the tool to have ready."""
         column, match = block.column, block.take(_TOOL_DEF)
         if match is None:
             raise block.wrong("TOOL DEF takes the number of a tool, its length L and its radius R")
@@ -232,8 +230,7 @@ class Definitions(Flow):
         raise block.wrong(_not_read(cycle))
 
     def _pecking(self, block: Block, part: int) -> Rows:
-        """Cycle 1 of older controls: its lines give the parameters of cycle 200, and the surface lies below
-        the tool."""
+        """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [tree.assign(block.place, (own("cycle"), tree.ONE))]
         column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
@@ -247,8 +244,7 @@ class Definitions(Flow):
         return [tree.made(block.place, "cycle in force")]
 
     def _codes(self, block: Block, given: Items, *, straight: bool = False) -> tuple[Rows, Rows, bool]:
-        """Statements of the M codes of a block before and after its move, and whether it goes in machine
-        coordinates, as `straight` moves may."""
+        """Statements of M codes before and after the move, and whether it goes by machine coordinates."""
         before: Rows = []
         after: Rows = []
         machine = False

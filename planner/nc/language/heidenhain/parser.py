@@ -22,26 +22,10 @@ from collections.abc import Callable
 
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
+from planner.nc.language.heidenhain import text
 from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
-from planner.nc.language.heidenhain.text import (
-    PLANE,
-    POLAR,
-    POLE,
-    Block,
-    Items,
-    Rows,
-    X,
-    Y,
-    Z,
-    absolute,
-    blocks,
-    items,
-    looked_up,
-    own,
-    refuse_arc_axes,
-)
 from planner.nc.language.source import Source
 
 _FUNCTION = re.compile(
@@ -66,7 +50,7 @@ class HeidenhainParser(Definitions):
 
     def parse(self) -> list[tree.Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
-        self.blocks = tuple(blocks(self.source.words.data, self.source.file, self.source.begin))
+        self.blocks = tuple(text.blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
         self.compensates = any(compensates(block.text) for block in self.blocks)
         self.oversizes = any(re.match(r"TOOL CALL.*\bDR", b.text, re.IGNORECASE) for b in self.blocks)
@@ -92,12 +76,12 @@ class HeidenhainParser(Definitions):
                         )
                     )
         set_up: list[tuple[tree.Parameter, tree.Expression]] = [
-            (own(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
+            (text.own(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
         ]
         if not source.file:
-            set_up += [(one, tree.ZERO) for one in (X, Y, Z, *POLE, *POLAR)]
-            set_up += [(own(name), tree.ZERO) for name in ("dx", "dy", "cycle")]
-            set_up.append((PLANE, tree.TWO))
+            set_up += [(one, tree.ZERO) for one in (text.X, text.Y, text.Z, *text.POLE, *text.POLAR)]
+            set_up += [(text.own(name), tree.ZERO) for name in ("dx", "dy", "cycle")]
+            set_up.append((text.PLANE, tree.TWO))
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
@@ -126,10 +110,9 @@ class HeidenhainParser(Definitions):
 
     # --- blocks
 
-    def _body(self, first: int, last: int, called: bool = False) -> Rows:
-        """Statements of the blocks `first` to `last` - 1. Of a subprogram, `called`, faults are known
-        already."""
-        body: Rows = []
+    def _body(self, first: int, last: int, called: bool = False) -> text.Rows:
+        """Statements of blocks `first` to `last` - 1; faults of `called` subprograms are known already."""
+        body: text.Rows = []
         faults = len(self.faults)
         self.skip = False
         for k in range(first, last):
@@ -145,7 +128,7 @@ class HeidenhainParser(Definitions):
             body.append(tree.Return(self.blocks[last - 1].place))
         return body
 
-    def _block(self, k: int, last: int) -> Rows:
+    def _block(self, k: int, last: int) -> text.Rows:
         block = self.blocks[k]
         match = _FUNCTION.match(block.text)
         name = " ".join(match.group().upper().split()) if match else ""
@@ -164,36 +147,36 @@ class HeidenhainParser(Definitions):
         self.skip = bool(corner)
         return [*corner, *read(self, block)]
 
-    def _call_program(self, block: Block) -> Rows:
+    def _call_program(self, block: text.Block) -> text.Rows:
         """CALL PGM name: a file of the program's folder; its units end with it."""
         name = called_file(block.rest)
         if not name:
             raise block.wrong("CALL PGM is followed by the name of a program")
         units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
         called = tree.Call(block.place, name, None, block.rest.strip())
-        return [called, units, looked_up(block)]
+        return [called, units, text.looked_up(block)]
 
     # --- moves
 
-    def _ends(self, block: Block, given: Items) -> dict[str, tree.Expression]:
+    def _ends(self, block: text.Block, given: text.Items) -> dict[str, tree.Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
-        return {axis: absolute(axis, found) for axis, found in given.axes.items()}
+        return {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
 
-    def _straight(self, block: Block) -> Rows:
-        given, name = items(block, turning=self.source.at_tip), block.function
+    def _straight(self, block: text.Block) -> text.Rows:
+        given, name = text.items(block, turning=self.source.at_tip), block.function
         before, after, machine = self._codes(block, given, straight=name == "L")
         if machine and any(relative for _, relative in given.axes.values()):
             raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
-        lines: Rows = [*before, *self._side(block, given)]
+        lines: text.Rows = [*before, *self._side(block, given)]
         if name == "LP":
             self._need_pole(block)
             lines += self.moves.polar_line(block, given)
         else:
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
-        return [*lines, *([looked_up(block)] if machine else []), *after]
+        return [*lines, *([text.looked_up(block)] if machine else []), *after]
 
-    def _corner(self, k: int, last: int) -> Rows:
+    def _corner(self, k: int, last: int) -> text.Rows:
         """RND or CHF in block k, which the move before it ends with."""
         block = self.blocks[k] if k < last else None
         if block is None or not (match := re.match(r"(RND|CHF)\b", block.text, re.IGNORECASE)):
@@ -206,8 +189,8 @@ class HeidenhainParser(Definitions):
         kind = CORNERS.index("RND" if rounded else "CHR")
         return [tree.made(block.place, "corner", kind=kind, size=number)]
 
-    def _arc(self, block: Block) -> Rows:
-        name, given = block.function, items(block)
+    def _arc(self, block: text.Block) -> text.Rows:
+        name, given = block.function, text.items(block)
         before, after, _ = self._codes(block, given)
         before += self._side(block, given)
         if name == "CTP":
@@ -218,45 +201,45 @@ class HeidenhainParser(Definitions):
             self._need_pole(block)
             return [*before, *rows, *after]
         if name != "C" or not self.moves.tilted:
-            refuse_arc_axes(block, given)
+            text.refuse_arc_axes(block, given)
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
         rows = how(block, given, self._ends(block, given))
         if name == "C":
             self._need_pole(block)
         return [*before, *rows, *after]
 
-    def _need_pole(self, block: Block) -> None:
+    def _need_pole(self, block: text.Block) -> None:
         if not self.poles:
             raise block.fault("there is no pole: write CC before")
 
-    def _side(self, block: Block, given: Items) -> Rows:
+    def _side(self, block: text.Block, given: text.Items) -> text.Rows:
         if given.side is None or not self.compensates:
             return []
         return [tree.made(block.place, "compensate", side=given.side)]
 
-    def _approach(self, block: Block) -> Rows:
+    def _approach(self, block: text.Block) -> text.Rows:
         rows, given = approach_rows(block, self.moves.automatic)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
 
-    def _pole(self, block: Block) -> Rows:
-        column, given = block.column, items(block)
-        ends = self._ends(block, given) if given.axes else {"X": X, "Y": Y}
+    def _pole(self, block: text.Block) -> text.Rows:
+        column, given = block.column, text.items(block)
+        ends = self._ends(block, given) if given.axes else {"X": text.X, "Y": text.Y}
         if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
             raise block.fault(
                 "the plane of a pole is that of its two coordinates; write CC with both of them", column
             )
-        named = [(POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
+        named = [(text.POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
-        return [tree.assign(block.place, *named, (PLANE, tree.Number(float(normal))))]
+        return [tree.assign(block.place, *named, (text.PLANE, tree.Number(float(normal))))]
 
     # --- cycles
 
-    def _cycle_call(self, block: Block) -> Rows:
+    def _cycle_call(self, block: text.Block) -> text.Rows:
         if not block.take(r"\s*POS\b"):
             before, after = self._codes_alone(block)
             return [*before, *self._call_cycle(block), *after]
-        given = items(block)
+        given = text.items(block)
         before, after, _ = self._codes(block, given)
         ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
@@ -269,7 +252,7 @@ _WHY = {
     ),
     **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
 }
-_READ: dict[str, Callable[[HeidenhainParser, Block], Rows]] = {
+_READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
     **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), lambda parser, block: []),

@@ -49,8 +49,7 @@ def parameter(number: int) -> tree.Numbered:
 
 @dataclass
 class Block:
-    """A block of the program, read from left to right: its place, and its text without number and comment,
-    parts of continued lines joined by blanks."""
+    """A block read from left to right: its place, and its text without number and comment, in one line."""
 
     place: tree.SourcePlace
     text: str
@@ -269,14 +268,12 @@ def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
 
 
 def looked_up(block: Block) -> tree.Line:
-    """The position is asked of the interpreter: after an offset has changed, or a move in machine
-    coordinates."""
+    """Ask the interpreter for the position: behind offsets and moves in machine coordinates."""
     where = [tree.Numbered(tree.Number(float(FIRST_POSITION + k))) for k in range(3)]
     return tree.assign(block.place, *zip((X, Y, Z), where, strict=True))
 
 
 def refuse_arc_axes(block: Block, given: Items) -> None:
-    """Arcs of CR and CT lie in the working plane, and so do those of C where all poles do. Raises
-    ProgramFault."""
+    """Arcs of CR and CT, and C without other poles, lie in the working plane. Raises ProgramFault."""
     if "Z" in given.axes:
         raise block.fault("an arc with Z; a helix is written as CP with IPA")

@@ -212,8 +212,7 @@ class Commands(SiemensControl):
         raise reader.fault(f"{reader.peek(-1)} is not read; {REMEDY}", reader.tokens[reader.next - 1].at)
 
     def _tool_point(self, reader: LineTokens) -> None:
-        """TRAORI and TRAFOOF, alone or with the number of the transformation, 1. Raises ProgramFault for
-        another one, and for TRAORI on a machine without kinematics."""
+        """TRAORI and TRAFOOF, alone or as NAME(1). Raises ProgramFault for others, and without kinematics."""
         name = reader.peek(-1)
         at = reader.tokens[reader.next - 1].at
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
@@ -327,6 +326,5 @@ class Commands(SiemensControl):
 
 
 def siemens_files(name: str) -> frozenset[str]:
-    """Names that the file of a subprogram may have, in small letters: NAME.SPF, NAME.MPF, and as controls
-    save them, NAME_SPF."""
+    """Names, in small letters, that the file of a subprogram may have: NAME.SPF, NAME.MPF, NAME_SPF."""
     return frozenset(name + ending for ending in (".spf", ".mpf", "_spf", "_mpf", ""))

@@ -122,8 +122,7 @@ def pattern_rows(
 
 
 def check(name: str, given: Container[str]) -> None:
-    """Raises ValueError for arguments that are missing: those of CYCLE81 to CYCLE83 are looked at in the
-    text."""
+    """Raises ValueError for arguments that CYCLE81 to CYCLE83 lack: they are looked at in the text."""
     if name in _DRILLING:
         _required(name, given, "RTP", "RFP", "SDIS")
         for pair in (("DP", "DPR"), ("FDEP", "FDPR"))[: 1 + (name == "CYCLE83")]:

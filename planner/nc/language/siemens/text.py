@@ -260,8 +260,7 @@ class SiemensControl:
         )
 
     def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
-        """The label of a repeat, a counter of its own, and how often. Raises ProgramFault for a label that is
-        not known."""
+        """The label of a repeat, its counter, and how often. Raises ProgramFault for an unknown label."""
         label = reader.peek()
         reader.next += 1
         if label not in known:

@@ -34,9 +34,8 @@ CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_
 RADIUS_MIN = {1.0: 0.00127, MM_PER_INCH: 0.00005 * MM_PER_INCH}
 CLOSURE_RELATIVE = 1e-3
 HALF_CIRCLE = 1e-12  # relative
-SAME_PLACE = (
-    1e-7  # two points are one [mm]: a tenth of the finest digit of programs, far above the rounding of sums
-)
+# Two points are one [mm]: a tenth of the finest digit of programs, far above the rounding of sums.
+SAME_PLACE = 1e-7
 # Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the
 # rounding of a turn written out.
 FULL_TURN = 1e-6
@@ -73,10 +72,7 @@ def arc_from_centre(start: FloatArray, end: FloatArray, centre: FloatArray, way:
 
 def arc_from_radius(start: FloatArray, end: FloatArray, radius: float, way: ArcWay) -> Arc:
     """The arc of a given radius [mm], more than half a turn if it is negative, from start (3,) to end (3,)
-    [mm].
-
-    Raises ArcError if there is none.
-    """
+    [mm]. Raises ArcError if there is none."""
     normal, clockwise, turns, unit = way
     a, b = IN_PLANE[normal]
     da, db = end[a] - start[a], end[b] - start[b]

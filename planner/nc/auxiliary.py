@@ -30,9 +30,7 @@ from planner.nc.program import Kind, PathControl
 from planner.nc.state import FeedMode, State
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
-SURFACE_STEP = (
-    0.05  # by which the spindle's speed changes in a part of a move: as much as overrides are set to
-)
+SURFACE_STEP = 0.05  # change of the spindle's speed in a part of a move: as much as overrides are set to
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
 _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
 # Below this feed [programmed units per minute] LinuxCNC takes this one under G93
@@ -49,9 +47,8 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
         return
     feed = block.value["F"]
     if not feed > 0:
-        raise block.fault(
-            "a feed must be positive; write the feed of the moves that follow, such as F1000", "F"
-        )
+        text = "a feed must be positive; write the feed of the moves that follow, such as F1000"
+        raise block.fault(text, "F")
     if mode == "inverse time":
         return
     state.feed_unit = state.unit
@@ -84,23 +81,19 @@ def check_feed(state: State, block: Block) -> None:
         if state.motion > 3:
             raise WordFault(word, f"{name} under G93 (inverse time) has no feed; write G94 before it")
         if "F" not in block.value:
-            raise WordFault(
-                word, f"{name} under G93 (inverse time) needs an F word on its line: one over its minutes"
-            )
+            text = f"{name} under G93 (inverse time) needs an F word on its line: one over its minutes"
+            raise WordFault(word, text)
         return
     if state.feed_mode == "per turn" and state.feed_per_turn > 0:
         if not state.spindle.speed > 0:
-            raise WordFault(
-                word, f"{name} with a feed per turn (G95) needs a spindle speed; write an S word before it"
-            )
+            text = f"{name} with a feed per turn (G95) needs a spindle speed; write an S word before it"
+            raise WordFault(word, text)
         if state.spindle.surface_speed:
             return  # its feed depends on the diameter: `surface_feed`
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
     if not state.feed > 0:
-        raise WordFault(
-            word,
-            f"{name} moves without a feed; write an F word on this line or before it, or feed_default into the machine file",
-        )
+        remedy = "write an F word on this line or before it, or feed_default into the machine file"
+        raise WordFault(word, f"{name} moves without a feed; {remedy}")
 
 
 def on_surface(state: State) -> bool:
@@ -108,27 +101,27 @@ def on_surface(state: State) -> bool:
     return state.spindle.surface_speed and state.feed_mode == "per turn" and state.feed_per_turn > 0
 
 
+def _surface_speed(state: State) -> float:
+    """[mm/min]"""
+    return state.spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
+
+
 def surface_feed(state: State, radius: float, word: int) -> float:
     """Feed [mm/s] at a radius [mm]. Raises WordFault on the axis, if the speed has no bound."""
-    spindle = state.spindle
-    per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
-    turns = per_minute / (2.0 * math.pi * abs(radius)) if radius else math.inf
-    turns = min(turns, spindle.speed_max or math.inf)
+    turns = _surface_speed(state) / (2.0 * math.pi * abs(radius)) if radius else math.inf
+    turns = min(turns, state.spindle.speed_max or math.inf)
     if math.isinf(turns):
-        raise WordFault(
-            word,
-            "a move to the spindle's axis under a constant surface speed (G96) without a largest speed has no feed; "
-            "write G50 S, or D beside G96",
-        )
+        move = "a move to the spindle's axis under a constant surface speed (G96) without a largest speed"
+        raise WordFault(word, f"{move} has no feed; write G50 S, or D beside G96")
     return state.feed_per_turn * turns / SECONDS_PER_MINUTE
 
 
 def surface_parts(state: State, start: float, end: float) -> list[float]:
     """Parts, up to 1, of a straight move between radii [mm]: the speed changes by `SURFACE_STEP` in each."""
     largest = max(abs(start), abs(end))
-    spindle = state.spindle
-    per_minute = spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
-    least = max(per_minute / (2.0 * math.pi * spindle.speed_max) if spindle.speed_max else 0.0, _LEAST_RADIUS)
+    speed_max = state.spindle.speed_max
+    least = _surface_speed(state) / (2.0 * math.pi * speed_max) if speed_max else 0.0
+    least = max(least, _LEAST_RADIUS)
     parts = {1.0}
     if start != end and largest > least:
         count = math.ceil(math.log(largest / least) / math.log1p(SURFACE_STEP))
@@ -162,11 +155,8 @@ def signal(table: BlockTable, block: Block) -> None:
         if letter not in block.value:
             raise block.fault(f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}", "signals")
     if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
-        raise block.fault(
-            "M66 waits for an input of the control, which only the machine knows; "
-            "plan the parts before and after it",
-            "signals",
-        )
+        text = "M66 waits for an input of the control, which only the machine knows"
+        raise block.fault(f"{text}; plan the parts before and after it", "signals")
     table.add_event("M", code / 10, block.line)
 
 
@@ -177,7 +167,7 @@ _PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_ST
 # a dwell, M6, M0. Cycles make room for themselves.
 ROWS_AT_ONCE = 4
 _LONG = 60.0  # a dwell of a minute is no usual one [s]
-_SPINDLE = {30: 1, 40: -1, 50: 0}  # how it turns after M3, M4, M5
+TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
 def events(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
@@ -213,7 +203,7 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
     for group in ("spindle", "spindle orientation", "coolant", "override"):
         if group in block.m:
             table.add_event("M", block.m[group] / 10, line)
-    state.spindle.turning = _SPINDLE.get(block.m.get("spindle", -1), state.spindle.turning)
+    state.spindle.turning = TURNING.get(block.m.get("spindle", -1), state.spindle.turning)
     if "spindle mode" in block.g:
         state.spindle.surface_speed = block.g["spindle mode"] == 960
         if state.spindle.surface_speed and "S" not in block.value:
@@ -257,29 +247,21 @@ def assume_rapids(table: BlockTable, ignored: IgnoredWords, findings: Findings) 
 
 def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
-    word = block.at["path control"]
-    if block.g["path control"] == _EXACT_PATH and ignored.printer:
-        raise WordFault(
-            word, "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
-        )
-    if (
-        block.g["path control"] == _EXACT_PATH
-        and "S" in block.value
-        and not block.m
-        and "motion" not in block.g
-    ):
+    word, code = block.at["path control"], block.g["path control"]
+    if code == _EXACT_PATH and ignored.printer:
+        text = "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
+        raise WordFault(word, text)
+    if code == _EXACT_PATH and "S" in block.value and not block.m and "motion" not in block.g:
         text = "G61 with S is exact path and the spindle's speed; in Marlin it goes back to a saved position"
         findings.assume(text, block.line, word)
-    state.path_control, state.tolerance = _PATH_CONTROLS[block.g["path control"]], np.nan
-    if "P" in block.value and block.g["path control"] == 640:
+    state.path_control, state.tolerance = _PATH_CONTROLS[code], np.nan
+    if "P" in block.value and code == 640:
         tolerance = block.value["P"]
         if tolerance < 0:
             raise block.fault("a tolerance must not be negative; write G64 P0.05", "P")
         if tolerance > 0 and tolerance * state.unit < TOLERANCE_MIN:
-            raise block.fault(
-                f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself",
-                "P",
-            )
+            text = f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself"
+            raise block.fault(text, "P")
         if tolerance > 0:
             state.tolerance = tolerance * state.unit
         else:

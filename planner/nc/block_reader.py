@@ -37,18 +37,14 @@ from planner.nc.settings import (
 
 MESSAGE = "message"  # the rest of the line is text
 
-COMMAND = Assumption(
-    "command to the control ($)", "commands to the control ($)", "assumed not to move anything"
-)
-_IGNORED = Assumption("command to the control", "commands to the control", "left out, as --ignore says")
+COMMAND = Assumption("command{|s} to the control ($)", "assumed not to move anything")
+_IGNORED = Assumption("command{|s} to the control", "left out, as --ignore says")
 # Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files
 # on a card.
 _HARMLESS = re.compile(
     r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
 )
-_OTHER_SETTING = Assumption(
-    "setting of grbl", "settings of grbl", "assumed not to change the motion", changes=True
-)
+_OTHER_SETTING = Assumption("setting{|s} of grbl", "assumed not to change the motion", changes=True)
 _SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
 _VALUE = re.compile(r"(\w+)=([-+]?\d+\.?\d*)")
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
@@ -71,25 +67,21 @@ def command(words: Words, word: int, block: Block, report: Report, ignored: Igno
     if homing := _HOMING.fullmatch(text):
         block.homing = homing.group(1).upper() or "XYZ"
         return True
-    if (setting := _SETTING.fullmatch(text)) and setting[1] in GRBL:
+    setting = _SETTING.fullmatch(text)
+    if setting and setting[1] in GRBL:
         block.settings.append(Setting(setting[1], {"": float(setting[2])}, word))
-        return True
-    if setting:
-        ignored.count(_OTHER_SETTING, text, block.line)
-        return True
-    if _HARMLESS.fullmatch(text):
-        ignored.count(COMMAND, text, block.line)
-        return True
-    return False
+    elif setting or _HARMLESS.fullmatch(text):
+        ignored.count(_OTHER_SETTING if setting else COMMAND, text, block.line)
+    else:
+        return False
+    return True
 
 
 def _velocity_limit(words: Words, word: int, block: Block) -> bool:
     text = (chr(words.data[int(words.at[word])]) + words.rest(word)).partition(";")[0].upper()
     name, _, rest = text.partition(" ")
     values = _VALUE.findall(rest)
-    if name.strip() != VELOCITY_LIMIT or " ".join(f"{key}={value}" for key, value in values) != " ".join(
-        rest.split()
-    ):
+    if name.strip() != VELOCITY_LIMIT or [f"{key}={value}" for key, value in values] != rest.split():
         return False
     block.settings.append(Setting(VELOCITY_LIMIT, {key.lower(): float(value) for key, value in values}, word))
     return True
@@ -117,8 +109,8 @@ _TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT
 
 _BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
 NAME_SHOWN = 20  # characters of a name in a note
-PROGRAM_NAME = codes.Assumption("program name", "program names", "nothing is done with them")
-PROGRAM_NUMBER = codes.Assumption("program number", "program numbers", "kept, nothing is done with them")
+PROGRAM_NAME = Assumption("program name{|s}", "nothing is done with them")
+PROGRAM_NUMBER = Assumption("program number{|s}", "kept, nothing is done with them")
 
 
 def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) -> Block | None:
@@ -154,13 +146,11 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
                 report(word, "a line number comes first on its line, once")
                 return None
         elif letter in "GM":
-            owned = ""
             taken = None
             if value * 10.0 not in ALWAYS_READ[letter] or ignored.reading.ignore:
                 taken = _settle(words, word, (first, last), block, ignored)
-            if taken is not None:
-                owned = taken
-            else:
+            owned = taken or ""
+            if taken is None:
                 block.partial |= _add_code(block, letter, value, word, report, ignored)
         elif letter in owned or (ignored.treatment[code] == LEFT_OUT and letter != "E"):
             if letter in owned and block.settings:
@@ -196,18 +186,17 @@ def _program_number(
 
 
 def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored: IgnoredWords) -> str | None:
-    """Keep a code that moves nothing, or that the user knows to be harmless, as an event.
-
-    Returns the letters behind it that are its own, or `MESSAGE` for all that follows; None for a code that is
-    to be read.
-    """
+    """Keep a code that moves nothing, or that the user knows to be harmless, as an event. Returns the letters
+    behind it that are its own, or `MESSAGE` for all that follows; None for a code that is to be read."""
     letter, value = chr(words.letter[word]), float(words.value[word])
     code = round(min(max(value, -1.0), CODE_MAX) * 10.0)
     if abs(value * 10.0 - code) > 10.0 * _CODE_ROUNDING:
         return None
     name = f"{letter}{codes.number(code)}"
-    before = _letters(words, row[0], word).replace("N", "").replace("M", "")
-    found = setting(letter, code, before, _behind(words, word + 1, row[1]))
+    letters = bytes(words.letter[row[0] : row[1]]).decode("latin-1")
+    before = letters[: word - row[0]].replace("N", "").replace("M", "")
+    behind = re.split("[GM]", letters[word + 1 - row[0] :], maxsplit=1)[0]  # up to the next code
+    found = setting(letter, code, before, behind)
     if ignored.ignores(name):
         ignored.count(LEFT_OUT_BY_USER, name, block.line)
         block.events.append((letter, code / 10))
@@ -235,15 +224,6 @@ def _bare_words(words: Words, word: int) -> dict[str, float]:
     """The letters of a line from one without a number on, NaN where they have none."""
     text = words.data[int(words.at[word]) :].partition(b"\n")[0].partition(b";")[0].decode("latin-1").lower()
     return {letter: float(number) if number else math.nan for letter, number in _BARE_WORD.findall(text)}
-
-
-def _letters(words: Words, first: int, last: int) -> str:
-    return bytes(words.letter[first:last]).decode("latin-1")
-
-
-def _behind(words: Words, word: int, last: int) -> str:
-    """The letters from a word on, up to the next code."""
-    return re.split("[GM]", _letters(words, word, last), maxsplit=1)[0]
 
 
 def _add_code(
@@ -291,33 +271,24 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
         del block.value[letter]
 
 
+_UNREADABLE = {
+    Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
+    Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",
+    Unreadable.COMMENT_NESTED: "a comment inside a comment is not allowed; remove the inner parenthesis",
+}
+_NO_WORD = "this character starts no word; a word is a letter and a number"
+
+
 def _unreadable(words: Words, word: int) -> str:
-    kind = Unreadable(int(words.value[word]))
-    if kind is Unreadable.LONG:
-        return (
-            f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?"
-        )
-    if kind is Unreadable.COMMENT_OPEN:
-        return "the comment is not closed on its line; write )"
-    if kind is Unreadable.COMMENT_NESTED:
-        return "a comment inside a comment is not allowed; remove the inner parenthesis"
+    kind, text = Unreadable(int(words.value[word])), words.text(word)
+    if kind in _UNREADABLE:
+        return _UNREADABLE[kind]
     if kind is Unreadable.NUMBER:
-        return _no_number(words, word)
-    return _character(words.text(word))
-
-
-def _no_number(words: Words, word: int) -> str:
-    after = words.data[int(words.at[word]) + len(words.text(word)) :].lstrip(b" \t")[:1].decode("latin-1")
-    if after in codes.CHARACTERS and after not in ")/":
-        return codes.CHARACTERS[after]
-    return "a letter without a number; write digits after it, such as X1.5"
-
-
-def _character(character: str) -> str:
-    if character.isdigit() or character in "+-.":
+        after = words.data[int(words.at[word]) + len(text) :].lstrip(b" \t")[:1].decode("latin-1")
+        known = codes.CHARACTERS.get(after, "") if after not in ")/" else ""
+        return known or "a letter without a number; write digits after it, such as X1.5"
+    if text.isdigit() or text in "+-.":
         return "a number without a letter before it; a word is a letter and one number"
-    if character.isprintable():
-        return codes.CHARACTERS.get(
-            character, "this character starts no word; a word is a letter and a number"
-        )
-    return f"character {ord(character)} is not part of a text; is this a binary file?"
+    if text.isprintable():
+        return codes.CHARACTERS.get(text, _NO_WORD)
+    return f"character {ord(text)} is not part of a text; is this a binary file?"

@@ -171,6 +171,7 @@ class BlockTable:
         names = [c for k, c in enumerate(further) if self.block.further[used, k].any()]
         units = [RAD_PER_DEG if LETTERS.index(c) < ROTARY else 1.0 for c in names]
         moved = self.block.further[used][:, [further.index(c) for c in names]] * np.array(units)
+        centres = np.array([arc[1] for arc in self.arcs]).reshape(-1, 3)
         return Program(
             source=source,
             axes=LINEAR_AXES + tuple(letter.lower() for letter in names),
@@ -180,7 +181,7 @@ class BlockTable:
             **{name: getattr(self.block, name)[used].copy() for name in _COPIED},
             synchronised=np.array(self.synchronised, dtype=np.int64),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
-            arc_center=_padded(np.array([arc[1] for arc in self.arcs]).reshape(-1, 3), len(names)),
+            arc_center=np.pad(centres, ((0, 0), (0, len(names)))),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
             splines=SplineTable(
@@ -203,11 +204,6 @@ class BlockTable:
 
 
 _COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
-
-
-def _padded(points: FloatArray, further: int) -> FloatArray:
-    """Points (n, 3) with zeros for so many further axes."""
-    return np.pad(points, ((0, 0), (0, further))) if further else points
 
 
 def _grown(array: Array, needed: int) -> Array:

@@ -7,6 +7,7 @@ each other.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 
@@ -24,13 +25,19 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """Something counted and said once: its name for one and for many, what is assumed of it, and whether that
-    may change geometry or time (docs/language.md)."""
+    """Something counted and said once: its name, in which {one|many} stands for what differs, what is assumed
+    of it, and whether that may change geometry or time (docs/language.md)."""
 
-    one: str
-    many: str
+    name: str
     said: str
     changes: bool = False
+
+    def named(self, times: int) -> str:
+        """How often it was met, and its name."""
+        return f"{times:,} " + _ONE_OR_MANY.sub(lambda both: both[1 if times == 1 else 2], self.name)
+
+
+_ONE_OR_MANY = re.compile(r"\{(.*?)\|(.*?)\}")
 
 
 G_GROUP: dict[int, str] = {

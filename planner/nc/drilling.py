@@ -11,14 +11,8 @@ They stay in force while the same code does. The tool goes to the hole at the he
 above R, else at the one it will retract to; then fast to R, makes the hole, and retracts to R (G99) or to the
 level before the series (G98), if that is higher.
 
-    G81 drill            feed down
-    G82 spot             feed down, dwell
-    G73, G83 peck        feed down Q by Q; between pecks up by `CLEARANCE` (G73), or to R and back to `CLEARANCE` above the last depth
-    G74, G84 tap         feed down, dwell, spindle the other way, feed up
-    G85, G89 bore        feed down, (G89: dwell,) feed up
-    G86 bore             feed down, dwell, spindle stop
-    G87 back bore        beside the hole down, into it, feed up to K and down again, beside it out
-    G88 bore             feed down, dwell, full stop: the operator retracts, and the plan has a rapid for it
+`_STEPS` says what each cycle does there. Between pecks the tool goes up by `CLEARANCE` (G73), or to R and back
+to `CLEARANCE` above the last depth. At G88 the operator retracts, and the plan has a rapid for it.
 """
 
 from __future__ import annotations
@@ -47,8 +41,8 @@ STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which mus
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole in programmed coordinates and units: in the plane (a, b), along its normal c. (Pecks are counted
-    in programmed units, so that decimal fractions of an inch add up as they do in the control.)"""
+    """A hole in programmed coordinates and units, in which pecks add up as in the control: in the plane
+    (a, b), along its normal c."""
 
     code: int  # tenths of the G code
     place: tuple[float, float]  # (a, b)
@@ -73,31 +67,45 @@ class CycleStep:
     spindle: int = 0
 
 
+# The steps of each cycle from above the hole at R on: moves at the feed (down to the depth, back to R, out to
+# where the cycle ends) and fast (up to where it ends; beside, deep, in and away, of the back bore, whose feed
+# leads to the counterbore), the dwell, the spindle (stop, other way, again as before), and a full stop.
+_STEPS = {
+    **dict.fromkeys(PECKING, "pecks down up"),
+    **dict.fromkeys(TAPPING, "down stop other dwell out stop again"),
+    810: "down up",
+    820: "down dwell up",
+    850: "down back up",
+    860: "down dwell stop up again",
+    870: "beside stop deep in again counterbore down stop deep away up again",
+    880: "down dwell stop halt up again",
+    890: "down dwell out",
+}
+
+
 def steps(hole: Hole) -> Iterator[CycleStep]:
     """The steps of a hole, from above it at R on."""
     a, b = hole.place
-    down, up = CycleStep(Kind.LINE, (a, b, hole.bottom)), CycleStep(Kind.RAPID, (a, b, hole.retract))
-    dwell, stop = CycleStep(Kind.DWELL, seconds=hole.dwell), CycleStep(None, spindle=5)
-    again = CycleStep(None, spindle=3 if hole.turning > 0 else 4)
-    if hole.code in PECKING:
-        yield from _pecks(hole)
-        yield from (down, up)
-    elif hole.code in TAPPING:
-        other = CycleStep(None, spindle=4 if hole.turning > 0 else 3)
-        yield from (down, stop, other, dwell, CycleStep(Kind.LINE, (a, b, hole.retract)), stop, again)
-    elif hole.code == 850:
-        yield from (down, CycleStep(Kind.LINE, (a, b, hole.clear)), up)
-    elif hole.code == 890:
-        yield from (down, dwell, CycleStep(Kind.LINE, (a, b, hole.retract)))
-    elif hole.code == 870:
-        yield from _back_bore(hole, stop, again)
-    elif hole.code in (860, 880):
-        halt = (CycleStep(Kind.STOP),) if hole.code == 880 else ()
-        yield from (down, dwell, stop, *halt, up, again)
-    elif hole.code == 820:
-        yield from (down, dwell, up)
-    else:
-        yield from (down, up)
+    aside = a + hole.beside[0], b + hole.beside[1]
+    codes_as_before = (3, 4) if hole.turning > 0 else (4, 3)
+    step = {
+        "down": CycleStep(Kind.LINE, (a, b, hole.bottom)),
+        "back": CycleStep(Kind.LINE, (a, b, hole.clear)),
+        "out": CycleStep(Kind.LINE, (a, b, hole.retract)),
+        "counterbore": CycleStep(Kind.LINE, (a, b, hole.counterbore)),
+        "up": CycleStep(Kind.RAPID, (a, b, hole.retract)),
+        "beside": CycleStep(Kind.RAPID, (*aside, hole.clear)),
+        "deep": CycleStep(Kind.RAPID, (*aside, hole.bottom)),
+        "in": CycleStep(Kind.RAPID, (a, b, hole.bottom)),
+        "away": CycleStep(Kind.RAPID, (*aside, hole.retract)),
+        "dwell": CycleStep(Kind.DWELL, seconds=hole.dwell),
+        "halt": CycleStep(Kind.STOP),
+        "stop": CycleStep(None, spindle=5),
+        "again": CycleStep(None, spindle=codes_as_before[0]),
+        "other": CycleStep(None, spindle=codes_as_before[1]),
+    }
+    for name in _STEPS[hole.code].split():
+        yield from _pecks(hole) if name == "pecks" else (step[name],)
 
 
 def _pecks(hole: Hole) -> Iterator[CycleStep]:
@@ -112,23 +120,11 @@ def _pecks(hole: Hole) -> Iterator[CycleStep]:
         depth -= hole.peck
 
 
-def _back_bore(hole: Hole, stop: CycleStep, again: CycleStep) -> Iterator[CycleStep]:
-    (a, b), c = hole.place, hole.bottom
-    aside = a + hole.beside[0], b + hole.beside[1]
-    yield CycleStep(Kind.RAPID, (*aside, hole.clear))
-    yield from (stop, CycleStep(Kind.RAPID, (*aside, c)), CycleStep(Kind.RAPID, (a, b, c)), again)
-    yield from (CycleStep(Kind.LINE, (a, b, hole.counterbore)), CycleStep(Kind.LINE, (a, b, c)), stop)
-    yield from (CycleStep(Kind.RAPID, (*aside, c)), CycleStep(Kind.RAPID, (*aside, hole.retract)))
-    yield from (CycleStep(Kind.RAPID, (a, b, hole.retract)), again)
-
-
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _BY_HAND = 880  # G88
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3  # down, out and back in
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
-# How the spindle turns after M3, M4 and M5.
-_SPINDLE = {3: 1, 4: -1, 5: 0}
 
 
 def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
@@ -184,11 +180,8 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     clear = words["R"] + (0.0 if state.absolute else series.level)
     bottom = words["XYZ"[axis]] + (0.0 if state.absolute else clear)
     if bottom > clear:
-        raise block.fault(
-            f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth "
-            f"{AXES[axis].upper()} = {bottom:g}; "
-            "write R above it"
-        )
+        name, depth = f"G{codes.number(state.motion)}", f"{AXES[axis].upper()} = {bottom:g}"
+        raise block.fault(f"{name} would begin at R = {clear:g}, below its depth {depth}; write R above it")
     return Hole(
         state.motion,
         (0.0, 0.0),
@@ -209,10 +202,8 @@ def _repeats(block: Block, hole: Hole) -> int:
     repeats = integer(block, "L", 1) if "L" in block.value else 1
     pecks = (hole.clear - hole.bottom) / hole.peck if hole.code in PECKING else 0.0
     if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
-        text = (
-            f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
-        )
-        raise block.fault(text)
+        wrong = "Q" if pecks else "L"
+        raise block.fault(f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {wrong}")
     return repeats
 
 
@@ -232,13 +223,9 @@ def _say(state: State, block: Block, findings: Findings) -> None:
 
 def _series(state: State, code: int, level: float) -> CycleSeries:
     """The series the line belongs to; the words in force are those of its code only."""
-    series = state.series
-    if series is None:
-        series = CycleSeries(code, {}, level)
-    elif series.code != code:
-        series = CycleSeries(code, {}, series.level)
-    state.series = series
-    return series
+    if state.series is None or state.series.code != code:
+        state.series = CycleSeries(code, {}, level if state.series is None else state.series.level)
+    return state.series
 
 
 def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
@@ -267,7 +254,7 @@ def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
     table.make_room(1)
     if step.kind is None:
         table.add_event("M", step.spindle, line)
-        state.spindle.turning = _SPINDLE[step.spindle]
+        state.spindle.turning = auxiliary.TURNING[10 * step.spindle]
     elif step.kind == Kind.DWELL:
         table.add_dwell(step.seconds, line, state)
     elif step.kind == Kind.STOP:

@@ -146,7 +146,7 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
 # How a letter is treated whatever stands beside it, in `Assumed.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
 
-LEFT_OUT_BY_USER = Assumption("word", "words", "left out, as --ignore says")
+LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 
 
 @dataclass(slots=True)
@@ -243,15 +243,14 @@ class IgnoredWords:
             said = "left out (--extruder ignore); what the extruder does by itself takes no time in this plan"
         else:
             said = "left out, as --ignore says: the plan knows nothing of this axis"
-        return Assumption(f"{letter} word", f"{letter} words", said, changes=parked)
+        return Assumption(f"{letter} word{{|s}}", said, changes=parked)
 
     def notes(self) -> list[Said]:
         """Everything that was assumed, by its first line."""
         return [
             Said(
                 found.line,
-                f"{found.times:,} {what.one if found.times == 1 else what.many}: {what.said}; "
-                f"first {found.word} line {found.line}",
+                f"{what.named(found.times)}: {what.said}; first {found.word} line {found.line}",
                 what.changes,
             )
             for what, found in self._counted.items()

@@ -99,30 +99,22 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
     is_feed = np.isin(program.kind, FEED_MOVES)
     feed = program.feed[is_feed]
     low, high = _extents(program, start)
+    kinds = [kind for kind in Kind if kind != Kind.SPLINE or len(program.splines)]
+    quantiles = np.quantile(length[is_feed], LENGTH_QUANTILES).tolist() if len(feed) else [np.nan] * 5
     return ProgramInfo(
         source=program.source,
         assumptions=program.assumptions,
         lines=lines,
-        blocks={
-            kind.name.lower(): int((program.kind == kind).sum())
-            for kind in Kind
-            if kind != Kind.SPLINE or len(program.splines)
-        },
+        blocks={kind.name.lower(): int((program.kind == kind).sum()) for kind in kinds},
         full_circles=int((np.abs(program.arc_sweep) >= 2 * np.pi - 1e-9).sum()),
         helices=int((np.abs(_rise(program, start)) > _NOWHERE).sum()),
         events=_count_events(program),
         extent_min=low,
         extent_max=high,
-        length={
-            kind.name.lower(): float(length[program.kind == kind].sum())
-            for kind in MOVES
-            if kind != Kind.SPLINE or len(program.splines)
-        },
+        length={k.name.lower(): float(length[program.kind == k].sum()) for k in MOVES if k in kinds},
         feed=(float(feed.min()), float(feed.max())) if len(feed) else (np.nan, np.nan),
         feed_changes=int((feed[1:] != feed[:-1]).sum()),
-        segment_length=tuple(
-            float(q) for q in (np.quantile(length[is_feed], LENGTH_QUANTILES) if len(feed) else [np.nan] * 5)
-        ),
+        segment_length=tuple(quantiles),
         corners=_corners(program, start, length, is_feed),
         zero_moves=int(((length <= _NOWHERE) & np.isin(program.kind, MOVES)).sum()),
         dwell=float(program.dwell.sum()),
@@ -191,17 +183,12 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
     with np.errstate(invalid="ignore", divide="ignore"):
         leaving = (program.end - start) / length[:, None]
     arriving = leaving.copy()
-    k, rows, axes, n = (
-        program.arc_block,
-        np.arange(len(program.arc_block)),
-        _plane_axes(program),
-        program.arc_normal,
-    )
+    k, n, axes = program.arc_block, program.arc_normal, _plane_axes(program)
     for spoke, tangent in zip(_spokes(program, start), (leaving, arriving), strict=True):
         size = np.maximum(length[k], _NOWHERE)
         tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
         tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size
-        tangent[k, n] = _rise(program, start)[rows] / size
+        tangent[k, n] = _rise(program, start) / size
     _set_spline_tangents(program, leaving, arriving)
     parts = (length > _NOWHERE) | ~np.isin(program.kind, MOVES)  # what joins or separates
     leaving, arriving, is_feed = leaving[parts], arriving[parts], is_feed[parts]

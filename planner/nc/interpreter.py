@@ -38,9 +38,8 @@ from planner.nc.set_limits import LimitsInForce
 from planner.nc.state import REFUSED_MOTION, Setup, State
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
-_FEED_LEAST = (
-    1.0 / SECONDS_PER_MINUTE
-)  # nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s]
+# Nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s].
+_FEED_LEAST = 1.0 / SECONDS_PER_MINUTE
 _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
@@ -138,11 +137,9 @@ class Interpreter:
         self.table.begin(len(words.letter))
         while row < rows and not self.ended:
             self.table.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
-            after = (
-                row
-                if self.mover.splines.open
-                else run_plain(words, row, self.state, self.table, self.ignored)
-            )
+            after = row
+            if not self.mover.splines.open:
+                after = run_plain(words, row, self.state, self.table, self.ignored)
             self._begun |= after > row
             if after < rows:
                 self.by_word += 1
@@ -207,14 +204,12 @@ class Interpreter:
 
     def _assume_feeds(self) -> None:
         """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""
-        kind, feed = (
-            column[: self.table.blocks] for column in (self.table.block.kind, self.table.block.feed)
-        )
-        slow = np.flatnonzero(np.isin(kind, FEED_MOVES) & (feed < _FEED_LEAST))
+        block, used = self.table.block, slice(0, self.table.blocks)
+        slow = np.flatnonzero(np.isin(block.kind[used], FEED_MOVES) & (block.feed[used] < _FEED_LEAST))
         if len(slow) and not self._timed:
-            at = feed[slow[0]] * SECONDS_PER_MINUTE
+            at = block.feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
-            self.findings.assume(text, int(self.table.block.line[slow[0]]))
+            self.findings.assume(text, int(block.line[slow[0]]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -226,11 +221,10 @@ class Interpreter:
                 self.open_arcs.append(OpenArc(block.line, fault.otherwise, centred))
                 message += f"; {_IF_LATHE}" if self.two_axes else ""
             self.findings.report(fault.word, message)
-            return block.m.get("stopping") in (20, 300)
         except CutterFault as fault:
             self.findings.report(min(block.at.values()), str(fault))
             self.mover.cutter = self.state.actual = None  # what follows is read without compensation
-            return block.m.get("stopping") in (20, 300)
+        return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
@@ -304,21 +298,17 @@ class Interpreter:
         code = block.g.get("one-shot")
         if code is None or code in (40, 530):
             return
-        motion = block.g.get("motion")
+        motion, name = block.g.get("motion"), f"G{codes.number(code)}"
         if code in (280, 300) and motion == 0 and not self.state.strict:
-            self.findings.note(
-                f"the words beside G0 G{codes.number(code)} are those of G{codes.number(code)}", block.line
-            )
+            self.findings.note(f"the words beside G0 {name} are those of {name}", block.line)
         elif code in COVET_AXES and motion is not None:
-            raise block.fault(
-                f"G{codes.number(code)} and G{codes.number(motion)} "
-                f"both use the axis words of the line; write two lines",
-                "one-shot",
-            )
+            text = f"{name} and G{codes.number(motion)} both use the axis words of the line; write two lines"
+            raise block.fault(text, "one-shot")
         if code in (280, 300):
             go_home(self.state, self.table, block, self.findings)
-        elif code in (281, 301):
-            offsets.store_position(self.state, code)
+        elif code in (281, 301):  # where the machine stands becomes the position of G28 or G30
+            self.state.homes[code - 1] = self.state.position.copy()
+            self.state.further.homes[code - 1] = self.state.further.position.copy()
         elif code == 100:
             offsets.set_data(self.state, block, self.findings)
         else:
@@ -327,10 +317,8 @@ class Interpreter:
     def _check_parked(self, block: Block) -> None:
         """Report words of axes that are not planned and would move."""
         for letter in codes.PARKABLE:
-            if letter in self.state.further.letters:
+            if letter in self.state.further.letters or letter not in block.value:
                 continue
-            if letter in block.value and not self.ignored.may_stand(
-                letter, block.value[letter], absolute=self.state.absolute
-            ):
+            if not self.ignored.may_stand(letter, block.value[letter], absolute=self.state.absolute):
                 self.ignored.moved.add(letter)
                 self.findings.report(block.at[letter], str(codes.LETTERS_REFUSED[letter]))

@@ -255,25 +255,16 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 reading = False
                 continue
 
-            if c == _LETTER_O and not _digit_follows(
-                source, i + 1
-            ):  # names and expressions may follow: the line cannot be split into words
+            # names and expressions may follow: the line cannot be split into words
+            if c == _LETTER_O and not _digit_follows(source, i + 1):
                 letter[words], value[words], at[words] = c, -1.0, i
                 words += 1
                 reading = False
                 continue
 
             # a letter: its number follows, perhaps with spaces inside
-            place, negative, signed, mantissa, digits, decimals, point, exact = (
-                i,
-                False,
-                False,
-                0,
-                0,
-                0,
-                False,
-                True,
-            )
+            place, mantissa, digits, decimals = i, 0, 0, 0
+            negative, signed, point, exact = False, False, False, True
             i += 1
             while i < end:
                 d = source[i]

@@ -72,15 +72,14 @@ def switch(
     name = f"G{codes.number(code)}"
     word = block.at["cutter compensation"]
     if on is not None:
-        raise WordFault(word, f"{name} while cutter radius compensation is on; write G40 before it")
+        raise WordFault(word, _refusal(name))
     if state.normal == 0:
         raise WordFault(word, f"{name} in the y z plane is not supported; write G17 or G18 before it")
     if state.normal == 1 and state.rotated:
         raise WordFault(word, f"{name} in G18 while the work system is rotated is not supported")
     if "L" in block.value:
-        raise block.fault(
-            f"the edge orientation L of {name} is not supported; remove it and write the tool's path", "L"
-        )
+        text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
+        raise block.fault(text, "L")
     diameter = _diameter(state, block, code, findings)
     if diameter == 0.0:
         return None
@@ -106,12 +105,11 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
 def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """All axes, or the block's (in its rotated system), go to the position of G28 or G30."""
     code, word = block.g["one-shot"], block.at["one-shot"]
+    name = f"G{codes.number(code)}"
     if code not in state.homes:
-        findings.assume(
-            f"G{codes.number(code)} has no position in the machine file: machine zero", block.line, word
-        )
+        findings.assume(f"{name} has no position in the machine file: machine zero", block.line, word)
     else:
-        offsets.assume_origin(state, f"G{codes.number(code)}", block, findings)
+        offsets.assume_origin(state, name, block, findings)
     if state.actual is not None:  # cutter radius compensation ends here
         state.actual = None
         table.add(Kind.RAPID, block.line, state)
@@ -136,10 +134,8 @@ def go_to_switches(state: State, table: BlockTable, block: Block, findings: Find
     for letter in block.homing:
         state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
     table.add(Kind.RAPID, block.line, state)
-    findings.assume(
-        "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not",
-        block.line,
-    )
+    text = "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not"
+    findings.assume(text, block.line)
 
 
 def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
@@ -165,8 +161,7 @@ _WHY_NO_MOTION = {
 
 
 class Mover:
-    """Executes the motion of blocks, one after the other: moves the state, and appends to the table of
-    blocks.
+    """Executes the motion of blocks: moves the state, and appends to the table of blocks.
 
     feed_default : of moves before the first F word [mm/s], or None
     findings : keeps what is assumed
@@ -189,8 +184,11 @@ class Mover:
 
     def execute(self, block: Block) -> None:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
-        state = self.state
-        self._take_code(block)
+        state, code = self.state, block.g.get("motion")
+        if code is not None:  # stays in force, until another one or G80
+            state.motion = code // 10 if code <= 30 else code
+        elif "cycle end" in block.g:
+            state.motion, state.series = NO_MOTION, None
         if block.g.get("one-shot") in COVET_AXES:
             return
         if block.g.get("tool length") in (431, 432) and "motion" not in block.g:
@@ -206,16 +204,9 @@ class Mover:
         elif moves.is_move(state, block):
             self._move(block)
         elif "motion" in block.g and state.motion > 3:
-            text = f"G{codes.number(state.motion)} needs an axis word: where it leads to"
-            raise block.fault(text, "motion")
-
-    def _take_code(self, block: Block) -> None:
-        """The motion code of a block stays in force, until another one or G80."""
-        if "motion" in block.g:
-            code = block.g["motion"]
-            self.state.motion = code // 10 if code <= 30 else code
-        elif "cycle end" in block.g:
-            self.state.motion, self.state.series = NO_MOTION, None
+            raise block.fault(
+                f"G{codes.number(state.motion)} needs an axis word: where it leads to", "motion"
+            )
 
     def _take_default_feed(self, block: Block) -> None:
         if not self.ignored.strict:
@@ -299,17 +290,15 @@ class Mover:
                 text = "no G17, G18 or G19 before the first arc: G17; a Fanuc control starts with what is set in it"
                 self.findings.assume(text, block.line, block.motion_word())
             arc, normal = moves.arc(state, block, target)
+            length = moves.arc_length(state.position, target, arc, normal)
             if abs(arc.sweep) <= FULL_TURN:
-                length = moves.arc_length(state.position, target, arc, normal)
                 text = f"an arc of {length:.4g} mm hardly turns; some controls make a full circle of it"
                 self.findings.assume(text, block.line, block.motion_word())
             if auxiliary.on_surface(state):
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
                 state.feed = auxiliary.surface_feed(state, abs(centre) + size, block.motion_word())
-            auxiliary.feed_of_time(
-                state, block, moves.arc_length(state.position, target, arc, normal), self.findings
-            )
+            auxiliary.feed_of_time(state, block, length, self.findings)
             if self.cutter is not None:
                 self.cutter.arc(target, arc, block.line)
         finally:
@@ -326,9 +315,8 @@ class Mover:
         if self.cutter is not None:
             raise block.fault("a spline under cutter radius compensation; write G40 before it")
         if state.actual is not None:
-            raise block.fault(
-                "the move after G40 must be straight; write G0 or G1 to where this spline begins"
-            )
+            text = "the move after G40 must be straight; write G0 or G1 to where this spline begins"
+            raise block.fault(text)
         state.series = None
         if state.in_thread:
             threads.stop(state, self.table, block.line)

@@ -27,9 +27,7 @@ from planner.nc.state import REFUSED_MOTION, State
 # certainly a mistake.
 NUMBER_MAX = 1e9
 OFFSET_NUMBER = codes.Assumption(
-    "number of an offset (D, H) without a code that uses it",
-    "numbers of offsets (D, H) without a code that uses them",
-    "left out",
+    "number{|s} of {an offset|offsets} (D, H) without a code that uses {it|them}", "left out"
 )
 Report = Callable[[int, str], None]
 
@@ -92,14 +90,7 @@ def unused(letter: str) -> str:
 
 
 _CLOSES_IF = "the arc would close if its centre were"
-_ROUNDING = {
-    "T": 1e-4,
-    "H": 1e-4,
-    "D": 1e-4,
-    "L": 1e-4,
-    "Q": 1e-4,
-    "P": 1e-3,
-}  # what RS274NGC rounds away from a whole number
+_ROUNDING = {**dict.fromkeys("THDLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
 
 
 class ArcFault(WordFault):
@@ -158,10 +149,8 @@ def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
 
 
 def plane_of(state: State) -> tuple[int, bool]:
-    """The normal axis of the plane in the machine's axes, and whether it points against that axis.
-
-    Raises ArcError if the plane is turned to where no axis is normal to it.
-    """
+    """The normal axis of the plane in the machine's axes, and whether it points against that axis. Raises
+    ArcError if the plane is turned to where no axis is normal to it."""
     if not state.rotated or state.normal == 2:
         return state.normal, False
     normal = state.work_system().turn(np.eye(3)[state.normal])

@@ -52,9 +52,8 @@ def refuse(state: State, block: Block, where: str) -> None:
     if block.has(state.further.letters):
         word = block.first_of(state.further.letters)
         letter = next(c for c in state.further.letters if block.at.get(c) == word)
-        raise WordFault(
-            word, f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
-        )
+        text = f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
+        raise WordFault(word, text)
 
 
 def move(state: State, block: Block) -> None:
@@ -71,10 +70,8 @@ def move(state: State, block: Block) -> None:
             further.position[column] = here + value
         elif letter in further.wrapped:
             if abs(value) >= _TURN:
-                raise WordFault(
-                    block.at[letter],
-                    f"axis {letter} is wrapped: its places are above -360 and below 360 degrees",
-                )
+                text = f"axis {letter} is wrapped: its places are above -360 and below 360 degrees"
+                raise WordFault(block.at[letter], text)
             zero = further.offset(state.system)[column]
             place = abs(value - zero if in_machine else value)
             further.position[column] = _unwrapped(math.copysign(place, value), here - zero) + zero
@@ -199,18 +196,9 @@ def assume_origin(state: State, what: str, block: Block, findings: Findings) -> 
         findings.assume(text, block.line, block.at["one-shot"])
 
 
-def store_position(state: State, code: int) -> None:
-    """G28.1, G30.1: where the machine stands becomes the position of G28 or G30."""
-    state.homes[code - 1] = state.position.copy()
-    state.further.homes[code - 1] = state.further.position.copy()
-
-
 def shift_origin(state: State, block: Block) -> None:
     """G92 gives the place the coordinates, G52 gives the offset; G92.1 and G92.2 take it back, G92.3 brings
-    it again.
-
-    Raises WordFault for a G52 or G92 without X, Y and Z.
-    """
+    it again. Raises WordFault for a G52 or G92 without X, Y and Z."""
     code = block.g["one-shot"]
     if code in (520, 920):
         if not block.has(state.letters):
@@ -294,9 +282,8 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
     tool = state.tools.get(number) or Tool(np.zeros(3))
     for letter in "IJQ":
         if letter in block.value:
-            findings.note(
-                f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge", block.line
-            )
+            text = f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge"
+            findings.note(text, block.line)
     offset = _given(state, block, tool.offset) if kind == 1 else _offset_from_place(state, block, tool, kind)
     diameter = 2.0 * block.value["R"] * state.unit if "R" in block.value else tool.diameter
     state.tools[number] = Tool(offset, diameter)
@@ -316,9 +303,8 @@ def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> Flo
 
 def _offset_of(state: State, number: int, block: Block, findings: Findings) -> FloatArray:
     if number not in state.tools and number != 0:
-        findings.assume(
-            f"tool {number} has no length in the machine file: 0", block.line, block.at["tool length"]
-        )
+        text = f"tool {number} has no length in the machine file: 0"
+        findings.assume(text, block.line, block.at["tool length"])
     return state.tools[number].offset.copy() if number in state.tools else np.zeros(3)
 
 

@@ -81,22 +81,13 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     further = state.further
     columns = further.columns
     place = further.position[columns]
-    fixed = _Fixed(
-        state.absolute,
-        state.unit,
-        state.feed_factor,
-        int(state.path_control),
-        state.tolerance,
-        state.offset,
-        *_of_further(state),
-    )
-    begin = _Counts(
-        row, table.blocks, table.events, table.refusals, state.motion, state.feed, state.feed_unit
-    )
+    path = state.feed_factor, int(state.path_control), state.tolerance, state.offset
+    fixed = _Fixed(state.absolute, state.unit, *path, *_of_further(state))
+    stored = table.blocks, table.events, table.refusals
+    begin = _Counts(row, *stored, state.motion, state.feed, state.feed_unit)
     others = _Others(ignored.treatment, ignored.parked)
-    end = _run(
-        rows, begin, fixed, state.position, place, table.block, table.event, table.refused_word, others
-    )
+    columns_of = table.block, table.event, table.refused_word
+    end = _run(rows, begin, fixed, state.position, place, *columns_of, others)
     further.position[columns] = place
     if end.blocks > begin.blocks:
         state.series = None
@@ -123,9 +114,7 @@ def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
 
 
 @njit(cache=True)
-def _run(
-    rows, begin, fixed, position, place, block, event, refused_word, others
-):  # pragma: no cover - compiled
+def _run(rows, begin, fixed, position, place, block, event, refused_word, others):  # pragma: no cover
     """Execute rows from `begin` on into the columns, the position and `refused_word`; says how far."""
     letter, value, line, first, frame = rows
     absolute, unit, feed_factor, path_control, tolerance, offset, column, rotary, further_offset, wrapped = (

@@ -32,14 +32,10 @@ GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate(_GRBL_AXES)} | {
 }
 CORNERS = "no limit of this plan, which goes around corners within the tolerance and the machine's acceleration and jerk"
 UNKNOWN_M = Assumption(
-    "M code that this reader does not know",
-    "M codes that this reader does not know",
-    "assumed not to move anything",
-    changes=True,
+    "M code{|s} that this reader does not know", "assumed not to move anything", changes=True
 )
 TOOL_POINT_M = Assumption(
-    "switch to the tool centre point, as some controls have it (M128, M428)",
-    "switches to the tool centre point, as some controls have them (M128, M428)",
+    "switch{|es} to the tool centre point, as some controls have {it|them} (M128, M428)",
     "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
     changes=True,
 )
@@ -47,44 +43,30 @@ TOOL_POINT_M = Assumption(
 TOOL_POINT_ON, TOOL_POINT_OFF = (128, 428), (129, 429)
 _TOOL_LENGTH_POINT = 434  # G43.4, read where the machine has kinematics
 PRINTER_M = Assumption(
-    "code of a 3-D printer that moves nothing",
-    "codes of a 3-D printer that move nothing",
+    "code{|s} of a 3-D printer that move{s|} nothing",
     "temperatures, fans, messages; they take no time in this plan",
 )
 WAIT_M = Assumption(
-    "wait for a temperature",
-    "waits for a temperature",
-    "full stops; how long they last no plan knows",
-    changes=True,
+    "wait{|s} for a temperature", "full stops; how long they last no plan knows", changes=True
 )
-CORNER_M = Assumption(
-    "speed of corners (M205, M566)", "speeds of corners (M205, M566)", CORNERS, changes=True
-)
+CORNER_M = Assumption("speed{|s} of corners (M205, M566)", CORNERS, changes=True)
 SCALE_M = Assumption(
-    "code of a 3-D printer that shifts or scales its axes, or changes how they move",
-    "codes of a 3-D printer that shift or scale its axes, or change how they move",
+    "code{|s} of a 3-D printer that shift{s|} or scale{s|} its axes, or change{s|} how they move",
     "not followed: positions are those of the program",
     changes=True,
 )
-SPINDLE_LIMIT = Assumption(
-    "largest spindle speed", "largest spindle speeds", "they change nothing in the path"
-)
-EXTRUDER_ZERO = Assumption("zero of the extruder", "zeros of the extruder", "left out with its words")
+SPINDLE_LIMIT = Assumption("largest spindle speed{|s}", "they change nothing in the path")
+EXTRUDER_ZERO = Assumption("zero{|s} of the extruder", "left out with its words")
 RETRACTION = Assumption(
-    "retraction of an extruder (G10, G11)",
-    "retractions of an extruder (G10, G11)",
-    "they take no time in this plan",
-    changes=True,
+    "retraction{|s} of an extruder (G10, G11)", "they take no time in this plan", changes=True
 )
 G_SETTING = Assumption(
-    "G code that sets the control or cancels what this reader does not have",
-    "G codes that set the control or cancel what this reader does not have",
+    "G code{|s} that set{s|} the control or cancel{s|} what this reader does not have",
     "assumed not to move anything",
     changes=True,
 )
 PARKS = Assumption(
-    "code that changes or loads filament, or parks the head",
-    "codes that change or load filament, or park the head",
+    "code{|s} that change{s|} or load{s|} filament, or park{s|} the head",
     "a full stop; what it moves is not planned, and the head is assumed to come back",
     changes=True,
 )
@@ -134,11 +116,8 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class CodeSetting:
-    """A code that moves nothing: what is said of it, the letters behind it on its line that are its own,
-    whether it is a full stop.
-
-    Nothing is said of one that is read (set_limits.py).
-    """
+    """A code that moves nothing: what is said of it (nothing of one that is read, set_limits.py), the letters
+    behind it on its line that are its own, whether it is a full stop."""
 
     what: Assumption | None
     own: str
@@ -147,16 +126,12 @@ class CodeSetting:
 
 def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | None:
     """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up
-    to the next code.
-
-    None for a code that is read, or refused.
-    """
+    to the next code; None for a code that is read, or refused."""
     return _g_setting(code, before, behind) if letter == "G" else _m_setting(code, before, behind)
 
 
 def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
-    moved = _MOVED.intersection(before + behind)
-    if moved:
+    if _MOVED.intersection(before + behind):
         return None
     if code in (500, 920) and "S" in behind:
         return CodeSetting(SPINDLE_LIMIT, "SPQR")
@@ -175,16 +150,13 @@ def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
 def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     number = code // 10
     progress = number == 73 and ("P" in behind or "R" in behind)
-    if (
-        code % 10
-        or code < 0
-        or number in MAY_MOVE
-        or ((code in M_GROUP or code in M_REFUSED) and not progress)
-    ):
+    is_read = (code in M_GROUP or code in M_REFUSED) and not progress
+    if code % 10 or code < 0 or number in MAY_MOVE or is_read:
         return None
     if number in _PARKING:
         return CodeSetting(PARKS, EVERYTHING, stops=True)
-    what: Assumption | None = _said_of(number)
+    of = {WAIT_M: _WAITING, CORNER_M: _CORNERS, SCALE_M: _SCALES, PRINTER_M: _OF_PRINTERS}
+    what = next((what for what, numbers in of.items() if number in numbers), UNKNOWN_M)
     if number in SETS_LIMITS:
         return None if before else CodeSetting(None, EVERYTHING)
     stops = number in _WAITING or number == _MOVES_FINISHED
@@ -195,12 +167,6 @@ def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     if 100 <= number <= 199:
         return CodeSetting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
     return None if set("XYZ").intersection(behind) else CodeSetting(what, EVERYTHING)
-
-
-def _said_of(number: int) -> Assumption:
-    """The assumption about an M code that moves nothing."""
-    of = {WAIT_M: _WAITING, CORNER_M: _CORNERS, SCALE_M: _SCALES, PRINTER_M: _OF_PRINTERS}
-    return next((what for what, numbers in of.items() if number in numbers), UNKNOWN_M)
 
 
 def may_be_ignored(name: str) -> bool:

@@ -1,17 +1,8 @@
-"""G5, G5.1, G5.2 with G5.3, and G6.2: words to rational Bezier cubics (nc/bezier.py), exactly.
+"""G5, G5.1, G5.2 with G5.3, and G6.2 (docs/language.md, "Curves"): words to rational Bezier cubics
+(nc/bezier.py), exactly.
 
-    G5   X Y I J P Q    cubic; its inner control points are the start plus (I, J) and the end plus (P, Q). Without I J it goes on from a
-                        G5 just before it: (I, J) = -(P, Q) of that one
-    G5.1 X Y I J        quadratic; its inner control point is the start plus (I, J)
-    G5.2 X Y P L        control points with weights P; the order L (degree plus one) is 2, 3 or 4, by itself 3. The first control point
-                        is where the machine stands; a P without X and Y, before any other, is its weight.
-                        G5.3 ends the list, and the curve is run: knots are even, with the ends' repeated, as
-                        LinuxCNC has them
-    G6.2 P K X Y Z R    a knot K in every line, a control point X Y Z with the weight R in all but the last P ones, P the order, 2 to 4,
-                        by itself 4, as Fanuc has it. The curve is run with its last knot
-
-G5 to G5.2 are curves in the X Y plane (G17). A curve of several lines is one block, at the line where it
-begins.
+A curve of several lines is one block, at the line where it begins. The knots of G5.2 are even, with the ends'
+repeated, as LinuxCNC has them; those of G6.2 stand in its lines, as Fanuc has it.
 """
 
 from __future__ import annotations
@@ -64,14 +55,21 @@ class OpenSpline:
         )
 
 
+_CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # that do not leave a curve
+
+
+def _fault(block: Block, message: str) -> WordFault:
+    """A fault of the first word of a line."""
+    return WordFault(min(block.at.values()), message)
+
+
 class SplineReader:
     """Reads the lines of splines; `open` is the curve that is not at its end."""
 
     def __init__(self) -> None:
         self.open: OpenSpline | None = None
-        self._words: Words | None = (
-            None  # those that hold the word of the open curve, if they were executed before
-        )
+        # those that hold the word of the open curve, if they were executed before
+        self._words: Words | None = None
         self._reflected: tuple[int, FloatArray] | None = None  # blocks after the last G5, and its -(P, Q)
 
     def read(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
@@ -83,12 +81,10 @@ class SplineReader:
         code = state.motion
         try:
             if self.open is not None and self.open.blocks != blocks:
-                raise WordFault(
-                    _any_word(block),
-                    f"a dwell, a stop or a move stands inside the spline of line {self.open.line}",
-                )
-            if self.open is not None and _leaves(self.open, block):
-                raise WordFault(_any_word(block), self.open.unfinished)
+                text = f"a dwell, a stop or a move stands inside the spline of line {self.open.line}"
+                raise _fault(block, text)
+            if self.open is not None and block.g.get("motion") not in (None, *_CODES[self.open.code]):
+                raise _fault(block, self.open.unfinished)
             if code in (CUBIC, QUADRATIC):
                 return (self._cubic if code == CUBIC else _quadratic)(state, block, blocks), block.line
             if code == NURBS_WITH_KNOTS:
@@ -140,10 +136,8 @@ class SplineReader:
             return _even_knots(opened, block), opened.line
         if opened is None:
             if now != NURBS:
-                raise WordFault(
-                    _any_word(block),
-                    "control points of a spline after its G5.3; write G5.2, or another motion code",
-                )
+                text = "control points of a spline after its G5.3; write G5.2, or another motion code"
+                raise _fault(block, text)
             opened = OpenSpline(
                 block.line, block.at["motion"], NURBS, 3, blocks, [state.position.copy()], [1.0]
             )
@@ -166,10 +160,8 @@ class SplineReader:
         opened = self.open
         if opened is None:
             if block.g.get("motion") != NURBS_WITH_KNOTS:
-                raise WordFault(
-                    _any_word(block),
-                    "words of a spline after its last knot; write G6.2, or another motion code",
-                )
+                text = "words of a spline after its last knot; write G6.2, or another motion code"
+                raise _fault(block, text)
             order = _order(block, "P") if "P" in block.value else 4
             opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
         elif "P" in block.value:
@@ -185,7 +177,7 @@ class SplineReader:
         elif "R" in block.value:
             raise block.fault("a weight without a control point; write X, Y or Z beside it", "R")
         if "K" not in block.value:
-            raise WordFault(_any_word(block), "a line of G6.2 needs its knot K")
+            raise _fault(block, "a line of G6.2 needs its knot K")
         if opened.knots and block.value["K"] < opened.knots[-1]:
             raise block.fault(
                 f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}", "K"
@@ -199,22 +191,7 @@ class SplineReader:
 
 def is_spline_line(block: Block) -> bool:
     """True if a line under a spline's motion code has words of the spline."""
-    return "motion" in block.g or bool(
-        block.value.keys() & set("XYZIJKLRPQ") - block.own
-    )  # those of other codes are theirs
-
-
-def _leaves(opened: OpenSpline, block: Block) -> bool:
-    """True if the block's motion code leaves the open curve, or begins another one."""
-    code = block.g.get("motion")
-    if opened.code == NURBS:
-        return code not in (None, NURBS, NURBS_END)
-    return code not in (None, NURBS_WITH_KNOTS)
-
-
-def _any_word(block: Block) -> int:
-    """Index of the first word of a line."""
-    return min(block.at.values())
+    return "motion" in block.g or bool(block.value.keys() & set("XYZIJKLRPQ") - block.own)
 
 
 def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
@@ -269,7 +246,7 @@ def _order(block: Block, letter: str) -> int:
 def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray:
     """(3,) control point of a line of G6.2 [mm], with the coordinates of the one before where not named."""
     if not state.absolute:
-        raise WordFault(_any_word(block), "control points of G6.2 with G91 are not read; write G90 before it")
+        raise _fault(block, "control points of G6.2 with G91 are not read; write G90 before it")
     here = state.position
     state.position = opened.points[-1] if opened.points else here
     point = target(state, block)
@@ -285,22 +262,23 @@ def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray
     return state.position.copy()
 
 
+def _curve(opened: OpenSpline, knots: FloatArray) -> Pieces:
+    control = homogeneous(np.array(opened.points), np.array(opened.weights))
+    return _split(cubic_pieces(control, knots, opened.order - 1))
+
+
 def _check_count(opened: OpenSpline, word: int) -> None:
-    if len(opened.points) < opened.order:
-        raise WordFault(
-            word,
-            f"a spline of order {opened.order} needs {opened.order} control points or more; {len(opened.points)} are given",
-        )
+    count, order = len(opened.points), opened.order
+    if count < order:
+        text = f"a spline of order {order} needs {order} control points or more; {count} are given"
+        raise WordFault(word, text)
 
 
 def _even_knots(opened: OpenSpline, block: Block) -> Pieces:
     """The curve of G5.2: knots 0 (L times), 1, 2 ... n - L, and n - L + 1 (L times) for n points."""
     _check_count(opened, block.at["motion"])
     count, order = len(opened.points), opened.order
-    knots = np.clip(np.arange(count + order) - order + 1, 0, count - order + 1).astype(float)
-    return _split(
-        cubic_pieces(homogeneous(np.array(opened.points), np.array(opened.weights)), knots, order - 1)
-    )
+    return _curve(opened, np.clip(np.arange(count + order) - order + 1, 0, count - order + 1).astype(float))
 
 
 def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
@@ -312,18 +290,12 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
             f"the first {order} knots of a spline of order {order} must be equal, and the last {order}", "K"
         )
     inner = knots[order:-order]
-    if (
-        np.unique(inner, return_counts=True)[1].max(initial=0) >= order
-        or inner.min(initial=np.inf) == knots[0]
-    ):
-        raise block.fault(
-            f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve",
-            "K",
-        )
+    most = np.unique(inner, return_counts=True)[1].max(initial=0)
+    if most >= order or inner.min(initial=np.inf) == knots[0]:
+        text = f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
+        raise block.fault(text, "K")
     if inner.max(initial=-np.inf) == knots[-1]:
         raise block.fault(
             f"the last {order} knots must be larger than those before: more break the curve", "K"
         )
-    return _split(
-        cubic_pieces(homogeneous(np.array(opened.points), np.array(opened.weights)), knots, order - 1)
-    )
+    return _curve(opened, knots)

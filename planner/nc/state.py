@@ -23,22 +23,8 @@ from planner.nc.program import PathControl
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
 REFUSED_MOTION = -2  # a motion code that is not supported is in force (only `info` reads on)
 
-_PATH_CONTROL = {
-    "blend": PathControl.BLEND,
-    "exact_path": PathControl.EXACT_PATH,
-    "exact_stop": PathControl.EXACT_STOP,
-}
-SYSTEMS = (
-    540,
-    550,
-    560,
-    570,
-    580,
-    590,
-    591,
-    592,
-    593,
-)  # work systems of G10 P1 to P9, by ten times their G codes
+# Work systems of G10 P1 to P9, by ten times their G codes.
+SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
@@ -204,7 +190,7 @@ class Setup:
         if machine is None:
             return cls()
         return cls(
-            path_control=_PATH_CONTROL[machine.path_control],
+            path_control=PathControl[machine.path_control.upper()],
             systems={system_code(name): _vector(given) for name, given in machine.work_offsets.items()},
             positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
             feed_default=machine.feed_default,

@@ -121,9 +121,8 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
         letter = "P" if value["P"] == 0 else "I"
         raise WordFault(block.at[letter], f"{letter} of G76 must not be 0: {_NEEDED[letter]}")
     if not 0 < value["J"] < value["K"]:
-        raise block.fault(
-            "J of G76, the depth of the first pass, must be above 0 and below K, the full depth", "J"
-        )
+        text = "J of G76, the depth of the first pass, must be above 0 and below K, the full depth"
+        raise block.fault(text, "J")
     if not 0 <= value.get("Q", 0.0) <= ANGLE_MAX:
         raise block.fault(f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees", "Q")
     here = state.programmed() / state.unit
@@ -224,20 +223,16 @@ def _rapid(state: State, table: BlockTable, line: int, place: FloatArray) -> Non
 
 
 def _say(state: State, block: Block, findings: Findings) -> None:
-    findings.note(
-        f"G{codes.number(state.motion)} is in step with the spindle: its feed is pitch times S, between a run-in and a run-out "
-        "that begin and end with full stops",
-        block.line,
-    )
+    text = "its feed is pitch times S, between a run-in and a run-out that begin and end with full stops"
+    findings.note(f"G{codes.number(state.motion)} is in step with the spindle: {text}", block.line)
 
 
 def _feed(state: State, block: Block, pitch: float) -> float:
     """Feed [mm/s] of programmed units in a turn. Raises WordFault if the spindle's speed is not known."""
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
     if spindle.surface_speed:
-        raise block.fault(
-            f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
-        )
+        text = f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
+        raise block.fault(text)
     if not spindle.turning or not spindle.speed > 0:
         raise block.fault(f"{name} needs the spindle turning; write S and M3 or M4 before it")
     return pitch * state.unit * spindle.speed / SECONDS_PER_MINUTE

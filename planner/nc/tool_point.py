@@ -29,7 +29,7 @@ from planner.machine import Machine
 from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.nc.block_table import BlockTable
 from planner.nc.extra_axes import LETTERS, ROTARY
-from planner.nc.moves import Block, WordFault
+from planner.nc.moves import Block
 from planner.nc.program import (
     FEED_MOVES,
     MOVES,
@@ -74,39 +74,29 @@ class ToolPointSwitch:
         """Follow the words of a block. Raises WordFault without kinematics, and for a tool off its axis."""
         tool = block.g.get("tool length")
         if tool == G43_4 and self.chain is None:
-            raise block.fault(
-                "the tool centre point (G43.4) needs a machine with a table [kinematics]; "
-                "add it to the machine file",
-                "tool length",
-            )
+            needs = "the tool centre point (G43.4) needs a machine with a table [kinematics]"
+            raise block.fault(f"{needs}; add it to the machine file", "tool length")
         now = self._word(block, tool)
         if self.chain is None or (now == self._on and tool is None):
             return
         length = float(state.tool_offset[2]) or self.chain.data.tool_length
         if now and state.tool_offset[:2].any():
-            raise WordFault(
-                block.at["tool point" if block.tool_point is not None else "tool length"],
-                "the tool centre point needs a tool on the spindle's axis; this one has an offset in x or y",
+            text = (
+                "the tool centre point needs a tool on the spindle's axis; this one has an offset in x or y"
             )
+            raise block.fault(text, "tool point" if block.tool_point is not None else "tool length")
         if now != self._on or (now and length != self.switches[-1].length):
             self._move(state, now, length)
             self.switches.append(Switch(table.blocks, block.line, now, length))
 
     def check(self, state: State, block: Block, before: FloatArray) -> None:
         """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes
-        stand at 0.
-
-        before : (6,) place of the further axes before the block
-        """
+        stand at 0, where they were `before` (6,), too."""
         code = block.g.get("one-shot", 0)
-        if (
-            self._on
-            and code in _JOINT_PLACES
-            and (before[:ROTARY].any() or state.further.position[:ROTARY].any())
-        ):
+        turned = before[:ROTARY].any() or state.further.position[:ROTARY].any()
+        if self._on and code in _JOINT_PLACES and turned:
             raise block.fault(
-                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, "
-                f"and {_JOINT_PLACES[code]} goes to a "
+                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
                 "place of the joints; switch the tool centre point off before it (G49, M429, M129)",
                 "one-shot",
             )
@@ -141,19 +131,15 @@ class ToolPointSwitch:
 
 
 def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | None) -> Program:
-    """The program as one of the controlled point throughout (module text), if the tool centre point is on
-    somewhere while rotary axes are off 0; else the program itself.
+    """The program as one of the controlled point throughout, if the tool centre point is on somewhere while
+    rotary axes are off 0; else the program itself.
 
     Raises InputError for feed moves while it is off and a rotary axis is off 0, and for tools of two lengths.
     """
     on = _where_on(program, switch.switches)
     tilted = _tilted(program, switch.chain)
-    if (
-        switch.chain is None
-        or machine is None
-        or not (on & np.isin(program.kind, MOVES)).any()
-        or not tilted.any()
-    ):
+    moves_on = (on & np.isin(program.kind, MOVES)).any()
+    if switch.chain is None or machine is None or not moves_on or not tilted.any():
         return program
     first = _tool_of(program, switch.switches)
     whole = _with_axes(program, switch.chain.axes)
@@ -176,9 +162,8 @@ def _where_on(program: Program, switches: list[Switch]) -> Array:
 
 def _tilted(program: Program, chain: Chain | None) -> Array:
     """(B,) True for the blocks at whose start or end a rotary axis of the kinematics is off 0."""
-    columns = [
-        k for k, letter in enumerate(program.axes) if chain is not None and letter in chain.data.rotary
-    ]
+    rotary = chain.data.rotary if chain is not None else ()
+    columns = [k for k, letter in enumerate(program.axes) if letter in rotary]
     turned: Array = np.any(np.vstack([program.start, program.end])[:, columns], axis=1)
     found: Array = turned[1:] | turned[:-1]
     return found

@@ -28,7 +28,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.language.detect import without_leader
 from planner.nc.lexer import NUMBER, Words, split_words
-from planner.nc.program import FEED_MOVES, Program, extruder_alone
+from planner.nc.program import FEED_MOVES, Program, extruder_alone, plain
 
 SIGNIFICANT = 4  # digits of a feed
 # The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
@@ -73,9 +73,8 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     per_minute = mode.in_force[row] == G94
     often = np.full(len(moving), np.nan) if inverse is None else np.asarray(inverse, dtype=np.float64)[moving]
     often[~per_minute | (mode.word[row] >= 0)] = np.nan
-    f_word_feed = (
-        programmed * unit[row]
-    )  # [mm per minute]; not that of a move under G93 and G95, and in a thread
+    # [mm per minute]; not that of a move under G93 and G95, and in a thread
+    f_word_feed = programmed * unit[row]
     off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
     own = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
     moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
@@ -143,9 +142,7 @@ def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new:
             number = texts.get(value) or texts.setdefault(value, round_down(value))
         elif k >= 0 and (word < 0 or ours):
             value = float(new.programmed[k])
-            number = as_given.get(value) or as_given.setdefault(
-                value, np.format_float_positional(value, trim="-")
-            )
+            number = as_given.get(value) or as_given.setdefault(value, plain(value))
         given = float(number or words.value[word]) * unit[r]
         if k >= 0 and ours:
             edits += _edited(words, r, word, number, "G94")

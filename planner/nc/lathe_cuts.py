@@ -38,11 +38,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.turning import PASSES_MAX, SAME, ContourFault, Leg, TurningStep, exchanged
-
-
-class ThreadFault(ValueError):
-    """The words of a thread contradict each other; the text says how."""
+from planner.nc.turning import PASSES_MAX, SAME, Leg, exchanged
 
 
 @dataclass(frozen=True)
@@ -64,14 +60,6 @@ class LatheThread:
     chamfer: float = 0.0
 
 
-@dataclass(frozen=True)
-class Pass:
-    """A move of the cycle to `end` (z + i x): fast, or in step with the spindle by `pitch` a turn."""
-
-    end: complex
-    pitch: float = 0.0
-
-
 def lathe_depths(thread: LatheThread) -> Iterator[float]:
     """Depths of the passes below the crest [mm]."""
     left, n, depth = thread.height - thread.finish, 1, thread.first
@@ -85,8 +73,8 @@ def lathe_depths(thread: LatheThread) -> Iterator[float]:
         yield thread.height
 
 
-def thread_passes(thread: LatheThread) -> Iterator[Pass]:
-    """The moves of the cycle, from its start and back to it. Raises ThreadFault."""
+def thread_passes(thread: LatheThread) -> Iterator[Leg]:
+    """The moves of the cycle, from its start and back to it. Raises ValueError."""
     _require(thread)
     start, end = thread.start, thread.end
     out, ahead = (math.copysign(1.0, start.imag - end.imag), math.copysign(1.0, end.real - start.real))
@@ -97,37 +85,43 @@ def thread_passes(thread: LatheThread) -> Iterator[Pass]:
         cut, leave = complex(begin, low + thread.taper), complex(end.real, low)
         along = leave - cut
         pitch = thread.lead * abs(along) / max(abs(along.real), abs(along.imag))
-        yield Pass(complex(begin, start.imag))
-        yield Pass(cut)
+        yield Leg(complex(begin, start.imag), fast=True)
+        yield Leg(cut, fast=True)
         if thread.chamfer > 0.0:
             leave -= along * (thread.chamfer / abs(along.real))
-            yield Pass(leave, pitch)
+            yield Leg(leave, pitch=pitch)
             leave += complex(ahead, out) * thread.chamfer
-            yield Pass(leave, thread.lead * math.sqrt(2.0))
+            yield Leg(leave, pitch=thread.lead * math.sqrt(2.0))
         else:
-            yield Pass(leave, pitch)
-        yield Pass(complex(leave.real, start.imag))
-    yield Pass(start)
+            yield Leg(leave, pitch=pitch)
+        yield Leg(complex(leave.real, start.imag), fast=True)
+    yield Leg(start, fast=True)
 
 
 def _require(thread: LatheThread) -> None:
-    along = abs(thread.end.real - thread.start.real)
-    if thread.start.imag == thread.end.imag or not along > 0.0:
-        raise ThreadFault("a thread needs room in x and z between where the tool stands and X Z")
-    if not 0.0 < thread.first <= thread.height or not 0.0 <= thread.finish < thread.height:
-        raise ThreadFault(
-            "the first depth and the finishing allowance of a thread lie between 0 and its height"
-        )
-    if thread.first + thread.finish > thread.height * (1.0 + 1e-12) and thread.finish:
-        raise ThreadFault("the first depth and the finishing allowance of a thread are more than its height")
-    if not thread.lead > 0.0 or not 1 <= thread.springs <= PASSES_MAX:
-        raise ThreadFault("a thread needs a lead above 0 and at least one pass at its full depth")
-    if not 0.0 <= thread.angle < 180.0 or not 0.0 <= thread.chamfer < along:
-        raise ThreadFault("a thread's angle is 0 to 180 degrees, and its chamfer shorter than the thread")
-    if thread.height > thread.first * math.sqrt(PASSES_MAX):
-        raise ThreadFault(f"the thread makes more than {PASSES_MAX} passes")
-    if abs(thread.start.imag - thread.end.imag) < thread.height:
-        raise ThreadFault("the tool stands below the thread's crest: between X and X plus its height")
+    along, across = abs(thread.end.real - thread.start.real), abs(thread.end.imag - thread.start.imag)
+    first, finish, height = thread.first, thread.finish, thread.height
+    depths, angle = "the first depth and the finishing allowance of a thread", thread.angle
+    for right, wrong in (
+        (
+            along > 0.0 and across > 0.0,
+            "a thread needs room in x and z between where the tool stands and X Z",
+        ),
+        (0.0 < first <= height and 0.0 <= finish < height, f"{depths} lie between 0 and its height"),
+        (not finish or first + finish <= height * (1.0 + 1e-12), f"{depths} are more than its height"),
+        (
+            thread.lead > 0.0 and 1 <= thread.springs <= PASSES_MAX,
+            "a thread needs a lead above 0 and at least one pass at its full depth",
+        ),
+        (
+            0.0 <= angle < 180.0 and 0.0 <= thread.chamfer < along,
+            "a thread's angle is 0 to 180 degrees, and its chamfer shorter than the thread",
+        ),
+        (height <= first * math.sqrt(PASSES_MAX), f"the thread makes more than {PASSES_MAX} passes"),
+        (across >= height, "the tool stands below the thread's crest: between X and X plus its height"),
+    ):
+        if not right:
+            raise ValueError(f"G76: {wrong}")
 
 
 @dataclass(frozen=True)
@@ -143,60 +137,59 @@ class Pecking:
     relief: float = 0.0
 
 
-def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[TurningStep]:
+def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[Leg]:
     """The moves of G90, or with `facing` of G94 [mm]."""
     if facing:
         yield from map(exchanged, single_cut(exchanged(start), exchanged(end), taper, facing=False))
         return
-    yield TurningStep(Leg(complex(start.real, end.imag + taper)), fast=True)
-    yield TurningStep(Leg(end))
-    yield TurningStep(Leg(complex(end.real, start.imag)))
-    yield TurningStep(Leg(start), fast=True)
+    yield Leg(complex(start.real, end.imag + taper), fast=True)
+    yield Leg(end)
+    yield Leg(complex(end.real, start.imag))
+    yield Leg(start, fast=True)
 
 
-def single_thread(start: complex, end: complex, taper: float, lead: float) -> Iterator[Pass]:
-    """The moves of G92 [mm]; `lead` is that along the longer of z and x. Raises ThreadFault."""
+def single_thread(start: complex, end: complex, taper: float, lead: float) -> Iterator[Leg]:
+    """The moves of G92 [mm]; `lead` is that along the longer of z and x. Raises ValueError."""
     begin = complex(start.real, end.imag + taper)
     along = end - begin
     if not lead > 0.0 or not abs(along.real) > SAME:
-        raise ThreadFault("a thread needs a lead above 0 and room in z between where the tool stands and Z")
-    yield Pass(begin)
-    yield Pass(end, lead * abs(along) / max(abs(along.real), abs(along.imag)))
-    yield Pass(complex(end.real, start.imag))
-    yield Pass(start)
+        text = "a thread needs a lead above 0 and room in z between where the tool stands and Z"
+        raise ValueError(f"G92: {text}")
+    yield Leg(begin, fast=True)
+    yield Leg(end, pitch=lead * abs(along) / max(abs(along.real), abs(along.imag)))
+    yield Leg(complex(end.real, start.imag), fast=True)
+    yield Leg(start, fast=True)
 
 
-def pecked(given: Pecking, *, grooving: bool) -> Iterator[TurningStep]:
-    """The moves of G74, or with `grooving` of G75 [mm]. Raises ContourFault."""
+def pecked(given: Pecking, *, grooving: bool) -> Iterator[Leg]:
+    """The moves of G74, or with `grooving` of G75 [mm]. Raises ValueError."""
     if grooving:
         yield from map(exchanged, pecked(exchanged(given), grooving=False))
         return
     deep, wide = given.end.real - given.start.real, given.end.imag - given.start.imag
+    retract, peck, relief = given.retract, given.peck, given.relief
     if abs(deep) < SAME:
-        raise ContourFault("the cycle needs room between where the tool stands and its bottom")
-    if not given.peck > 0.0 or not given.shift > 0.0:
-        raise ContourFault("the peck and the shift of the cycle must be above 0")
-    if (1.0 + abs(wide) / given.shift) * (1.0 + abs(deep) / given.peck) > PASSES_MAX:
-        raise ContourFault(f"the cycle makes more than {PASSES_MAX} pecks")
-    if given.retract > given.peck:
-        raise ContourFault(
-            f"the retract of the cycle, {given.retract:g} mm, is longer than its peck, {given.peck:g} mm"
-        )
-    if given.relief > min(given.shift, abs(wide)):
-        raise ContourFault(
-            f"the relief of the cycle, {given.relief:g} mm, is longer than the way to the next cut: the tool would gouge"
-        )
+        raise ValueError("the cycle needs room between where the tool stands and its bottom")
+    if not peck > 0.0 or not given.shift > 0.0:
+        raise ValueError("the peck and the shift of the cycle must be above 0")
+    if (1.0 + abs(wide) / given.shift) * (1.0 + abs(deep) / peck) > PASSES_MAX:
+        raise ValueError(f"the cycle makes more than {PASSES_MAX} pecks")
+    if retract > peck:
+        raise ValueError(f"the retract of the cycle, {retract:g} mm, is longer than its peck, {peck:g} mm")
+    if relief > min(given.shift, abs(wide)):
+        long = f"the relief of the cycle, {relief:g} mm, is longer than the way to the next cut"
+        raise ValueError(f"{long}: the tool would gouge")
     down, on = math.copysign(1.0, deep), math.copysign(1.0, wide)
     for x in _stations(given.start.imag, given.end.imag, given.shift, from_start=True):
-        yield TurningStep(Leg(complex(given.start.real, x)), fast=True)
+        yield Leg(complex(given.start.real, x), fast=True)
         for z in _stations(given.start.real, given.end.real, given.peck, from_start=False):
-            yield TurningStep(Leg(complex(z, x)))
+            yield Leg(complex(z, x))
             if z != given.end.real:
-                yield TurningStep(Leg(complex(z - down * given.retract, x)), fast=True)
+                yield Leg(complex(z - down * given.retract, x), fast=True)
         away = x - on * given.relief if x != given.start.imag else x
-        yield TurningStep(Leg(complex(given.end.real, away)), fast=True)
-        yield TurningStep(Leg(complex(given.start.real, away)), fast=True)
-    yield TurningStep(Leg(given.start), fast=True)
+        yield Leg(complex(given.end.real, away), fast=True)
+        yield Leg(complex(given.start.real, away), fast=True)
+    yield Leg(given.start, fast=True)
 
 
 def _stations(begin: float, end: float, step: float, *, from_start: bool) -> Iterator[float]:

@@ -31,17 +31,16 @@ PASSES_MAX = 10_000  # of a cycle: more are a mistake in its depth
 SAME = 1e-9  # lengths below this are none [mm]: the rounding of coordinates around 1e3 mm
 
 
-class ContourFault(ValueError):
-    """The profile, or the words of its cycle, allow no passes; the text says why."""
-
-
 @dataclass(frozen=True)
 class Leg:
-    """A move to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or not (-1)."""
+    """A move to `end`: a line (turning 0), or an arc about `centre`, counter-clockwise (1) or not (-1); fast,
+    at the feed, or in step with the spindle, `pitch` along it in each turn [mm]."""
 
     end: complex
     turning: int = 0
     centre: complex = 0j
+    fast: bool = False
+    pitch: float = 0.0
 
     def moved(self, by: complex) -> Leg:
         """The leg, moved."""
@@ -58,14 +57,6 @@ class Contour:
 
 
 @dataclass(frozen=True)
-class TurningStep:
-    """A move of a cycle: fast, or at the feed."""
-
-    leg: Leg
-    fast: bool = False
-
-
-@dataclass(frozen=True)
 class Roughing:
     """How much a pass of G71 or G72 takes."""
 
@@ -76,27 +67,25 @@ class Roughing:
     more: complex = 0j
 
 
-def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[TurningStep]:
-    """The moves of G71, or with `facing` of G72. Raises ContourFault."""
+def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[Leg]:
+    """The moves of G71, or with `facing` of G72. Raises ValueError."""
     if facing:
         return map(exchanged, _removal(exchanged(contour), exchanged(given)))
     return _removal(contour, given)
 
 
-def pattern_repeat(
-    contour: Contour, passes: int, shift: complex, allowance: complex
-) -> Iterator[TurningStep]:
-    """The moves of G73: `passes` times along the profile, the first off by `shift`. Raises ContourFault."""
+def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: complex) -> Iterator[Leg]:
+    """The moves of G73: `passes` times along the profile, the first off by `shift`. Raises ValueError."""
     if not 1 <= passes <= PASSES_MAX:
-        raise ContourFault(f"G73 makes 1 to {PASSES_MAX} passes, not {passes}")
+        raise ValueError(f"G73 makes 1 to {PASSES_MAX} passes, not {passes}")
     for n in range(passes):
         by = allowance + (shift * (passes - 1 - n) / (passes - 1) if passes > 1 else 0.0)
-        yield TurningStep(Leg(contour.start + by), fast=True)
+        yield Leg(contour.start + by, fast=True)
         yield from _along(contour, by)
-    yield TurningStep(Leg(contour.start), fast=True)
+    yield Leg(contour.start, fast=True)
 
 
-def _removal(contour: Contour, given: Roughing) -> Iterator[TurningStep]:
+def _removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
     """G71 of a profile; levels are imaginary parts."""
     _require_one_way(contour)
     moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
@@ -104,31 +93,30 @@ def _removal(contour: Contour, given: Roughing) -> Iterator[TurningStep]:
     top = contour.start + given.allowance
     height = top.imag - first.imag
     if not given.depth > 0 or abs(height) / given.depth > PASSES_MAX:
-        raise ContourFault(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
+        raise ValueError(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
     out = math.copysign(1.0, height)
     ahead = math.copysign(1.0, last.real - first.real)
-    yield TurningStep(Leg(top), fast=True)
+    yield Leg(top, fast=True)
     n = 1
     while (level := top.imag - out * n * given.depth) * out - first.imag * out > SAME:
         end = _reached(moved, level, out)
         away = complex(-ahead, out) * given.retract
-        yield TurningStep(Leg(complex(top.real, level)), fast=contour.fast)
+        yield Leg(complex(top.real, level), fast=contour.fast)
         if (end - top.real) * ahead > SAME:
-            yield TurningStep(Leg(complex(end, level)))
-            yield TurningStep(Leg(complex(end, level) + away), fast=True)
-            yield TurningStep(Leg(complex(top.real, level + away.imag)), fast=True)
+            yield Leg(complex(end, level))
+            yield Leg(complex(end, level) + away, fast=True)
+            yield Leg(complex(top.real, level + away.imag), fast=True)
         n += 1
-    yield TurningStep(Leg(complex(top.real, first.imag)), fast=contour.fast)
+    yield Leg(complex(top.real, first.imag), fast=contour.fast)
     yield from _along(contour, given.allowance)
-    yield TurningStep(Leg(complex(contour.legs[-1].end.real + given.allowance.real, top.imag)), fast=True)
-    yield TurningStep(Leg(contour.start), fast=True)
+    yield Leg(complex(contour.legs[-1].end.real + given.allowance.real, top.imag), fast=True)
+    yield Leg(contour.start, fast=True)
 
 
-def _along(contour: Contour, by: complex) -> Iterator[TurningStep]:
+def _along(contour: Contour, by: complex) -> Iterator[Leg]:
     """The profile, moved."""
-    yield TurningStep(contour.legs[0].moved(by), fast=contour.fast)
-    for leg in contour.legs[1:]:
-        yield TurningStep(leg.moved(by))
+    yield replace(contour.legs[0].moved(by), fast=contour.fast)
+    yield from (leg.moved(by) for leg in contour.legs[1:])
 
 
 def _reached(legs: list[Leg], level: float, out: float) -> float:
@@ -155,9 +143,9 @@ def _crossing(start: complex, leg: Leg, level: float) -> float:
 
 
 def _require_one_way(contour: Contour) -> None:
-    """See that neither x nor z turns back along the profile. Raises ContourFault."""
+    """See that neither x nor z turns back along the profile. Raises ValueError."""
     if len(contour.legs) < 2:
-        raise ContourFault("the profile has no move behind its first one")
+        raise ValueError("the profile has no move behind its first one")
     at = contour.legs[0].end
     ways = {"z": {0.0}, "x": {0.0}}
     for leg in contour.legs[1:]:
@@ -168,11 +156,11 @@ def _require_one_way(contour: Contour) -> None:
         at = leg.end
     for axis, found in ways.items():
         if len(found) > 2:
-            raise ContourFault(
+            raise ValueError(
                 f"{axis} turns back along the profile: only profiles without pockets (type I) are read; write these passes out"
             )
     if len(ways["x"]) < 2 and len(ways["z"]) < 2:
-        raise ContourFault("the profile has no move behind its first one")
+        raise ValueError("the profile has no move behind its first one")
 
 
 def _directions(start: complex, leg: Leg) -> list[complex]:

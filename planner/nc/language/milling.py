@@ -28,20 +28,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.nc.language.making import Row, equal_steps
+from planner.nc.turning import Leg
 
 _SHORT = 1e-9  # relative length of a leg that is left out
 
 
-@dataclass(frozen=True)
-class PocketLeg:
-    """A straight leg to its end, or an arc about a centre (turning 1 counter-clockwise, -1 clockwise)."""
-
-    end: complex
-    centre: complex = 0j
-    turning: int = 0
-
-
-Path = tuple[complex, list[PocketLeg]]  # a start and the legs from there
+Path = tuple[complex, list[Leg]]  # a start and the legs from there
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ class RoundedRectangle:
         """From the middle of the left wall round, counter-clockwise (turning 1) or clockwise."""
         a, b = self.a - inset, self.b - inset
         r = min(max(self.corner - inset, 0.0), a, b)
-        legs: list[PocketLeg] = []
+        legs: list[Leg] = []
         place = start = complex(-a, 0.0)
         for corner, before, after in (
             (complex(-a, -b), -1j, 1),
@@ -71,24 +63,24 @@ class RoundedRectangle:
         ):
             first, last = corner - r * before, corner + r * after
             if abs(first - place) > _SHORT * (a + b):
-                legs.append(PocketLeg(first))
+                legs.append(Leg(first))
             if r > _SHORT * (a + b):
-                legs.append(PocketLeg(last, corner - r * before + r * after, 1))
+                legs.append(Leg(last, 1, corner - r * before + r * after))
             place = last
         if abs(start - place) > _SHORT * (a + b):
-            legs.append(PocketLeg(start))
+            legs.append(Leg(start))
         if turning < 0:
-            legs = [PocketLeg(leg.end.conjugate(), leg.centre.conjugate(), -leg.turning) for leg in legs]
+            legs = [Leg(leg.end.conjugate(), -leg.turning, leg.centre.conjugate()) for leg in legs]
         return start, legs
 
-    def to_wall(self) -> list[PocketLeg]:
+    def to_wall(self) -> list[Leg]:
         """From the core's start to where a straight leg to a loop stays inside: none is needed."""
         return []
 
     def core(self) -> Path:
         """From the middle to the one end and to the other."""
         along = complex(self.a - self.room, self.b - self.room)
-        return 0j, [] if along == 0 else [PocketLeg(along), PocketLeg(-along)]
+        return 0j, [] if along == 0 else [Leg(along), Leg(-along)]
 
 
 @dataclass(frozen=True)
@@ -113,32 +105,32 @@ class ArcSlot:
         start = far * (self.radius + 1j * way * w)
         # the far end, inwards; the inner wall back; the near end; the outer wall forth; and the far end again
         legs = [
-            PocketLeg(inner * far, self.radius * far, way),
-            PocketLeg(inner * near, 0j, -way),
-            PocketLeg(outer * near, self.radius * near, way),
-            PocketLeg(outer * far, 0j, way),
-            PocketLeg(start, self.radius * far, way),
+            Leg(inner * far, way, self.radius * far),
+            Leg(inner * near, -way),
+            Leg(outer * near, way, self.radius * near),
+            Leg(outer * far, way),
+            Leg(start, way, self.radius * far),
         ]
         return (start, legs) if turning == way else (start, backwards(start, legs))
 
-    def to_wall(self) -> list[PocketLeg]:
+    def to_wall(self) -> list[Leg]:
         """Along the arc to the far end."""
         return self.core()[1]
 
     def core(self) -> Path:
         """Along the arc."""
         near, far = cmath.rect(self.radius, self.begin), cmath.rect(self.radius, self.begin + self.sweep)
-        return near, [PocketLeg(far, 0j, 1 if self.sweep > 0 else -1)]
+        return near, [Leg(far, 1 if self.sweep > 0 else -1)]
 
 
 PocketShape = RoundedRectangle | ArcSlot
 
 
-def backwards(start: complex, legs: list[PocketLeg]) -> list[PocketLeg]:
+def backwards(start: complex, legs: list[Leg]) -> list[Leg]:
     """The legs from their end to the start."""
     ends = [start, *(leg.end for leg in legs)]
     return [
-        PocketLeg(end, leg.centre, -leg.turning)
+        Leg(end, -leg.turning, leg.centre)
         for end, leg in zip(reversed(ends[:-1]), reversed(legs), strict=True)
     ]
 
@@ -245,7 +237,7 @@ def _wall(shape: PocketShape, plan: PocketPlan) -> Path:
     size = min(plan.radius, width) / 2.0
     centre = start + 1j * plan.turning * tangent * size
     come, go = centre - size * tangent, centre + size * tangent
-    return come, [PocketLeg(start, centre, plan.turning), *legs, PocketLeg(go, centre, plan.turning)]
+    return come, [Leg(start, plan.turning, centre), *legs, Leg(go, plan.turning, centre)]
 
 
 _NARROW = 1e-9  # relative room beside the tool below which there is none
@@ -263,7 +255,7 @@ class _Cutting:
     def line(self, feed: float, point: complex | None = None, z: float | None = None) -> Row:
         return [("G", 1.0), ("F", feed), *self._ends(point, z)]
 
-    def legs(self, start: complex, legs: list[PocketLeg], feed: float) -> Iterator[Row]:
+    def legs(self, start: complex, legs: list[Leg], feed: float) -> Iterator[Row]:
         place = start
         for leg in legs:
             if leg.turning:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -45,20 +46,20 @@ class LatheCycles:
             "start": self._begin_at_once,
             "profile": self._begin,
             "back": lambda making, given: [self._fast(self._point(self._start))],
-            "G71": lambda making, given: self._removal(making, given, facing=False),
-            "G72": lambda making, given: self._removal(making, given, facing=True),
+            "G71": partial(self._removal, cycle="G71"),
+            "G72": partial(self._removal, cycle="G72"),
             "G73": self._pattern,
-            "G74": lambda making, given: self._pecking(making, given, grooving=False),
-            "G75": lambda making, given: self._pecking(making, given, grooving=True),
+            "G74": partial(self._pecking, cycle="G74"),
+            "G75": partial(self._pecking, cycle="G75"),
             "G76": self._thread,
-            "G90": lambda making, given: self._single(given, facing=False),
+            "G90": partial(self._single, facing=False),
             "G92": self._single_thread,
-            "G94": lambda making, given: self._single(given, facing=True),
+            "G94": partial(self._single, facing=True),
         }
 
     def _begin_at_once(self, making: Making, given: Given) -> Iterable[Row]:
         """G70 keeps where the tool is."""
-        self._start = self.run.interpreter.state.programmed().copy()
+        self._start = self._state.programmed().copy()
         return []
 
     # --- the profile
@@ -101,19 +102,23 @@ class LatheCycles:
 
     # --- cycles
 
-    def _removal(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
+    def _removal(self, making: Making, given: Given, *, cycle: str) -> Iterable[Row]:
         contour, unit = self._contour(), self._unit
-        if "R" not in given:
-            making.interpreter.findings.assume(
-                f"the retract of G{72 if facing else 71} is not given: {RETRACT:g} mm", making.place.line
-            )
         roughing = turning.Roughing(
             depth=abs(given["D"]) * unit,
-            retract=abs(given["R"]) * unit if "R" in given else RETRACT,
+            retract=self._retract(making, given, cycle),
             allowance=self._allowance(given),
             more=complex(given.get("K", 0.0), given.get("I", 0.0)) * unit,
         )
-        return self._rows(turning.stock_removal(contour, roughing, facing=facing))
+        return self._rows(turning.stock_removal(contour, roughing, facing=cycle == "G72"))
+
+    def _retract(self, making: Making, given: Given, cycle: str) -> float:
+        """R [mm], and what is assumed where it is not given."""
+        if "R" in given:
+            return abs(given["R"]) * self._unit
+        text = f"the retract of {cycle} is not given: {RETRACT:g} mm"
+        making.interpreter.findings.assume(text, making.place.line)
+        return RETRACT
 
     def _pattern(self, making: Making, given: Given) -> Iterable[Row]:
         contour = self._contour()
@@ -121,13 +126,10 @@ class LatheCycles:
         return self._rows(turning.pattern_repeat(contour, round(given["D"]), shift, self._allowance(given)))
 
     def _allowance(self, given: Given) -> complex:
-        part = 0.5 if self.run.interpreter.state.diameters else 1.0
-        return complex(given.get("W", 0.0), part * given.get("U", 0.0)) * self._unit
+        return complex(given.get("W", 0.0), given.get("U", 0.0) / self._of_radius) * self._unit
 
     def _thread(self, making: Making, given: Given) -> Iterable[Row]:
-        state, unit = self.run.interpreter.state, self._unit
-        start = self._point(state.programmed())
-        part = 0.5 if state.diameters else 1.0
+        start, unit, part = self._point(self._state.programmed()), self._unit, 1.0 / self._of_radius
         thread = lathe_cuts.LatheThread(
             start=start,
             end=complex(given.get("Z", start.real / unit), part * given.get("X", start.imag / (part * unit)))
@@ -142,9 +144,9 @@ class LatheCycles:
             taper=given.get("I", 0.0) * unit,
             chamfer=given.get("E", 0.0) * given["F"] * unit,
         )
-        return self._passes("G76", start, lathe_cuts.thread_passes(thread))
+        return self._rows(lathe_cuts.thread_passes(thread), start)
 
-    def _single(self, given: Given, *, facing: bool) -> Iterable[Row]:
+    def _single(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
         start = self._here()
         taper = given.get("R", 0.0) * self._unit
         return self._rows(lathe_cuts.single_cut(start, self._end(given, start), taper, facing=facing))
@@ -152,29 +154,23 @@ class LatheCycles:
     def _single_thread(self, making: Making, given: Given) -> Iterable[Row]:
         start = self._here()
         taper, lead = given.get("R", 0.0) * self._unit, given["F"] * self._unit
-        return self._passes(
-            "G92", start, lathe_cuts.single_thread(start, self._end(given, start), taper, lead)
-        )
+        return self._rows(lathe_cuts.single_thread(start, self._end(given, start), taper, lead))
 
-    def _pecking(self, making: Making, given: Given, *, grooving: bool) -> Iterable[Row]:
+    def _pecking(self, making: Making, given: Given, *, cycle: str) -> Iterable[Row]:
         start = self._here()
-        if "K" in given and "R" not in given:
-            making.interpreter.findings.assume(
-                f"the retract of G{75 if grooving else 74} is not given: {RETRACT:g} mm", making.place.line
-            )
         pecking = lathe_cuts.Pecking(
             start=start,
             end=self._end(given, start),
             peck=abs(given["K"]) * self._unit if "K" in given else math.inf,
             shift=abs(given["I"]) * self._unit if "I" in given else math.inf,
-            retract=abs(given["R"]) * self._unit if "R" in given else RETRACT,
+            retract=self._retract(making, given, cycle) if "K" in given else 0.0,
             relief=abs(given.get("D", 0.0)) * self._unit,
         )
-        return self._rows(lathe_cuts.pecked(pecking, grooving=grooving))
+        return self._rows(lathe_cuts.pecked(pecking, grooving=cycle == "G75"))
 
     def _here(self) -> complex:
         """Where the tool stands; it is the start of the cycle too. Raises ValueError."""
-        state = self.run.interpreter.state
+        state = self._state
         if state.actual is not None or state.rotated or state.normal != 1 or not state.absolute:
             raise ValueError(_NEEDS)
         self._start = state.programmed().copy()
@@ -182,56 +178,48 @@ class LatheCycles:
 
     def _end(self, given: Given, start: complex) -> complex:
         """The place of X and Z; the start's where they are not given."""
-        unit, part = self._unit, 0.5 if self.run.interpreter.state.diameters else 1.0
-        x = part * given["X"] * unit if "X" in given else start.imag
-        return complex(given["Z"] * unit if "Z" in given else start.real, x)
+        x = given["X"] / self._of_radius * self._unit if "X" in given else start.imag
+        return complex(given["Z"] * self._unit if "Z" in given else start.real, x)
 
     # --- rows
 
     @property
+    def _state(self) -> State:
+        return self.run.interpreter.state
+
+    @property
     def _unit(self) -> float:
-        return self.run.interpreter.state.unit
+        return self._state.unit
 
-    def _rows(self, steps: Iterable[turning.TurningStep]) -> list[Row]:
-        rows, at = [], self._point(self._start)
-        try:
-            for step in steps:
-                leg = step.leg
-                if not leg.turning and abs(leg.end - at) < turning.SAME:
-                    continue
-                if step.fast:
-                    rows.append(self._fast(leg.end))
-                elif leg.turning:
-                    centre = (leg.centre - at) / self._unit
-                    code = 3.0 if leg.turning > 0 else 2.0
-                    rows.append([("G", code), *self._to(leg.end), ("I", centre.imag), ("K", centre.real)])
-                else:
-                    rows.append([("G", 1.0), *self._to(leg.end)])
-                at = leg.end
-        except turning.ContourFault as fault:
-            raise ValueError(str(fault)) from fault
-        return rows
+    @property
+    def _of_radius(self) -> float:
+        """What X words are of a radius."""
+        return 2.0 if self._state.diameters else 1.0
 
-    def _passes(self, cycle: str, at: complex, passes: Iterable[lathe_cuts.Pass]) -> Iterable[Row]:
-        """Moves of a thread. Raises ValueError for what contradicts itself in it."""
-        rows: list[Row] = []
-        try:
-            for one in passes:
-                if one.pitch:
-                    rows.append([("G", 33.0), *self._to(one.end), ("K", one.pitch / self._unit)])
-                elif abs(one.end - at) > 0.0:
-                    rows.append(self._fast(one.end))
-                at = one.end
-        except lathe_cuts.ThreadFault as fault:
-            raise ValueError(f"{cycle}: {fault}") from fault
+    def _rows(self, legs: Iterable[turning.Leg], start: complex | None = None) -> list[Row]:
+        """The moves of a cycle from `start`, else from where it began."""
+        rows, at = [], self._point(self._start) if start is None else start
+        for leg in legs:
+            if not leg.turning and not leg.pitch and abs(leg.end - at) < turning.SAME:
+                continue
+            if leg.fast:
+                rows.append(self._fast(leg.end))
+            elif leg.pitch:
+                rows.append([("G", 33.0), *self._to(leg.end), ("K", leg.pitch / self._unit)])
+            elif leg.turning:
+                centre = (leg.centre - at) / self._unit
+                code = 3.0 if leg.turning > 0 else 2.0
+                rows.append([("G", code), *self._to(leg.end), ("I", centre.imag), ("K", centre.real)])
+            else:
+                rows.append([("G", 1.0), *self._to(leg.end)])
+            at = leg.end
         return rows
 
     def _fast(self, point: complex) -> Row:
         return [("G", 0.0), *self._to(point)]
 
     def _to(self, point: complex) -> Row:
-        part = 2.0 if self.run.interpreter.state.diameters else 1.0
-        return [("X", part * point.imag / self._unit), ("Z", point.real / self._unit)]
+        return [("X", self._of_radius * point.imag / self._unit), ("Z", point.real / self._unit)]
 
 
 def _contour_of(program: Program, offset: np.ndarray, start: complex) -> turning.Contour:

@@ -1,19 +1,17 @@
 """Centre and sweep of an arc from I J K or R, with the tolerances of RS274NGC as LinuxCNC applies them.
 
-In the plane of the arc, with start p0, end p1 and centre c, r0 = |p0 - c| and r1 = |p1 - c| should be equal;
-programs round. The arc is refused where
+With r0 and r1 the distances of start p0 and end p1 from the centre, an arc is refused where a radius is below
+RADIUS_MIN, and where
 
     |r0 - r1| > 100 T      or      |r0 - r1| > T  and  |r0 - r1| > 0.001 max(r0, r1),      T = CLOSURE
 
-and where a radius is below RADIUS_MIN. With R the centre lies on the perpendicular bisector of the chord of
-half length h, at sqrt(R^2 - h^2) from it; R > 0 means at most half a turn, R < 0 more. h may exceed |R| by
-RADIUS_MIN (a rounded half circle), and where h and R agree to HALF_CIRCLE the centre is the chord's middle:
-the square root would turn a rounding of 1e-13 into 4e-7.
+With R the centre lies on the perpendicular bisector of the chord of half length h, at sqrt(R^2 - h^2) from
+it; R > 0 means at most half a turn, R < 0 more. h may exceed |R| by RADIUS_MIN, and where they agree to
+HALF_CIRCLE the centre is the chord's middle: the square root would turn a rounding of 1e-13 into 4e-7.
 
-The sweep is the angle from p0 to p1 in the arc's direction, in (0, 2 pi]. An arc about a centre is a full
-turn where p1 is p0 to SAME_PLACE, as in LinuxCNC's motion (pmCircleInit goes by a length, not by an angle: an
-arc of 8 mm and radius 1e7 mm turns by less than 1e-6). An arc with R is none: p0 and p1 do not say where its
-centre is. P adds P - 1 turns. Planes are right-handed: (x, y) about z, (z, x) about y, (y, z) about x.
+The sweep is in (0, 2 pi]. An arc about a centre is a full turn where p1 is p0 to SAME_PLACE, as in LinuxCNC's
+motion (pmCircleInit goes by a length, not by an angle). P adds P - 1 turns. Planes are right-handed: (x, y)
+about z, (z, x) about y, (y, z) about x.
 """
 
 from __future__ import annotations

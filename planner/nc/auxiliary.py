@@ -1,17 +1,10 @@
 """Words that act before a block moves: spindle, tool, coolant, signals (M62 to M68) and other codes that a
-control passes on; dwells; path control. Outputs are events; an input that is waited for is refused.
+control passes on; dwells; path control; the feed of a move.
 
-The meaning of F, and the feed of a move: in length per minute (G94), per turn of the spindle (G95) or as one
-over minutes (G93).
-
-    G94    feed = F
-    G95    feed = F S                 S in revolutions per minute
-    G93    feed = length F            F on every line that moves at a feed
-
-A change of the mode forgets the feed. With G96 S is a surface speed v, in metres or feet per minute: the
-turns, and with them the feed of G95, depend on the radius r that is being cut, n = v / (2 pi r), up to D of
-G96. Straight moves are divided so that n changes by at most `SURFACE_STEP` in a part, and a part has the feed
-of its larger radius; an arc has that of its largest.
+G94 gives F, G95 F times S, G93 length times F; a change of the mode forgets the feed. With G96 S is a surface
+speed v: the turns depend on the radius r that is being cut, n = v / (2 pi r), up to D of G96. Straight moves
+are divided so that n changes by at most `SURFACE_STEP` in a part, and a part has the feed of its larger
+radius; an arc has that of its largest.
 """
 
 from __future__ import annotations

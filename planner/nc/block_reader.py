@@ -1,15 +1,9 @@
-"""One row of words as a block: its codes by modal group and its other words by letter, checked against each
-other.
-
-Checked here is what a line may hold at all: codes that are known, one code per modal group, a letter once,
-words that some code of the line uses, N at its start. What the words mean in the state of the program is the
-interpreter's business.
+"""One row of words as a block: its codes by modal group and its other words by letter, checked against what a
+line may hold at all. What the words mean in the state of the program is the interpreter's business.
 
 Lines that are no words: commands to grbl ($X, $H, $100=250), and G28 with bare axis letters, as 3-D printers
-have it.
-
-Settings and questions move nothing and are counted. Homing is a rapid to the position of G28 in the machine
-file, else to machine zero, and said so. Everything else that starts with $ may move ($J jogs) and is refused.
+have it. Homing is a rapid to the position of G28, else to machine zero, and said so. What else starts with $
+may move ($J jogs) and is refused.
 """
 
 from __future__ import annotations

@@ -54,10 +54,8 @@ class EventColumns(NamedTuple):
 
 class BlockTable:
     """Blocks and events so far. The columns have room to spare; `blocks` and `events` say how much is used.
-    New blocks stand in the call `frame`.
-
-    The compiled loop over plain rows writes into the columns directly and sets the counts.
-    """
+    New blocks stand in the call `frame`. The compiled loop over plain rows writes into the columns directly
+    and sets the counts."""
 
     def __init__(self, further: int = 0) -> None:
         self.blocks = 0

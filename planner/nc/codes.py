@@ -123,11 +123,8 @@ M_REFUSED: dict[int, Refusal] = {
 
 
 def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
-    """The refusal of a code that no table names; one that is not refused by `strict` alone may move.
-
-    That it can be left out (--ignore) is not said: of a code that may move it would be the plan of another
-    path.
-    """
+    """The refusal of a code that no table names; one that is not refused by `strict` alone may move. That it
+    can be left out (--ignore) is not said: of a code that may move it would be the plan of another path."""
     if letter == "M" and not strict:
         what = "an M code that this reader does not know, and that may move with its words or by itself, is"
         return Refusal(what, "write what it moves as G0 or G1", True)

@@ -1,29 +1,23 @@
 """Cutter radius compensation, G41 (left of the path) and G42 (right of it): from programmed moves to the
 tool's.
 
-In the plane of the moves, with the tool's radius r and the side s = +1 (left) or -1 (right), a programmed
-move is followed at the distance r: where its tangent is t, the tool's centre is at p + s r n(t), n(t) = t
-turned left by a quarter. So a line is offset to a parallel, and an arc about its centre, its radius less r
-where it turns towards the tool's side and more r elsewhere. Where two moves meet, the second turns by an
-angle away from the tool's side (outer corner), towards it (inner corner), or by less than `STRAIGHT_ON`:
+With the tool's radius r and the side s = +1 (left) or -1 (right) the tool's centre is at p + s r n(t) where
+the programmed tangent is t, n(t) = t turned left by a quarter. So a line is offset to a parallel, and an arc
+about its centre. Where two moves meet, the second turns by an angle away from the tool's side (outer corner),
+towards it (inner corner), or by less than `STRAIGHT_ON`:
 
     outer corner    an arc of radius r about the programmed corner joins the two offset ends; before a rapid a straight move does
     inner corner    both offset moves end at their intersection: the one that crosses in the sense in which the programmed moves turn
     straight on     the second begins where the first ends
 
-An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi, to
-`STRAIGHT_ON`, is an outer corner between lines and before an arc with the tool inside, and an inner one
-otherwise. Straight on, an arc begins up to `STRAIGHT_ON` r / R before its programmed start, R the offset
-radius.
-
-The first move, longer than r, leads straight from where the tool is to the offset end (an arc becomes the one
-that ends there with the programmed tangent). The move after G40 leads straight from there to the programmed
-end. Moves along the normal alone keep the place in the plane, and so do dwells and stops; M0 and M1 fix it:
-an inner corner after them is cut straight. All this is what LinuxCNC does, but that it refuses an arc that
-begins early by more than 0.0254 in mm programs, or 0.001 in inch programs, where a corner follows
-(move_endpoint_and_flush in interp_queue.cc compares the angle with a length); here it is cut.
-
-Lengths are machine coordinates in mm. Points and vectors in the plane are complex numbers: n(t) = i t.
+An inner corner that takes more of a move than there is would gouge, and is refused. Back by pi is an outer
+corner between lines and before an arc with the tool inside, and an inner one otherwise. The first move,
+longer than r, leads straight from where the tool is to the offset end (an arc becomes the one that ends there
+with the programmed tangent); the move after G40 leads straight to the programmed end. Moves along the normal,
+dwells and stops keep the place in the plane; M0 and M1 fix it. All this is what LinuxCNC does, but that it
+refuses an arc that begins early by more than 0.0254 in mm programs where a corner follows
+(move_endpoint_and_flush in interp_queue.cc compares the angle with a length); here it is cut. Points and
+vectors in the plane are complex numbers: n(t) = i t.
 """
 
 from __future__ import annotations
@@ -151,8 +145,6 @@ class Cutter:
             self._settle(self._open)
             self._open.fixed, self._open.row = True, -1
 
-    # --- corners
-
     def _corner(self, corner: complex, side: OffsetMove, kind: Kind, line: int) -> bool:
         """Join the open move to the next at a programmed corner; True for an inner one."""
         assert self._open is not None
@@ -208,8 +200,6 @@ class Cutter:
             self._table.arcs[open_.arc] = (block, centre, normal, open_.sweep)
         elif not open_.fixed and dot(open_.side.end - open_.begin, open_.side.first) < -NOWHERE:
             raise CutterFault(_GOUGE)
-
-    # --- blocks
 
     def _add(self, side: OffsetMove, target: FloatArray, kind: Kind, line: int, sweep: float = 0.0) -> None:
         state, table = self._state, self._table

@@ -41,13 +41,12 @@ class _Fed(NamedTuple):
 def with_extruder(
     program: Program, words: Words, rows: int, factors: Sequence[tuple[int, float]] = ()
 ) -> Program:
-    """The program with what the extruder feeds on each block, and full stops where it moves alone.
+    """The program with what the extruder feeds on each block, and full stops where it moves alone. Raises
+    InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside another
+    G code, and for one alone before the first F word.
 
     words   : of the program; of these the first `rows` rows
     factors : by which F counts from a line on (M220)
-
-    Raises InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside
-    another G code, and for one alone before the first F word.
     """
     fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES))
     if not fed.amount.any():

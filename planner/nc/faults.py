@@ -1,15 +1,8 @@
 """Findings while a program is read: constructs that are not read, and assumptions about it.
 
-Words that, as far as the program tells, move nothing are counted and said once each:
-
-    12 M codes that this reader does not know: assumed not to move anything; first M428 line 4
-
-`Reading.strict` refuses them instead. What may move is never among them, except where the sentence says what
-was assumed of it.
-
-An axis that is not planned may be named as long as it does not move: all its words have one value, after G91
-they are 0. The compiled loop (plain.py) checks it by `treatment` and `parked`, and so does `check_parked` for
-the other rows.
+Words that, as far as the program tells, move nothing are counted and said once each; `Reading.strict` refuses
+them. An axis that is not planned may be named as long as it does not move: all its words have one value,
+after G91 they are 0. The compiled loop (plain.py) checks it by `treatment` and `parked`.
 """
 
 from __future__ import annotations

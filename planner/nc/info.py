@@ -83,10 +83,8 @@ class ProgramInfo:
 def inspect_program(
     path: str | Path, machine: Machine | None = None, reading: Reading = AS_USUAL
 ) -> ProgramInfo:
-    """Read a program as far as it can be read and describe it.
-
-    Raises InputError only if the file cannot be read, is empty or is not a text.
-    """
+    """Read a program as far as it can be read and describe it. Raises InputError only if the file cannot be
+    read, is empty or is not a text."""
     data = load(path)
     program, faults = interpret(data, machine, reading, source=source_name(path))
     return describe(program, lines=len(data.splitlines()), unsupported=faults)

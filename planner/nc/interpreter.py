@@ -3,13 +3,9 @@
     feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work
     offset, path control, distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
 
-Two consequences surprise. F is read in the units in force *before* a G20 or G21 on its line. M3 and M8 act
-before the line's move and M0 after it. G53 holds for its line only; a motion code alone on a line moves
-nothing.
-
-Rows that are plain straight moves run in `plain.py`; this file is for the others, and `mover.py` for what
-they move. A fault is recorded and reading goes on with the next line, so that `info` can show them all;
-`reader.py` refuses a program that has any.
+F is read in the units in force *before* a G20 or G21 on its line. Rows that are plain straight moves run in
+`plain.py`; this file is for the others, and `mover.py` for what they move. A fault is recorded and reading
+goes on with the next line, so that `info` can show them all.
 """
 
 from __future__ import annotations
@@ -262,8 +258,6 @@ class Interpreter:
             self.state.motion = REFUSED_MOTION
         return stop in (20, 300)
 
-    # --- modes
-
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
         if "plane" in g:
@@ -291,8 +285,6 @@ class Interpreter:
             state.to_level, state.retract_given = g["retract mode"] == 980, True
         state.apply_offsets()
         self.table.keep_origin(state)
-
-    # --- what moves
 
     def _one_shot(self, block: Block) -> None:
         code = block.g.get("one-shot")

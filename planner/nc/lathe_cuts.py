@@ -1,35 +1,24 @@
-"""Cycles of single cuts on Fanuc and Haas lathes, G90 G92 G94, and those that peck, G74 G75: from their words
-to moves.
+"""Cycles of single cuts on Fanuc and Haas lathes, G90 G92 G94, those that peck, G74 G75, and the threading
+cycle G76: from their words to moves.
 
 Points are complex numbers, z + i x in radii [mm]; the tool stands at S, the words give E = (Z, X) and a taper
 r along x (in G94 z).
 
-    G90    fast in x to x_E + r, cut to E, cut in x back to x_S, fast back to S
-    G92    the same as a thread: in step with the spindle to E, then fast
-    G94    fast in z to z_E + r, cut to E, cut in z back to z_S, fast back to S
+    G90    fast in x to x_E + r, cut to E, cut in x back to x_S, fast back to S; G92 the same as a thread; G94 with x and z exchanged
     G74    pecks along z from z_S to z_E, each q deeper than the last and drawn back by e; at the bottom, but not of the first one, away
            by the relief against the shift; fast back to z_S, and the same p further in x until x_E; then fast
-           back to S
-    G75    the same with x and z exchanged
+           back to S; G75 the same with x and z exchanged
 
-Sources: the formats of Fanuc's lathes (series 0i-T) and of Haas (haascnc.com) as they are known; the order of
-the moves of G75, and that the first groove has no relief: the programming manual of ADTECH's CNC4620, which
-has Fanuc's format, page 55.
-
-The threading cycle G76 of Fanuc and Haas lathes: from its words to passes.
-
-The thread runs from the start S = (z_S, x_S) to the root E = (z_E, x_E), x in radii; s = sign(x_S - x_E)
-points away from it and t = sign(z_E - z_S) along it. A pass of depth c below the crest, x_E + s k, cuts at
+With s = sign(x_S - x_E) and t = sign(z_E - z_S) a pass of G76 of depth c below the crest, x_E + s k, cuts at
 x_E + s (k - c), from z_S + t c tan(a / 2): with the angle a of the tool it advances along the flank. A taper
-i moves the beginning of the cut by i. The depths are
+i moves the beginning of the cut by i; a chamfer of length g leaves the thread at 45 degrees before z_E. The
+depths are
 
     c_n = max(d sqrt(n), c_(n-1) + d_min)  while below k - r,    then k - r, then k, as often as the cycle says
 
-so that every pass takes the same section of chip. A chamfer of length g leaves the thread at 45 degrees
-before z_E.
-
-Sources: Haas' description of G76 (haascnc.com); the two-block format as in Fanuc's operator's manuals for
-series 0i-T.
+Sources: the formats of Fanuc's lathes (series 0i-T) and of Haas (haascnc.com) as they are known; the order of
+the moves of G75, and that the first groove has no relief: the programming manual of ADTECH's CNC4620, page
+55.
 """
 
 from __future__ import annotations

@@ -3,18 +3,14 @@
     line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits] [e +|- digits]
     comment = ( anything but a parenthesis )   or   ; to the end of the line
 
-Beyond RS274NGC: a % at the start of a line may have a name after it, which is not read; :1000 is O1000; $
-inside a line is a letter (the spindle's number, M3 $1); and a number may have an exponent with its sign, as
-programs that print numbers write small ones: -8.775e-05. It has no space before it, and E two digits or more:
-X1E-2 is a coordinate of 1 and an extruder's word.
+Beyond RS274NGC a % at the start of a line may have a name after it, :1000 is O1000, $ inside a line is a
+letter (M3 $1), and a number may have an exponent with its sign: -8.775e-05; E needs two digits or more, since
+X1E-2 is a coordinate and an extruder's word.
 
-A word takes 13 bytes: letter, value and place in the source. Columns and texts come from the source when a
-message needs them. What cannot be read becomes a word too, with the letter `FAULT` and a code as its value,
-and the rest of its line is left out: nothing disappears silently, and the lines after it are still read.
-
-Numbers are rounded correctly, so a coordinate is the same double as float(text): the digits form an integer
-below 2^53 and the point a power of ten up to 1e22, both exact, and one division of exact numbers rounds once.
-Longer numbers are marked NaN by the compiled loop and read by Python.
+A word takes 13 bytes: letter, value and place in the source. What cannot be read becomes a word too, with the
+letter `FAULT` and a code as its value, and the rest of its line is left out. Numbers are rounded as
+float(text): the digits form an integer below 2^53 and the point a power of ten up to 1e22, both exact, and
+one division rounds once. Longer numbers are marked NaN by the compiled loop and read by Python.
 """
 
 from __future__ import annotations

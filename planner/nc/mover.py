@@ -1,12 +1,5 @@
-"""Motion of blocks: G0 to G3, splines, drilling cycles and threads, with or without cutter radius
-compensation.
-
-G28 and G30: through the intermediate point, if there is one, to the machine's position; and homing by
-switches.
-
-G40, G41, G42, G41.1 and G42.1: the words that switch cutter radius compensation (cutter.py), and what is
-refused while it is on.
-"""
+"""Motion of blocks: G0 to G3, splines, drilling cycles and threads, G28 and G30, homing by switches, and the
+words that switch cutter radius compensation (cutter.py) with what is refused while it is on."""
 
 from __future__ import annotations
 

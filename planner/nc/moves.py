@@ -1,13 +1,9 @@
-"""A line of a program, as codes by modal group and words by letter, and where its words lead: end points,
-centres, arcs, and what G53 and the words of motion codes ask of the state.
+"""A line of a program, as codes by modal group and words by letter, and where its words lead.
 
 A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate
-(G53). I J K are relative to the start (G91.1), or absolute like the coordinates of G90 (G90.1), whatever G90
-and G91 say. In diameter mode (G7) X words are halved; I, K and R stay radii.
-
-A rotated work system turns the plane of an arc with it. An arc in G18 or G19 then lies in a plane of two axes
-only if the rotation is a quarter turn; the record of an arc knows no other planes, and other angles are
-refused there.
+(G53). I J K are relative to the start (G91.1), or absolute (G90.1). In diameter mode (G7) X words are halved;
+I, K and R stay radii. An arc in G18 or G19 lies in a plane of two axes only if the rotation of the work
+system is a quarter turn; other angles are refused there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Codes that set offsets: G10, G43 to G49, G52, G92 to G92.3, G28.1 and G30.1. None of them moves anything.
+"""Codes that set offsets: G10, G43 to G49, G52, G92 to G92.3, G28.1 and G30.1; none of them moves anything.
+And the coordinates of axes beside x, y and z.
 
 With q the position in a work system before G92 is taken off (state.py), a coordinate x is
 
@@ -6,24 +7,13 @@ With q the position in a work system before G92 is taken off (state.py), a coord
 
 and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for
 the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10
-takes coordinates as absolute, whatever G90 and G91 say; a tool's new offset is in force from its next G43 on.
+takes coordinates as absolute, whatever G90 and G91 say. Fanuc's and Haas' G10 L20 P gives the origin of G54.1
+P; what would add after G91 is refused: the flat program (language/flat.py) could not say it.
 
-Fanuc and Haas have it otherwise: G10 L20 P gives the origin of G54.1 P, as G10 L2 does that of G54 to G59.
-After G91 both would add, which is refused: the flat program (language/flat.py) could not say it.
-
-Axes beside x, y and z: rotary A B C in degrees, and U V W, which are linear too, in mm. They are joints: no
-kinematics.
-
-A machine that has one gives its letter to programs. Its coordinates follow the rules of the others, without
-rotation of the work system and without tool offsets:
-
-    machine position = origin of the work system + G92 offset + programmed coordinate
-
-F goes as in RS274NGC: it is the speed of x, y and z together if one of them moves, else that of u, v and w,
-else that of the rotary axes, in degrees per minute. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes in
-absolute mode to the programmed place within a turn, forwards if the number is positive (0 included),
-backwards if it has a minus; after G53 too, where LinuxCNC takes the magnitude of the number less the offsets
-(rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
+Axes beside x, y and z, rotary A B C in degrees and linear U V W in mm, are joints without rotation of the
+work system and tool offsets. F is the speed of x, y and z together if one of them moves, else of u, v and w,
+else of the rotary axes. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes to the absolute place within a
+turn, forwards unless the number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
 """
 
 from __future__ import annotations

@@ -82,12 +82,8 @@ def parse_program(
 def interpret(
     text: bytes | str, machine: Machine | None, reading: Reading = AS_USUAL, *, source: str
 ) -> tuple[Program, Sequence[Fault]]:
-    """Run a program to its end, past everything that is not supported.
-
-    Returns the program and the faults, in the order of the lines.
-
-    Raises InputError for an empty or binary text.
-    """
+    """Run a program to its end, past everything that is not supported. Returns the program and the faults, in
+    the order of the lines. Raises InputError for an empty or binary text."""
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     if are_points(data):
         return read_points(data, source), ()
@@ -113,11 +109,9 @@ def execute(
     source: str,
     tee: Callable[[Words], None] | None = None,
 ) -> tuple[Interpreter, Program, Sequence[Fault]]:
-    """Execute a program once, as `reading` says.
+    """Execute a program once, as `reading` says. Raises InputError if there is no word in it.
 
     tee : gets the expanded rows of a program that computes, chunk by chunk
-
-    Raises InputError if there is no word in it.
     """
     interpreter = Interpreter(machine, source, reading)
     language = detect.language_of(data) if reading.dialect == AUTO else reading.dialect

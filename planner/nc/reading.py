@@ -31,7 +31,8 @@ _SAY = "write G and M codes, rotary or second axes (A B C U V W) or commands of 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Settings of the reader, kept in `Program.reading`.
+    """Settings of the reader, kept in `Program.reading`. Raises InputError for a value that is not one of
+    these.
 
     strict       : refuse everything that would be assumed
     ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands
@@ -44,8 +45,6 @@ class Reading:
                    "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", or "auto", by what the program
                    holds
     block_delete : leave out the lines that start with "/"
-
-    Raises InputError for a value that is not one of these.
     """
 
     strict: bool = False

@@ -1,15 +1,14 @@
 """Codes that set something of the control and move nothing: which they are, and which words of their line are
 theirs.
 
-RS274NGC knows none of them; what a control does with them, nobody can read from the program. So each is an
-`Assumption`, counted in a note, and refused by `--strict`. A line such as `M203 X500 Y500 E5000` or `M73 P50
-R70` has words that look like others: they are the setting's where it stands first on its line.
+RS274NGC knows none of them, so each is an `Assumption`, counted in a note, and refused by `--strict`. If it
+stands first on its line, its own words are
 
-    code                                                  words of its line that are its own, if it stands first
     settings of the axes of a 3-D printer (M92 M201 ...)  all
     M100 to M199, which RS274NGC leaves to each machine   all but X Y Z F T: those move and set as anywhere
     other M codes                                         all; with X Y Z it may be a move, and is refused
-    any of them behind a G code or a coordinate           P and Q
+
+and P and Q behind a G code or a coordinate.
 """
 
 from __future__ import annotations

@@ -74,10 +74,8 @@ class SplineReader:
 
     def read(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
         """The pieces of the curve that ends on this line, and the line where it begins; None where none ends.
-        `blocks` of the program were read before.
-
-        Raises WordFault for words that are missing or contradict each other; an open curve is then given up.
-        """
+        `blocks` of the program were read before. Raises WordFault for words that are missing or contradict
+        each other; an open curve is then given up."""
         code = state.motion
         try:
             if self.open is not None and self.open.blocks != blocks:

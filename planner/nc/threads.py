@@ -1,26 +1,19 @@
-"""Motion in step with the spindle: G33, G33.1 and the threading cycle G76.
+"""Motion in step with the spindle: G33, G33.1 (along the thread and back) and the threading cycle G76.
 
-The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. A plan
-starts and ends at rest: with full stops at both ends of the cut the feed is reached behind the run-in and
-held up to the run-out, whose lengths the machine's acceleration and jerk give (geometry/run_in.py, which
-refuses a cut without room for them; the verdict looks at the feed between). LinuxCNC accelerates in the
-synchronised move, too. G33.1 taps: along the thread and back to its start.
-
-The threading cycle G76: from its words to passes.
-
-G76 cuts a thread on a lathe, from the drive line (x0, z0) to the depth K below the thread's peak at x0 + I,
+The tool advances K (pitch of G33) or P (of G76) along its path in each turn, so that S gives the feed. With
+full stops at both ends of the cut the feed is reached behind the run-in and held up to the run-out
+(geometry/run_in.py). G76 cuts from the drive line (x0, z0) to the depth K below the thread's peak at x0 + I,
 in passes of the depths
 
     d_n = J n^(1/R)  while below K,   then K once and for each of the H spring passes
 
-so that with R = 2 every pass takes the same section of chip. In the direction s = sign(I) of x and t of z,
-pass d is the last pass moved back by K - d, at the compound angle Q along z:
+In the direction s = sign(I) of x and t of z, pass d is the last pass moved back by K - d, at the compound
+angle Q along z:
 
     from  z0 + t d tan Q  to  z1 - t (K - d) tan Q,   cut at x0 + s (|I| + d),   cleared at x0 - s (K - d)
 
 Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the peak line of the pass and its
-depth; on them the pitch along z stays P. Lengths are in programmed units. In diameter mode (G7) I, J and K
-are diameters too.
+depth; on them the pitch along z stays P.
 """
 
 from __future__ import annotations

@@ -1,16 +1,12 @@
-"""The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 switch it on and off on a
-machine with kinematics.
+"""The tool centre point of a program: G43.4 and G49, M428 and M429, M128 and M129 on a machine with
+kinematics.
 
-While it is on, x, y, z of the program are those of the controlled point p of machine/kinematics/chain.py: the
-tool's tip as seen from the workpiece, with the tool's length L in z. While it is off they are the joints q.
-The switch moves nothing: what stands still are the joints. L is the length of the tool offset in force, else
-`tool_length` of the machine file.
-
-The program that is planned is one of p throughout. A move with the switch off is
-
-    the same move of p     where both rotary axes stand at 0, since q = p there
-    its own path in p      for rapid moves elsewhere: a straight line of q, in chords that p leaves by `CHORD_SHARE` of the tolerance
-    refused                for feed moves elsewhere
+While it is on, x, y, z of the program are the controlled point p of machine/kinematics/chain.py: the tool's
+tip as seen from the workpiece, with the tool's length in z (of the tool offset in force, else `tool_length`).
+While it is off they are the joints q. The switch moves nothing. The program that is planned is one of p
+throughout. A move with the switch off is the same move of p where both rotary axes stand at 0; a rapid move
+elsewhere is a straight line of q, in chords that p leaves by `CHORD_SHARE` of the tolerance; a feed move
+elsewhere is refused.
 """
 
 from __future__ import annotations
@@ -132,10 +128,8 @@ class ToolPointSwitch:
 
 def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | None) -> Program:
     """The program as one of the controlled point throughout, if the tool centre point is on somewhere while
-    rotary axes are off 0; else the program itself.
-
-    Raises InputError for feed moves while it is off and a rotary axis is off 0, and for tools of two lengths.
-    """
+    rotary axes are off 0; else the program itself. Raises InputError for feed moves while it is off and a
+    rotary axis is off 0, and for tools of two lengths."""
     on = _where_on(program, switch.switches)
     tilted = _tilted(program, switch.chain)
     moves_on = (on & np.isin(program.kind, MOVES)).any()

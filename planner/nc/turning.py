@@ -1,18 +1,15 @@
-"""Roughing cycles of lathes, G71, G72 and G73: from the profile of a part to the passes that lead to it, as
-Fanuc and Haas have them.
+"""Roughing cycles of lathes, G71, G72 and G73: from the profile of a part to its passes, as Fanuc and Haas
+have them.
 
 Points are complex numbers, z + i x in radii [mm]. The profile leads from A, where the tool stands, to its
-first point and along lines and arcs. Moved by the finishing allowance w + i u / 2 (not offset: its corners
-stay as they are) it is the last pass of every cycle.
+first point and along lines and arcs. Moved by the finishing allowance w + i u / 2 it is the last pass of
+every cycle; all cycles end at A.
 
     G71    passes along z at the levels x = C - n d, n = 1, 2 ..., while they lie outside of the profile's first point; C is A moved
            by the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45
            degrees and goes back fast
     G72    the same with x and z exchanged
     G73    the profile itself, n times, moved by the allowance + (i, k) (n - pass) / (n - 1): from the full (i, k) to nothing
-
-The way to a level and to the first point is fast if the profile's first move is (G0), else at the feed. All
-cycles end at A.
 
 Sources: the formats as Haas describes them (haascnc.com, G71, G73) and Hurco's and Fanuc's programmers'
 manuals (G71 U R, G71 P Q U W).

@@ -1,18 +1,12 @@
 """Writing a program back with other feeds: F words are put in or replaced, every other byte stays as it is.
 
-An F word is modal and is read in the units in force before its line, since F acts before a G20 or G21 beside
-it. One is written where a block's feed is not the one in force, in those units, and where the source has one
-on the block's line its number is replaced. A block that keeps its programmed feed keeps the source's word, or
-gets the programmed feed written out where one of ours is in force. Lines under G93 and G95, and threads, have
-no feed that an F word could plan, and stay. F words on lines without a feed move (alone on a line, beside G0)
-stay, they are what the source says.
+An F word is written where a block's feed is not the one in force, in the units in force before its line,
+since F acts before a G20 or G21 beside it. A block that keeps its programmed feed keeps the source's word, or
+gets it written out where one of ours is in force. Lines under G93 and G95, threads, and F words without a
+feed move stay. A block of rotary axes can be given under G93 instead, by how often it could be run in a
+minute; the next other one has G94 and its feed.
 
-Controls differ in what a feed per minute is where rotary axes move. Such a block can be given under G93
-instead, by how often it could be run in a minute, in every block anew; the first other one after it has G94
-and its feed. A line with a word of its own for the feed mode keeps it.
-
-Numbers are rounded down, so that no feed is above the one asked for, to `SIGNIFICANT` digits: each move then
-takes up to 0.1 % longer than asked.
+Numbers are rounded down to `SIGNIFICANT` digits: each move takes up to 0.1 % longer than asked.
 """
 
 from __future__ import annotations
@@ -44,15 +38,14 @@ Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the 
 
 
 def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatArray | None = None) -> bytes:
-    """The program `source` with new feeds.
+    """The program `source` with new feeds. Raises ValueError if the lines of `program` are not those of
+    `source`, or a feed is negative.
 
     program : what the reader made of `source`, with the settings that it was read with
     feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed
               is never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
     inverse : (B,) how often a block could be run in a minute, to be written under G93; NaN for blocks with a
               feed
-
-    Raises ValueError if the lines of `program` are not those of `source`, or a feed is negative.
     """
     alone = extruder_alone(program)  # keeps its feed, written out where one of ours is in force
     moving = np.flatnonzero(np.isin(program.kind, FEED_MOVES) | alone)

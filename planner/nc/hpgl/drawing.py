@@ -1,27 +1,17 @@
-"""The blocks and events of a drawing while it is read; `finish` makes the record.
+"""The blocks and events of a drawing while it is read, its user units, and circles through three points.
 
 The pen is an event with a full stop, because it takes its time to rise and to fall: M3 down, M5 up, T a pen
-from the carousel. The numbers are those of NC programs, so that the same drives, files and reports know them.
-
-The circle through three points, for AT and RT.
-
-With a = through - start and b = end - start the centre is start + c,
+from the carousel. With a = through - start and b = end - start the centre of AT and RT is start + c,
 
     c = ( (b_y |a|^2 - a_y |b|^2),  (a_x |b|^2 - b_x |a|^2) ) / (2 (a_x b_y - a_y b_x)),
 
-and the arc turns left where a x b > 0.
-
-User units of a plotter file (IP and SC): how coordinates become plotter units.
-
-IP gives the scaling points P1 and P2 in plotter units; SC the user coordinates that they shall have:
+and the arc turns left where a x b > 0. IP gives the scaling points P1 and P2 in plotter units, SC their user
+coordinates:
 
     SC xmin,xmax,ymin,ymax                     each axis by itself
     SC xmin,xmax,ymin,ymax,1[,left,bottom]     both axes alike, the smaller factor; what is left over lies to the left and
                                                below, in percent (50 each without the last two numbers)
     SC xmin,xfactor,ymin,yfactor,2             P1 and plotter units per user unit
-
-Without IP the scaling points depend on the paper in the plotter, which a file does not know: SC is then
-refused.
 """
 
 from __future__ import annotations
@@ -139,11 +129,8 @@ ON_A_LINE = 1e-9
 
 def circle_through(start: Point, through: Point, end: Point) -> tuple[Point, float] | None:
     """Centre [mm] and sweep [rad], counter-clockwise positive, of the arc from `start` through `through` to
-    `end`.
-
-    A full circle over the diameter start - through where the end is the start; None where the points are on a
-    line.
-    """
+    `end`. A full circle over the diameter start - through where the end is the start; None where the points
+    are on a line."""
     ax, ay = through[0] - start[0], through[1] - start[1]
     bx, by = end[0] - start[0], end[1] - start[1]
     a, b = math.hypot(ax, ay), math.hypot(bx, by)

@@ -1,20 +1,14 @@
-"""The instructions of HP-GL and HP-GL/2: which are read, which change nothing in the path, and which are
-refused with what to do.
+"""The instructions of HP-GL and HP-GL/2: how they are written, which change nothing in the path, and which
+are refused.
 
-A plotter leaves out instructions that it does not know. Here they are left out too, and counted in a note; of
-those that HP's plotters know, none that could change the path is left out: it is read, or ignored with a
-note, or a fault.
+Instructions that HP's plotters know and that could change the path are read, or ignored with a note, or a
+fault; others are left out and counted.
 
-From bytes to instructions, as plotters read them: two letters and numbers.
+    instruction = letter letter [number (separator number)*] [terminator]       number = [+|-] digits [. digits]
+    separator   = comma or white space, or nothing before a sign               terminator = ; or the next instruction
 
-    instruction = letter letter [number (separator number)*] [terminator]
-    number      = [+|-] digits [. digits]
-    separator   = comma or white space, or nothing before a sign
-    terminator  = ; or the letters of the next instruction
-
-Lines mean nothing. Between instructions may stand device control (ESC . letter), the frame of printers (ESC
-%, @PJL lines) and, at the end, characters that are no instruction; they are left out with a note. Small
-letters are read as capitals.
+Between instructions may stand device control (ESC . letter), the frame of printers (ESC %, @PJL lines) and,
+at the end, characters that are no instruction; they are left out with a note.
 """
 
 from __future__ import annotations

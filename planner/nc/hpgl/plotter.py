@@ -1,16 +1,10 @@
 """Executing the instructions of a plotter file: where the pen goes, at which speed, and when it rises and
 falls.
 
-    position [mm] = plotter units * unit                                  without SC
-                  = (P1 + (user - user_min) * (P2 - P1) / (user_max - user_min)) * unit     with SC
-
 The plotter unit is 0.025 mm unless the machine file says otherwise. Pen up the plotter moves as fast as it
-can (rapids), pen down at VS, in cm/s; without VS at the limits of its axes. Where the pen rises or falls it
-stands still for as long as the machine file says. A pen is changed with the pen up; afterwards it is down
-again if it was. CI and EA lower the pen for what they draw and leave pen and position as they found them. A
-file starts at (0, 0) with the pen up, without scaling, in absolute coordinates.
-
-A fault is recorded and reading goes on with the next instruction, so that `info` can show them all.
+can, pen down at VS, in cm/s, without VS at the limits of its axes. A pen is changed with the pen up; CI and
+EA leave pen and position as they found them. A file starts at (0, 0) with the pen up, without scaling, in
+absolute coordinates. A fault is recorded and reading goes on, so that `info` can show them all.
 """
 
 from __future__ import annotations
@@ -65,10 +59,8 @@ class _NotDrawn(Exception):
 def read_drawing(
     data: bytes, machine: Machine | None, source: str, reading: Reading = AS_USUAL
 ) -> tuple[Program, Sequence[Fault]]:
-    """Read a plotter file past everything that is not supported; the faults in the order of the file.
-
-    Raises InputError for a file without any instruction.
-    """
+    """Read a plotter file past everything that is not supported; the faults in the order of the file. Raises
+    InputError for a file without any instruction."""
     run = _Run(data, machine, reading)
     found = 0
     for instruction in instructions(data, run.report, run.note):
@@ -109,8 +101,6 @@ class _Run:
         self.scaling = Scaling()
         self.absolute = True
         self.speed, self.speed_of_pen = math.inf, dict[int, float]()
-
-    # --- what is said about it
 
     def report(self, at: int, end: int, message: str) -> None:
         self.reports.append((at, end, message))
@@ -160,8 +150,6 @@ class _Run:
         """Line and column of a byte, from 1."""
         line = bisect_left(self._line_ends, at)
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
-
-    # --- instructions
 
     def execute(self, it: Instruction) -> None:
         try:
@@ -284,8 +272,6 @@ class _Run:
             self.speed_of_pen[round(numbers[1])] = speed
         else:
             self.speed, self.speed_of_pen = speed, {}
-
-    # --- what the pen does
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
         """Where user coordinates lead [mm]."""

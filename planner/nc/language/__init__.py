@@ -1,18 +1,11 @@
 """Programs that compute: parameters, expressions, loops, branches and subprograms, expanded into rows of
 words.
 
-In reading order:
-
-    tree        what a program says: expressions and statements, in no language's spelling
-    compiled    statements to Python source, compiled once: `expressions` (and operators that all dialects have) in basic blocks
-    rows        what the running program appends: row after row, given to the interpreter in chunks
-    run         the running program: its parameters, calls and limits
-    system_variables  parameters that hold the state of the control
-    expression_reader  expressions by the ranks of their operators, for all dialects;  spelling: as RS274NGC and Fanuc write them
-    linuxcnc, fanuc, heidenhain, siemens    a folder for each dialect: its text to statements
-    source      the lines of a program: which are plain words, which belong to the language
-    expand      a program through all of this;  flat: the expanded program as text
-
-A language is a parser that makes a `tree.Program` and a `tree.Language` that says what its operators and
-parameters mean; `compiled`, `rows` and `run` know no language.
+    tree, expression_reader, spelling    what a program says, in no language's spelling; expressions, and how RS274NGC writes them
+    linuxcnc, fanuc, heidenhain, siemens a folder for each dialect: its text to statements and a `tree.Language`
+    source, detect                       which lines are plain words, which belong to a language
+    expressions, compiled, run, rows     statements to Python source, the running program, the rows that it appends
+    making, makers, milling              rows that Python makes while it runs
+    rows_through, travel, corner_moves, approach    frames, compensation and corners on the rows' way to the interpreter
+    expand, flat                         a program through all of this; the expanded program as text
 """

@@ -1,19 +1,15 @@
 """APPR and DEP: approach to a contour and departure from it.
 
 With the first contour point A, the unit tangent t of the first move there, and n the unit normal of t towards
-the tool's side, the tool's centre begins the contour at C = A + r n (r: radius of the tool). It comes from
-where it is straight to H, and from H to C
+the tool's side, the tool's centre begins the contour at C = A + r n. It comes straight to H, and from H to C
 
     LT    along the tangent          H = C - LEN t
     LN    along the normal           H = C + LEN n
     CT    on an arc of radius R      H: the angle CCA before C on the circle about M = C + R n; R < 0 puts M on the other side
     LCT   on an arc of radius R      H: where a line from where the tool is touches that circle
 
-Departure is the same, backwards, from the last contour point with the tangent of the last move. All of it in
-the plane; the coordinate along the tool axis changes at H (approach) or at the end (departure): so manuals up
-to TNC 640 have it, later ones move all axes at once.
-
-R is that of the tool's centre: the manuals' examples approach with R5 and a tool of radius 10.
+R is that of the tool's centre. Departure is the same, backwards. The coordinate along the tool axis changes
+at H (approach) or at the end (departure): so manuals up to TNC 640 have it, later ones move all axes at once.
 """
 
 from __future__ import annotations
@@ -70,12 +66,11 @@ class ContourWay:
         self, contour: complex, tangent: complex, normal: complex, other: complex
     ) -> tuple[complex, complex, int]:
         """The far end of the arc at a contour point, its centre, and its direction (1 counter-clockwise).
+        Raises ValueError if the line's other end is inside the circle.
 
         tangent : at the contour point, along the path
         normal  : towards the side of the tool
         other   : where the line comes from (LCT)
-
-        Raises ValueError if the line's other end is inside the circle.
         """  # fmt: skip
         radius = self.radius * self.scale
         centre = contour + radius * normal

@@ -1,14 +1,9 @@
 """Statements to Python source, compiled once: a loop of a million turns runs as Python's own code.
 
-Structured statements and jumps become the same thing: basic blocks, functions inside that of their
-procedure, which return the number of the block that is next. So loops may be nested as deep as one likes
-(Python allows 20). A loop asks its condition at the end of its turn, in the block of its body: a turn of a
-simple loop is one block.
-
-A line of the Python source belongs to a statement, so that an error of Python's arithmetic is told as the
-statement's.
-
-Loops are bounded while they run (run.py).
+Structured statements and jumps become basic blocks, functions inside that of their procedure, which return
+the number of the block that is next; so loops may be nested as deep as one likes (Python allows 20). A loop
+asks its condition in the block of its body, at its end. A line of the Python source belongs to a statement,
+so that an error of Python's arithmetic is told as the statement's.
 """
 
 from __future__ import annotations
@@ -55,11 +50,10 @@ class Compiled:
 def compile_procedures(
     procedures: Sequence[tree.Procedure], language: tree.Language, rows: AppendedRows, marker: str
 ) -> Compiled:
-    """Compile procedures; the rows that they append are added to `rows`.
+    """Compile procedures; the rows that they append are added to `rows`. Raises ProgramFault for a jump that
+    leads nowhere.
 
     marker : stands for a file name in tracebacks
-
-    Raises ProgramFault for a jump that leads nowhere.
     """
     found = Compiled()
     text: list[str] = []
@@ -93,8 +87,6 @@ class _Function:
         self._body(self.procedure.body)
         lines = self.blocks.source(place)
         return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *lines, (" return L.get(0)", place)]
-
-    # --- statements
 
     def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:

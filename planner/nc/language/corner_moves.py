@@ -1,20 +1,14 @@
-"""A rounding or chamfer between two moves of a contour.
+"""A rounding or chamfer between two moves of a contour, and cutter radius compensation as Heidenhain and
+Siemens (NORM, G450) have it, on the geometry of `planner.nc.cutter`.
 
-The rounding of radius R touches both moves: its centre lies on both, moved by R to the side to which the
-contour turns (`offset_lines.meeting`), and each move ends or begins at the foot of the centre on it. A
-chamfer is cut between straight moves only; it lies
+The centre of a rounding lies on both moves, moved by R to the side to which the contour turns, and each move
+ends or begins at its foot on it. A chamfer between straight moves lies CHR from the corner on both, or CHF /
+(2 cos(turn / 2)), so that it is itself CHF long.
 
-    CHR    the given distance from the corner on both moves
-    CHF    such that it is itself as long as given: length / (2 cos(turn / 2)) from the corner on both
-
-Cutter radius compensation as Heidenhain and Siemens (NORM, G450) have it, on the geometry of
-`planner.nc.cutter`.
-
-The first move leads straight to the place beside its programmed end, normal to the move after it; the contour
-then runs beside the programmed one, with arcs about outer corners and intersections at inner ones, and ends
-normal to its last move. The move behind it leads straight from there to its programmed end. So the first move
-waits for the next one in the plane; all others are given out at the end, since a corner moves the end of the
-move before it.
+The first compensated move leads straight to the place beside its programmed end, normal to the move after it;
+the contour then runs beside the programmed one and ends normal to its last move. So the first move waits for
+the next one in the plane; all others are given out at the end, since a corner moves the end of the move
+before it.
 """
 
 from __future__ import annotations

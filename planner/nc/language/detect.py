@@ -1,20 +1,10 @@
 """The language of a text, by what only programs in it contain; and files that are no programs at all.
 
-A program that computes nothing is told from the words that the lexer has made, without looking at its text.
-
-LinuxCNC's are O words with a keyword and named parameters. Fanuc's are GOTO, IF [ without an O word, WHILE [
-with DO, G65, G66, M98, M99, and sums without brackets behind an equals sign. Parameters and brackets alone
-belong to both and are read as LinuxCNC's.
-
-Conversational Heidenhain programs and Siemens programs with their commands and assignments are read by
-`planner.nc.language`, plotter files (HPGL) by `planner.nc.hpgl`. The marks below occur in no RS274NGC program
-outside comments.
-
-Text before the first % of a program: names of parts, lists of tools, what a serial line needed. Controls skip
-it.
-
-It is skipped here too where it cannot be a program: some line of it is no words, and no line that is words
-has a code or a coordinate. Parameters and expressions (# [ < =) are no such text.
+A program that computes nothing is told from the words that the lexer has made. LinuxCNC's are O words with a
+keyword and named parameters; Fanuc's GOTO, IF [ without an O word, WHILE [ with DO, G65, G66, M97, M98, M99,
+and sums without brackets behind an equals sign; parameters and brackets alone are read as LinuxCNC's. Text
+before the first % is skipped where it cannot be a program: some line of it is no words, and no line that is
+words has a code or a coordinate.
 """
 
 from __future__ import annotations
@@ -159,10 +149,7 @@ _DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 def without_leader(data: bytes) -> tuple[bytes, str]:
     """The program with blanks for the text before its first %, and the beginning of that text; ("" where
-    there is none).
-
-    Offsets and lines stay as they are.
-    """
+    there is none). Offsets and lines stay as they are."""
     match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
     text = data[: match.start()] if match else b""
     if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
@@ -216,11 +203,9 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
 
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
     """True if a program, found to be of that dialect, is one for a Fanuc or Haas lathe. `[dialect] lathe` of
-    the machine decides.
-
-    Otherwise it has no Y and V, and U or W (where these are no axes of the machine) beside X and Z, a cycle
-    G70 to G73 with P and Q, a G76 with K and D, or another sign of a lathe (`_has_signs`).
-    """
+    the machine decides. Otherwise it has no Y and V, and U or W (where these are no axes of the machine)
+    beside X and Z, a cycle G70 to G73 with P and Q, a G76 with K and D, or another sign of a lathe
+    (`_has_signs`)."""
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
     if dialect == LINUXCNC and any(

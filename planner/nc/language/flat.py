@@ -76,10 +76,8 @@ def flat_number(value: float) -> str:
 def flat_program(
     data: bytes, machine: Machine | None, reading: Reading, *, source: str
 ) -> tuple[str, Program] | None:
-    """The text of an expanded program and the program itself; None if it has nothing to expand.
-
-    Raises InputError for the first construct that is not supported or not valid.
-    """
+    """The text of an expanded program and the program itself; None if it has nothing to expand. Raises
+    InputError for the first construct that is not supported or not valid."""
     program, faults = interpret(data, machine, reading, source=source)
     require_none(faults, source)
     if program.expansion is None:

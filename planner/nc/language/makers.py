@@ -1,23 +1,13 @@
-"""The makers of rows by their names in `tree.MadeRows`.
-
-Programmed frames: shifts, rotations, mirror images and scales.
+"""The makers of rows by their names in `tree.MadeRows`; here those of frames, compensation and arcs.
 
 Siemens: TRANS, ROT, SCALE and MIRROR replace the frame, ATRANS, AROT, ASCALE and AMIRROR add to it in the
-coordinates in force,
-
-    p -> A (B p + b) + t      from      p -> A p + t.
-
-Heidenhain: cycles 7, 8, 10, 11 and 26 each set one part of
+coordinates in force. Heidenhain: cycles 7, 8, 10, 11 and 26 each set one part of
 
     p -> d + R D M p + (c - D c),
 
-d the datum shift, M the mirror image, D the scale (about c), R the rotation about the datum. In which order
-the parts act is not documented in what could be read; what depends on it is refused: a mirror image or a
-scale of single axes together with a rotation, and a datum shift (other than back to 0) while one of the
-others is in force.
-
-Where the frame is a shift alone it becomes a G52; else the rows are written in the coordinates of the work
-system (`travel`).
+d the datum shift, M the mirror image, D the scale (about c), R the rotation about the datum. What depends on
+their order, which is not documented, is refused. A shift alone becomes a G52; else the rows are written in
+the coordinates of the work system (`travel`).
 """
 
 from __future__ import annotations

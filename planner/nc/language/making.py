@@ -1,16 +1,9 @@
-"""Makers of rows.
+"""Makers of rows: functions of the running program's state and the values of a command that give rows of
+words, in the program's coordinates and units, each a list of letters and numbers, and raise ValueError for
+values that make no sense.
 
-A maker is a function of the running program's state and the values of a command; it gives rows of words in
-the program's coordinates and units, each a list of letters and numbers, and raises ValueError for values that
-make no sense.
-
-What programs of the languages mean that is planned otherwise, and may change geometry or time: sentences that
-are said first, by the names under which statements carry them (`assumed_row`).
-
-Makers of several dialects share the holes below: tapping, pecking with decreasing infeeds, and bores that are
-milled. Tapping goes in and out at the feed lead * speed of the spindle, with a full stop at the bottom, where
-the spindle turns round. It is planned with that feed as its upper limit, not in step with the spindle; a note
-says so.
+Also sentences that are said first (`assumed_row`), and holes of several dialects: tapping at lead times speed
+as upper limit, with a full stop where the spindle turns round, pecking with decreasing infeeds, milled bores.
 """
 
 from __future__ import annotations

@@ -1,23 +1,14 @@
 """Pockets and slots as rows: depth passes, paths from inside to outside, plunging, finishing.
 
-Roughing divides the depth, less the allowance at the bottom, into equal passes; each plunges where the core
-begins and clears the pocket from inside to outside up to the allowance at the walls. Finishing runs along the
-walls, which it meets and leaves on quarter circles, and clears the bottom in one pass.
+Roughing divides the depth into equal passes; each plunges where the core begins and clears the pocket up to
+the allowance at the walls. Finishing runs along the walls, which it meets and leaves on quarter circles, and
+clears the bottom in one pass. Manuals tell this; the single paths are this reader's own.
 
-Manuals tell the dimensions, the passes and that pockets are cut from inside to outside; the single paths are
-this reader's own. Two paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t
-inside the outer path, is t from its sides and (s - t) sqrt(2) from the inner corner; both are more than the
-tool's radius r somewhere if s > (1 + 1/sqrt(2)) r. So that is the most.
-
-Paths are complex numbers in the plane of the pocket; shapes give closed ones at equal distances from the
-walls:
-
-    RoundedRectangle    also circles (both halves equal to the corner radius) and straight slots (corner radius half the width)
-    ArcSlot             a slot along an arc
-
-`loop(d)` is the path at the distance d from the walls, 0 <= d < room; what is left at d = room is a line or
-an arc, the `core`, or a point. A tool of radius r whose centre runs along `loop(r)` touches all walls and
-cuts none of them, where corners have a radius of at least r.
+Paths are complex numbers in the plane of the pocket. `loop(d)` of a shape is the closed path at the distance
+d from the walls, 0 <= d < room; what is left at d = room is a line or an arc, the `core`, or a point. Two
+paths s apart have corners s sqrt(2) apart. A point between them on the diagonal, t inside the outer path, is
+t from its sides and (s - t) sqrt(2) from the inner corner; both are more than the tool's radius r somewhere
+if s > (1 + 1/sqrt(2)) r. So that is the most.
 """
 
 from __future__ import annotations
@@ -136,12 +127,11 @@ def backwards(start: complex, legs: list[Leg]) -> list[Leg]:
 
 
 def loops(shape: PocketShape, outermost: float, step: float, turning: int) -> list[Path]:
-    """The core and the closed paths from inside to outside that clear a pocket.
+    """The core and the closed paths from inside to outside that clear a pocket. Raises ValueError if the
+    pocket is too narrow for the tool.
 
     outermost : distance of the last path from the walls: the tool's radius and the allowance
     step      : most between two paths
-
-    Raises ValueError if the pocket is too narrow for the tool.
     """
     width = shape.room - outermost
     if width < -_SHORT * shape.room:
@@ -162,10 +152,7 @@ RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
 
 @dataclass(frozen=True)
 class PocketPlan:
-    """How a pocket is cut; lengths in the program's unit, feeds per minute.
-
-    feed, plunge_feed, finish_feed
-    """
+    """How a pocket is cut; lengths in the program's unit, feeds per minute."""
 
     # clear, top, bottom and retract: z of the clearance, the surface, the bottom, and the end
     clear: float

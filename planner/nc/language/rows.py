@@ -82,10 +82,7 @@ class AppendedRows:
 
     def take(self) -> Words:
         """All pending rows as words, which are then no longer pending. A computed value of NaN was vacant:
-        its word is left out.
-
-        Raises NotFinite if a computed value is infinite.
-        """
+        its word is left out. Raises NotFinite if a computed value is infinite."""
         tables = self._tables_now()
         entries = np.array(self.pending, dtype=np.int64)
         at_entry, frame = np.array(self.frames, dtype=np.int64).T

@@ -1,16 +1,9 @@
-"""Between the rows of a program and the interpreter: the programmed frame, and radius compensation as
-Heidenhain and Siemens have it.
+"""Between the rows of a program and the interpreter: the programmed frame q = A p + t in the coordinates of
+the work system, and radius compensation as Heidenhain and Siemens have it.
 
-A point p of the program is at
-
-    q = A p + t,      A (3, 3), t (3,),
-
-in the coordinates of the work system. Arcs stay arcs where A turns, mirrors and scales their plane evenly;
-where it mirrors the plane, their direction and the side of compensation change. Rows come out with absolute
-coordinates (G90), with centres as I J K, so that the expanded program needs neither frames nor compensation.
-Rows that only switch something pass.
-
-With no frame and no compensation in force rows pass as they are. All lengths here are in mm.
+Arcs stay arcs where A turns, mirrors and scales their plane evenly; where it mirrors the plane, their
+direction and the side of compensation change. Rows come out absolute (G90), with centres as I J K, so that
+the expanded program needs neither frames nor compensation. With none in force rows pass as they are.
 """
 
 from __future__ import annotations
@@ -67,8 +60,6 @@ class RowsThrough(travel_rows.Coordinates):
     def compensated(self) -> bool:
         """True if compensation is on, or waits for its approach."""
         return self._offset is not None or self._approach is not None
-
-    # --- rows
 
     def through(self, words: Words) -> Iterator[Words]:
         """The rows to execute instead, in pieces that are executed one by one. Raises ProgramFault."""
@@ -228,8 +219,6 @@ class RowsThrough(travel_rows.Coordinates):
             self._approach = None
         rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
         out += [self._in_units(one) for one in rows]
-
-    # --- inside
 
     def _no_corner(self) -> None:
         waits = self._corner or self._coming

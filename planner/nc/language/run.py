@@ -116,8 +116,6 @@ class ProgramRun:
         for name, function in compiled.functions.items():
             self.functions.setdefault(name, function)
 
-    # --- what the compiled program calls
-
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
         if self.rows.pending:
@@ -279,8 +277,6 @@ class ProgramRun:
         label, self.resume = self.resume, None
         assert label is not None
         return label
-
-    # --- inside
 
     def _number(self, index: float) -> int:
         number = whole(index)

@@ -129,8 +129,6 @@ class LineReader(ExpressionReader):
         self.at = match.end()
         return name
 
-    # --- values
-
     def number(self) -> float | None:
         """The number that comes next, without a sign, or None."""
         match = _NUMBER.match(self.text, self.at)
@@ -207,8 +205,6 @@ class LineReader(ExpressionReader):
 
     def skip(self, operator: str) -> None:
         self.at += len(operator)
-
-    # --- words
 
     def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
         """Words and assignments up to the end of the line; lengths without a point count `scale`."""

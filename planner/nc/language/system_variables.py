@@ -50,8 +50,6 @@ class SystemVariables:
             f"parameter #{number} belongs to the control and is only read here; write G10, G92, G28.1 or a tool change instead"
         )
 
-    # --- the state, as numbers
-
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
         state = self.interpreter.state
@@ -125,9 +123,6 @@ class SystemVariables:
             if code is not None:
                 rows.append([("M", code)])
         return tuple(tuple(row) for row in rows)
-
-
-# --- LinuxCNC
 
 
 def _motion_mode(motion: int) -> float:
@@ -246,9 +241,6 @@ class LinuxcncVariables(SystemVariables):
         if isinstance(parameter, str):
             return _LINUXCNC_NAMES[parameter](self)
         return _linuxcnc_number(self, parameter)
-
-
-# --- Fanuc
 
 
 class FanucVariables(SystemVariables):

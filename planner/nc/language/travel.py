@@ -42,10 +42,7 @@ class Travel(RowsThrough):
 
     def compensate(self, side: int, assume: Callable[[str], None]) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what
-        is assumed.
-
-        Raises ValueError.
-        """
+        is assumed. Raises ValueError."""
         self._no_corner()
         if side == 0:
             if self._approach is not None:

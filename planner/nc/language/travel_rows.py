@@ -204,12 +204,10 @@ class Coordinates:
     def arc(
         self, start: FloatArray, end: FloatArray, given: Mapping[int, float], clockwise: bool, unit: float
     ) -> Arc:
-        """The arc of a row in the work system.
+        """The arc of a row in the work system. Raises ValueError for one that does not close.
 
         start, end : (3,) in the program's coordinates
         given      : lengths and turns by letter code
-
-        Raises ValueError for one that does not close.
         """
         self.check_even()
         if RADIUS not in given and not set(CENTRES) & set(given):

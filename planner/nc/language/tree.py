@@ -21,9 +21,6 @@ class SourcePlace(NamedTuple):
     at: int
 
 
-# --- expressions
-
-
 class Value:
     """An expression; + - * / of two of them are operations, computed here where both are numbers."""
 
@@ -94,9 +91,6 @@ NEGATIVE = "-"
 def op(name: str, *operands: Value) -> Operation:
     """An operation of the language."""
     return Operation(name, operands)  # type: ignore[arg-type]
-
-
-# --- statements
 
 
 class PlainRows(NamedTuple):

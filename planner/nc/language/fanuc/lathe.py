@@ -1,12 +1,5 @@
-"""Cycles of Fanuc's and Haas' lathes as statements (their words: lathe_words.py).
-
-    G70             the profile P to Q, then back to where the tool was
-    G71 G72 G73     roughing (nc/turning.py) of the profile P to Q; then the blocks of the profile are passed over
-    G76             thread of many passes (nc/lathe_cuts.py)
-
-Both formats of the cycles are read: two blocks, G71 U R and G71 P Q U W (Fanuc; G72 W R, G73 U W R, G76 P Q
-R), and one, G71 P Q U W I K D (Haas; G73 I K D, G76 K D A I Q). Lengths of G76, and D, are in least
-increments (0.001 mm, 0.0001 inch) where they have no point.
+"""Cycles of Fanuc's and Haas' lathes with a profile, G70 to G73, and G76, as statements (docs/language.md,
+"Lathes").
 
 A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles.py) and G70 runs to cut it.
 """
@@ -82,8 +75,6 @@ class LatheParser(LatheWords):
             procedures[0].body.insert(after, row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
-    # --- profiles
-
     def _line(self, line: SourceLine) -> None:
         match = _NUMBER.match(line.text.replace(" ", ""))
         number = int(match.group(1)) if match else -1
@@ -101,8 +92,6 @@ class LatheParser(LatheWords):
                 self.profiles[pair] = (self.body, first, len(self.body))
         if ended:
             self.body.append(Label(line.place, _AFTER + number))
-
-    # --- cycles
 
     def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"

@@ -62,8 +62,6 @@ class LatheCycles:
         self._start = self._state.programmed().copy()
         return []
 
-    # --- the profile
-
     def _begin(self, making: Making, given: Given) -> Iterable[Row]:
         """The blocks that follow are read aside."""
         if self._aside is not None:
@@ -99,8 +97,6 @@ class LatheCycles:
     @staticmethod
     def _point(position: np.ndarray) -> complex:
         return complex(position[2], position[0])
-
-    # --- cycles
 
     def _removal(self, making: Making, given: Given, *, cycle: str) -> Iterable[Row]:
         contour, unit = self._contour(), self._unit
@@ -180,8 +176,6 @@ class LatheCycles:
         """The place of X and Z; the start's where they are not given."""
         x = given["X"] / self._of_radius * self._unit if "X" in given else start.imag
         return complex(given["Z"] * self._unit if "Z" in given else start.real, x)
-
-    # --- rows
 
     @property
     def _state(self) -> State:

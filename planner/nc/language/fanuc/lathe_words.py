@@ -1,22 +1,9 @@
-"""Cycles of Fanuc's and Haas' lathes without a profile, as statements (their moves: nc/lathe_cuts.py).
+"""Words of Fanuc's and Haas' lathes (G code system A) as those of LinuxCNC's lathes, and cycles without a
+profile (docs/language.md, "Lathes"; their moves: nc/lathe_cuts.py).
 
-G90 G92 G94     turning, thread, facing in one cut: X Z (U W) and a taper R (Haas: I; K of G94). They hold until another motion:
-                each further line with X, Z, U or W is a cut, with the words that it does not give as they
-                were
-G74 G75         pecking along z and x: G74 R(retract) and G74 X Z P(shift) Q(peck) R(relief) F, and in one block
-                G74 X Z I(shift) K(peck) D(relief) F; in G75 the P or I is the peck and the Q or K the shift.
-                P and Q are in least increments (0.001 mm, 0.0001 inch) where they have no point
-
-Words of Fanuc's and Haas' lathes (G code system A) as those of LinuxCNC's lathes.
-
-    X, U            diameters (G7), in the plane G18;  U W: X and Z from where the tool is;  H: refused unless 0
-    G98 G99         feed per minute and per turn (G94, G95)
-    G32             thread of the lead F (G33 K)
-    G50 S           largest spindle speed (D of G96);  G96 G97 S
-    G4 X U          dwell in seconds
-    T0203           tool 2 with the offset 3 of the machine file (T2 M6, G43 H3); T0200 without one (G49); a full stop
-
-Refused: drilling cycles, G50 with coordinates.
+U W become X and Z from where the tool is, G98 G99 feeds per minute and per turn (G94, G95), G32 a thread G33
+K, G50 S the D of G96, G4 X U a dwell, T0203 rows of its own (T2 M6, G43 H3; T0200 G49). Drilling cycles and
+G50 with coordinates are refused.
 """
 
 from __future__ import annotations

@@ -1,12 +1,5 @@
-"""Macros of Fanuc and Haas as statements.
-
-    O1000 ... M99          a subprogram, in the same file; the first program of the file is the main one
-    M98 P1000 L3           call it three times (also P31000: the last four digits are its number); parameters are the caller's
-    G65 P1000 A1. B2.      call it with parameters of its own: A is #1, B #2, C #3, I #4 ... as Fanuc numbers them
-    G66 P1000 A1. ... G67  call it after every line between them that moves
-    M97 P100               call what begins at N100 of this program (Haas)
-    M99, M99 P200          return, to N200 of the caller
-    IF [c] GOTO 10, IF [c] THEN #1=2, WHILE [c] DO 1 ... END 1, GOTO 10, GOTO #1
+"""Macros of Fanuc and Haas as statements: O1000 ... M99, M98 P1000 L3 (P31000), G65, G66 ... G67, M97 P100
+(Haas), M99 P200, and IF, THEN, WHILE, GOTO.
 
 #1 to #33 are a call's own. A parameter without a value (#0, or one never assigned) counts as 0 in sums,
 differs from 0 for EQ and NE, and a word with such a value is left out. The right side of an assignment needs
@@ -93,8 +86,6 @@ class FanucParser(FanucControl):
         elif all(known.name != name for known in self.procedures):
             self.procedures.append(tree.Procedure(name, procedure.body[at].place, procedure.body[at:]))
 
-    # --- lines
-
     def _plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement, used labels between them, and G66 calls after those that move."""
         if self.targets == frozenset() and self.modal is None:
@@ -162,8 +153,6 @@ class FanucParser(FanucControl):
             if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
                 self.body.append(tree.Message(line.place, (text,)))
 
-    # --- IF, WHILE, GOTO
-
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         if keyword == "GOTO":
             self.body.append(tree.Goto(line.place, reader.value()))
@@ -196,8 +185,6 @@ class FanucParser(FanucControl):
         else:
             raise reader.refused("IF [condition] is followed by GOTO or THEN", at)
         self.body.append(tree.If(line.place, ((condition, body),), []))
-
-    # --- words and calls
 
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = [word.code for word in words]

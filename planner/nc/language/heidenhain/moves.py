@@ -1,21 +1,12 @@
-"""Path functions as rows of words: L, C, CR, CT, LP, CP. Roundings RND and chamfers CHF are made where the
-rows pass (`corner_moves`).
+"""Path functions as rows of words: L, C, CR, CT, LP, CP. (Roundings and chamfers: `corner_moves`.)
 
-The position (_x, _y, _z), the pole (_cx, _cy, _cz) and the normal of its plane (_plane), the last polar
-coordinates (_pr, _pa) and the direction of the last move in x and y (_dx, _dy) are variables of the running
-program, since coordinates may be computed and incremental. Rows carry absolute coordinates.
+The position, the pole and the normal of its plane, the last polar coordinates and the direction of the last
+move are variables of the running program, since coordinates may be computed and incremental. Rows carry
+absolute coordinates. PA counts from +X, +Y or +Z to the other axis of the pole's plane; arcs about it lie in
+that plane, DR+ as G3 in G17, G19 and G18 (TNC 640, conversational programming, polar coordinates).
 
-A pole lies in X/Y, Y/Z or Z/X, as its block names the axes, and PA counts from +X, +Y or +Z to the other
-axis. Arcs about it, C and CP, lie in its plane, DR+ from the first axis to the second one, as G3 has it in
-G17, G19 and G18. (TNC 640, conversational programming, polar coordinates: pole and angle reference axis.) A
-program that has poles in other planes than X/Y asks for the plane while it runs.
-
-CT's centre lies on the normal n of the direction at the start, at
-
-    radius = |v|^2 / (2 n v),      v from start to end; positive to the left, where the arc turns counter-clockwise.
-
-Behind CR, whose centre is not computed here, the direction is that of the moves that were executed
-(`makers.tangent_arc`).
+CT's centre lies on the normal n of the direction at the start, at radius = |v|^2 / (2 n v), v from start to
+end; behind CR the direction is that of the moves that were executed (`makers.tangent_arc`).
 """
 
 from __future__ import annotations

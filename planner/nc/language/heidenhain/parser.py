@@ -1,18 +1,7 @@
-"""A conversational program as statements.
-
-    BEGIN PGM .. MM|INCH    TOOL CALL n Z S F    L C CC CR CT LP CP CTP RND CHF    LBL, CALL LBL [REP], CALL PGM    Q1 = .., FN 0-14
-    RL RR R0, APPR, DEP (`contour`)    CYCL DEF 7 8 10 11 26, TRANS DATUM (`contour`)    9 (dwell) 32 (tolerance)
-    CYCL DEF 1 200 to 209, 220 221 240, 251 to 254 (`cycles`)    CYCL CALL [POS], M99    STOP, M codes
+"""A conversational program as statements (docs/language.md, "Heidenhain", says what is read and refused).
 
 LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the program comes to it, too. CALL
-LBL n REP m goes back to LBL n m times. The tool axis is Z. FMAX is rapid for its block only. M91 is a move in
-machine coordinates.
-
-On a machine with kinematics M128 and M129 switch the tool centre point, and L takes A, B and C.
-
-Refused with their block: PLANE, M128 without kinematics, LN, free contours (FK), APPR and DEP with polar
-coordinates, other cycles, M89 and other M codes that change moves, polar coordinates without a pole, texts
-and QS parameters.
+LBL n REP m goes back to LBL n m times. The tool axis is Z. FMAX is rapid for its block only.
 """
 
 from __future__ import annotations
@@ -85,8 +74,6 @@ class HeidenhainParser(Definitions):
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
-    # --- labels
-
     def _find_labels(self) -> None:
         for k, block in enumerate(self.blocks):
             if not block.text.upper().startswith("LBL"):
@@ -107,8 +94,6 @@ class HeidenhainParser(Definitions):
             if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE):
                 return k
         return len(self.blocks)
-
-    # --- blocks
 
     def _body(self, first: int, last: int, called: bool = False) -> text.Rows:
         """Statements of blocks `first` to `last` - 1; faults of `called` subprograms are known already."""
@@ -155,8 +140,6 @@ class HeidenhainParser(Definitions):
         units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
         called = tree.Call(block.place, name, None, block.rest.strip())
         return [called, units, text.looked_up(block)]
-
-    # --- moves
 
     def _ends(self, block: text.Block, given: text.Items) -> dict[str, tree.Expression]:
         if given.polar:
@@ -232,8 +215,6 @@ class HeidenhainParser(Definitions):
         named = [(text.POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
         return [tree.assign(block.place, *named, (text.PLANE, tree.Number(float(normal))))]
-
-    # --- cycles
 
     def _cycle_call(self, block: text.Block) -> text.Rows:
         if not block.take(r"\s*POS\b"):

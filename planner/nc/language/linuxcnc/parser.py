@@ -1,16 +1,9 @@
-"""LinuxCNC's language (RS274NGC with O words) as statements.
-
-    o100 sub ... o100 endsub [value]      o100 call [a] [b] ...      o100 return [value]
-    o101 if [c] / elseif [c] / else / endif      o102 while [c] ... endwhile      o103 do ... while [c]
-    o104 repeat [n] ... endrepeat         o104 break, continue
-    O100 ... M99 and M98 P100 L3: subprograms as other controls write them
+"""LinuxCNC's language (RS274NGC with O words) as statements; O100 ... M99 and M98 P100 L3, too, as other
+controls write subprograms.
 
 A label is a number, a <name>, or an expression where it calls. A call runs the subprogram of that name in the
-program, else that of the file name.ngc in the program's folder. Parameters 1 to 30 are a call's own: its
-arguments, then zeros; so are named parameters that do not begin with an underscore. M98 shares its caller's.
-
-What LinuxCNC refuses and this reader takes: a subprogram that stands after its call, break and continue in
-repeat loops.
+program, else that of the file name.ngc in its folder. Parameters 1 to 30 are a call's own: its arguments,
+then zeros; so are named parameters without an underscore. M98 shares its caller's.
 """
 
 from __future__ import annotations
@@ -210,8 +203,6 @@ class LinuxcncParser:
                 expanded = kind.strip().upper() != "MSG"
                 self.body.append(tree.Message(line.place, _pieces(text) if expanded else (text,)))
 
-    # --- codes that are control flow
-
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
         """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
         match = _FLOW.match(reader.text, reader.at)
@@ -238,8 +229,6 @@ class LinuxcncParser:
                 self.base = self.body = self.main
                 self.plain_sub = ""
         return True
-
-    # --- O words
 
     def _o_word(self, reader: LineReader, line: SourceLine) -> None:
         reader.at += 1

@@ -1,16 +1,8 @@
-"""Commands of a Sinumerik program: cycles, frames, declarations and messages; their tables; calls of
-subprograms.
+"""Commands of a Sinumerik program: their tables; cycles, frames, declarations and messages; calls of
+subprograms, files of the program's folder (NAME, NAME P3, NAME(1, R2), CALL "NAME", L10).
 
-Subprograms are files of their own in the program's folder:
-
-    NAME            call NAME.SPF (or .MPF); NAME P3 three times; NAME(1, R2) with values
-    CALL "NAME"     the same, for names that begin with digits
-    L10             call L10.SPF
-    PROC NAME(REAL A, INT B)    the first line of a subprogram: its variables, which get the values of the call
-    M17, RET, M30   its end
-
-Variables of DEF are a call's own; R parameters are shared. Commands of the reader hand values over in shared
-names.
+Variables of DEF and PROC are a call's own; R parameters are shared. Commands of the reader hand values over
+in shared names.
 """
 
 from __future__ import annotations

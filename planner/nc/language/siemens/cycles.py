@@ -93,10 +93,8 @@ def pattern_rows(
     given: Sequence[tree.Expression | None],
     drilled: Sequence[tree.Statement],
 ) -> list[tree.Statement]:
-    """Moves to the holes with the statements of their cycle behind each.
-
-    Raises ValueError for arguments that are missing.
-    """
+    """Moves to the holes with the statements of their cycle behind each. Raises ValueError for arguments that
+    are missing."""
     known = {key: value for key, value in zip(PATTERNS[name], given, strict=False) if value is not None}
     missing = [key for key in PATTERNS[name] if key not in known and key != "INDA"]
     if missing:

@@ -1,18 +1,7 @@
-"""A Sinumerik program as statements.
-
-    words      G0-G3 G9 G17-G19 G33 G40-G42 G53-G57 G60 G64 G641-G645 G70 G71 G90 G91 G94 G450 G500 G700 G710, G4 F,
-               X Y Z I J K with = AC() IC(), CR= TURN= F S T D M, N, CIP CT RND= CHR= CHF= (`block_words`)
-    language   DEF, assignments, labels, IF ELSE ENDIF, WHILE, FOR, LOOP, REPEAT UNTIL, GOTO GOTOF GOTOB, IF .. GOTO, REPEAT label P=n,
-               REPEATB label P=n
-    commands   SUPA, frames (TRANS ROT SCALE MIRROR and ATRANS ...), MSG, MCALL and CYCLE81 to 89, 840,
-               POCKET3, POCKET4 (`cycles`), CYCLE832 (tolerance), CYCLE800() (no tilt), and those that move
-               nothing (`commands.IDLE`); TRAORI and TRAFOOF on a machine with kinematics
+"""A Sinumerik program as statements (docs/language.md, "Sinumerik", says what is read and refused).
 
 Lines of plain words stay as the lexer split them. The mode of G90 and G91 is that of the text above a line,
 for AC and IC.
-
-Refused with their line: tilted frames (ROT X, CYCLE800 with angles), TRAORI without kinematics, KONT, G451,
-RNDM, G331, polar coordinates (AP, RP), SLOT1, LONGHOLE and other cycles.
 """
 
 from __future__ import annotations
@@ -116,8 +105,6 @@ class SiemensParser(BlockWords):
         modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
         if len(modes):
             self.absolute = bool(modes[-1] == 90)
-
-    # --- lines
 
     def _line(self, line: SourceLine) -> None:
         text = _without_comment(line.text)

@@ -11,11 +11,10 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.units import RAD_PER_DEG
 from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
-from planner.nc.extra_axes import LETTERS, ROTARY, rotary_feed
 from planner.nc.faults import Notes
 from planner.nc.program import FEED_MOVES, EventTable, Frame, Kind, Origins, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
-from planner.nc.state import State
+from planner.nc.state import LETTERS, ROTARY, State, rotary_feed
 
 
 class BlockColumns(NamedTuple):

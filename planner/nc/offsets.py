@@ -25,10 +25,19 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import codes
-from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.faults import Findings
 from planner.nc.moves import Block, WordFault, coordinate, integer
-from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
+from planner.nc.state import (
+    FURTHER_MAX,
+    FURTHER_SYSTEMS,
+    LETTERS,
+    ROTARY,
+    SYSTEMS,
+    State,
+    System,
+    Tool,
+    system_name,
+)
 
 _TURN = 360.0  # degrees
 

@@ -17,12 +17,11 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.nc.block_table import BlockTable
-from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.faults import AXIS, LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.moves import NUMBER_MAX
 from planner.nc.program import Kind
-from planner.nc.state import State
+from planner.nc.state import LETTERS, ROTARY, State
 
 # Letters by their codes.
 _F, _G, _N, _O, _S, _X, _Z = 70, 71, 78, 79, 83, 88, 90

@@ -9,15 +9,15 @@ machine coordinates, so that changing an offset moves nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.units import MM_PER_INCH
+from planner.base.units import MM_PER_INCH, RAD_PER_DEG
 from planner.machine import LINEAR_AXES, Machine
-from planner.nc.extra_axes import ExtraAxes, extra_axes_of
 from planner.nc.program import PathControl
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
@@ -25,10 +25,59 @@ REFUSED_MOTION = -2  # a motion code that is not supported is in force (only `in
 
 # Work systems of G10 P1 to P9, by ten times their G codes.
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
+_HOMES = {"g28": 280, "g30": 300}  # codes of positions by their names in a machine file
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
 FeedMode = Literal["per minute", "inverse time", "per turn"]
+
+
+LETTERS = "ABCUVW"
+ROTARY = 3  # the first so many of them
+
+
+def _zeros() -> FloatArray:
+    return np.zeros(len(LETTERS))
+
+
+@dataclass(slots=True)
+class ExtraAxes:
+    """State of the axes beside x, y and z (offsets.py has their rules): arrays (6,) in the order of `LETTERS`, in degrees and mm."""
+
+    letters: str = ""  # those that the machine has and that are read
+    wrapped: str = ""  # those of them that are wrapped
+    position: FloatArray = field(default_factory=_zeros)  # in machine coordinates
+    origins: dict[int, FloatArray] = field(default_factory=dict)  # of work systems, by code
+    g92: FloatArray = field(default_factory=_zeros)  # the G92 offset
+    g92_saved: FloatArray = field(default_factory=_zeros)  # what G92.3 brings back
+    homes: dict[int, FloatArray] = field(default_factory=dict)  # positions of G28 (280) and G30 (300)
+
+    @property
+    def columns(self) -> list[int]:
+        """Indices of the axes that are read."""
+        return [LETTERS.index(letter) for letter in self.letters]
+
+    def offset(self, system: int) -> FloatArray:
+        """(6,) machine position of the programmed zero in a work system."""
+        return self.g92 + self.origins.get(system, _zeros())
+
+    @classmethod
+    def of(cls, machine: Machine | None) -> ExtraAxes:
+        """The further axes of a machine at their zero; none without a machine."""
+        if machine is None:
+            return cls()
+        letters = "".join(letter for letter in LETTERS if letter.lower() in machine.axes)
+        return cls(
+            letters=letters,
+            wrapped="".join(letter for letter in letters if machine.axes[letter.lower()].wrapped),
+            origins={system_code(name): _vector(p, LETTERS) for name, p in machine.work_offsets.items()},
+            homes={_HOMES[name]: _vector(p, LETTERS) for name, p in machine.positions.items()},
+        )
+
+
+def rotary_feed(feed: float, unit: float) -> float:
+    """Feed [rad/s] of a block of rotary axes alone, by that in force [mm/s] and mm per programmed unit."""
+    return feed / unit * RAD_PER_DEG
 
 
 @dataclass(frozen=True)
@@ -191,8 +240,8 @@ class Setup:
             return cls()
         return cls(
             path_control=PathControl[machine.path_control.upper()],
-            systems={system_code(name): _vector(given) for name, given in machine.work_offsets.items()},
-            positions={280 if name == "g28" else 300: _vector(p) for name, p in machine.positions.items()},
+            systems={system_code(name): _vector(p, LINEAR_AXES) for name, p in machine.work_offsets.items()},
+            positions={_HOMES[name]: _vector(p, LINEAR_AXES) for name, p in machine.positions.items()},
             feed_default=machine.feed_default,
             machine=machine,
             tools={
@@ -219,7 +268,7 @@ class Setup:
             homes=dict(self.positions),
             tools=dict(self.tools),
             change_timed=times is not None and times.tool_change is not None,
-            further=extra_axes_of(self.machine, system_code),
+            further=ExtraAxes.of(self.machine),
         )
         state.apply_offsets()
         return state
@@ -238,5 +287,5 @@ def system_name(code: int) -> str:
     return f"G{code // 10}" + (f".{code % 10}" if code % 10 else "")
 
 
-def _vector(given: dict[str, float]) -> FloatArray:
-    return np.array([given.get(letter, 0.0) for letter in LINEAR_AXES])
+def _vector(given: dict[str, float], letters: Iterable[str]) -> FloatArray:
+    return np.array([given.get(letter.lower(), 0.0) for letter in letters])

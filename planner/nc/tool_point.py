@@ -24,7 +24,6 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine
 from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.nc.block_table import BlockTable
-from planner.nc.extra_axes import LETTERS, ROTARY
 from planner.nc.moves import Block
 from planner.nc.program import (
     FEED_MOVES,
@@ -37,7 +36,7 @@ from planner.nc.program import (
     ToolPoint,
 )
 from planner.nc.settings import TOOL_POINT_ON
-from planner.nc.state import State
+from planner.nc.state import LETTERS, ROTARY, State
 
 CHORD_SHARE = 0.1  # of the tolerance, that a rapid move of the joints leaves its chords by [-]
 CHORDS_MAX = 2**14  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um

@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 from planner.nc.language import tree
 
-COMPARISONS = frozenset(("EQ", "NE", "GT", "GE", "LT", "LE"))
+_SIGNS = {"EQ": "==", "NE": "!=", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
+COMPARISONS = frozenset(_SIGNS)
 LOGICAL = frozenset(("AND", "OR", "XOR", "NOT"))
 
 
@@ -44,19 +45,11 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
 # of this one.
 ARITHMETIC: dict[tuple[str, int], str] = {
     ("-", 1): "(-{0})",
-    ("+", 2): "({0}+{1})",
-    ("-", 2): "({0}-{1})",
-    ("*", 2): "({0}*{1})",
-    ("/", 2): "({0}/{1})",
+    **{(sign, 2): f"({{0}}{sign}{{1}})" for sign in "+-*/"},
+    **{(name, 2): f"({{0}}{sign}{{1}})" for name, sign in _SIGNS.items()},
     ("**", 2): "power({0},{1})",
     ("MOD", 2): "modulo({0},{1})",
     ("DIV", 2): "float(trunc({0}/{1}))",
-    ("EQ", 2): "({0}=={1})",
-    ("NE", 2): "({0}!={1})",
-    ("GT", 2): "({0}>{1})",
-    ("GE", 2): "({0}>={1})",
-    ("LT", 2): "({0}<{1})",
-    ("LE", 2): "({0}<={1})",
     ("AND", 2): "({0}!=0 and {1}!=0)",
     ("OR", 2): "({0}!=0 or {1}!=0)",
     ("XOR", 2): "(({0}!=0)!=({1}!=0))",
@@ -69,11 +62,9 @@ ARITHMETIC: dict[tuple[str, int], str] = {
     ("EXP", 1): "exp({0})",
     ("LN", 1): "log({0})",
     ("LOG", 1): "log10({0})",
-    ("SQRT", 1): "sqrt({0})",
-    ("SQR", 1): "sqrt({0})",
+    **dict.fromkeys((("SQRT", 1), ("SQR", 1)), "sqrt({0})"),
     ("POT", 1): "({0})**2",
-    ("INT", 1): "float(trunc({0}))",
-    ("TRUNC", 1): "float(trunc({0}))",
+    **dict.fromkeys((("INT", 1), ("TRUNC", 1)), "float(trunc({0}))"),
     ("FRAC", 1): "({0}-trunc({0}))",
     ("FIX", 1): "float(floor({0}))",
     ("FUP", 1): "float(ceil({0}))",
@@ -124,10 +115,9 @@ class BasicBlocks:
         lines = []
         for k, block in enumerate(self.blocks[:-1]):
             lines.append((f" def b{k}():", place))
-            lines += [
-                (re.sub("@([0-9]+)@", lambda named: str(self.block_of[int(named[1])]), f"  {text}"), at)
-                for text, at in block
-            ]
+            for text, at in block:
+                known = re.sub("@([0-9]+)@", lambda named: str(self.block_of[int(named[1])]), text)
+                lines.append((f"  {known}", at))
         names = "".join(f"b{k}," for k in range(len(self.blocks) - 1))
         return [*lines, (f" b=({names});pc=0", place), (" while pc>=0:pc=b[pc]()", place)]
 

@@ -16,10 +16,17 @@ from collections.abc import Callable, Mapping
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.compiled import Compiled, whole
+from planner.nc.language.compiled import (
+    Compiled,
+    Endless,
+    TooDeep,
+    last_statement,
+    sentence,
+    statement_of,
+    whole,
+)
 from planner.nc.language.making import Maker, Making
 from planner.nc.language.rows import AppendedRows, NotFinite
-from planner.nc.language.stops import Endless, TooDeep, last_statement, sentence, statement_of
 from planner.nc.language.system_variables import Modes, SystemVariables
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import TravelRow, words_of

@@ -30,6 +30,10 @@ _FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
 _AXES = 9  # x y z a b c u v w; the last six are zero here
 
 
+def _numbers(*ranges: tuple[int, int]) -> frozenset[int]:
+    return frozenset(number for first, last in ranges for number in range(first, last))
+
+
 class SystemVariables:
     """Answers for one interpreter. Subclasses name the parameters."""
 
@@ -46,9 +50,8 @@ class SystemVariables:
 
     def put(self, number: int, value: float | None) -> None:
         """Assign to a parameter of the control. Raises ValueError: a program changes its state by codes."""
-        raise ValueError(
-            f"parameter #{number} belongs to the control and is only read here; write G10, G92, G28.1 or a tool change instead"
-        )
+        remedy = "write G10, G92, G28.1 or a tool change instead"
+        raise ValueError(f"parameter #{number} belongs to the control and is only read here; {remedy}")
 
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
@@ -96,20 +99,15 @@ class SystemVariables:
         if state.path_control == PathControl.BLEND and not np.isnan(state.tolerance):
             path.append(("P", state.tolerance / state.unit))
         system = SYSTEMS[self.system()] / 10
-        codes = (
-            _PLANE[state.normal],
-            90.0 if state.absolute else 91.0,
-            90.1 if state.absolute_centre else 91.1,
-        )
+        distance = 90.0 if state.absolute else 91.0
+        codes = _PLANE[state.normal], distance, 90.1 if state.absolute_centre else 91.1
         rows = [
             [("G", 21.0 if state.unit == 1.0 else 20.0), ("G", 7.0 if state.diameters else 8.0)],
             [*(("G", code) for code in (*codes, system, 98.0 if state.to_level else 99.0)), *path],
             [("G", _FEED_MODES[state.feed_mode])],
         ]
         if state.tool_offset.any():
-            lengths = (
-                (letter, float(state.tool_offset[axis]) / state.unit) for axis, letter in enumerate("XYZ")
-            )
+            lengths = zip("XYZ", (state.tool_offset / state.unit).tolist(), strict=True)
             rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])])
         else:
             rows.append([("G", 49.0)])
@@ -136,9 +134,7 @@ def _on(condition: bool) -> float:
 
 _LINUXCNC_NAMES: dict[str, Callable[[SystemVariables], float]] = {
     "_vmajor": lambda a: 2.9,
-    "_vminor": lambda a: 0.0,
-    "_task": lambda a: 0.0,
-    "_remap_level": lambda a: 0.0,
+    **dict.fromkeys(("_vminor", "_task", "_remap_level", "_adaptive_feed", "_feed_hold"), lambda a: 0.0),
     "_motion_mode": lambda a: _motion_mode(a.interpreter.state.motion),
     "_plane": lambda a: 10.0 * _PLANE[a.interpreter.state.normal],
     "_ccomp": lambda a: 400.0,
@@ -162,16 +158,13 @@ _LINUXCNC_NAMES: dict[str, Callable[[SystemVariables], float]] = {
     "_spindle_cw": lambda a: _on(a.interpreter.state.spindle.turning > 0),
     "_mist": lambda a: _on(a.event("M", (7.0, 9.0)) == 7.0),
     "_flood": lambda a: _on(a.event("M", (8.0, 9.0)) == 8.0),
-    "_speed_override": lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0),
-    "_feed_override": lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0),
-    "_adaptive_feed": lambda a: 0.0,
-    "_feed_hold": lambda a: 0.0,
+    **dict.fromkeys(("_speed_override", "_feed_override"), lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0)),
     "_feed": lambda a: a.feed(),
     "_rpm": lambda a: a.interpreter.state.spindle.speed,
-    "_current_tool": lambda a: float(a.interpreter.state.tool_loaded),
-    "_current_pocket": lambda a: float(a.interpreter.state.tool_loaded),
-    "_selected_tool": lambda a: float(a.interpreter.state.tool_selected),
-    "_selected_pocket": lambda a: float(a.interpreter.state.tool_selected),
+    **dict.fromkeys(("_current_tool", "_current_pocket"), lambda a: float(a.interpreter.state.tool_loaded)),
+    **dict.fromkeys(
+        ("_selected_tool", "_selected_pocket"), lambda a: float(a.interpreter.state.tool_selected)
+    ),
     **{f"_{letter}": lambda a, axis=axis: a.here(axis) for axis, letter in enumerate("xyzabcuvw")},  # type: ignore[misc]
     **{f"_abs_{letter}": lambda a, axis=axis: a.machine(axis) for axis, letter in enumerate("xyzabc")},  # type: ignore[misc]
 }
@@ -224,15 +217,7 @@ class PositionVariables(SystemVariables):
 class LinuxcncVariables(SystemVariables):
     """Numbers 5161 to 5428 and the predefined names of LinuxCNC 2.9."""
 
-    numbers = frozenset(
-        (
-            *range(5161, 5170),
-            *range(5181, 5190),
-            *range(5210, 5220),
-            *range(5220, 5221 + 180),
-            *range(5400, 5414),
-        )
-    ) | frozenset(range(5420, 5429))
+    numbers = _numbers((5161, 5170), (5181, 5190), (5210, 5401), (5400, 5414), (5420, 5429))
     names = frozenset((*_LINUXCNC_NAMES, "_call_level"))
 
     def get(self, parameter: int | str, depth: int) -> float:
@@ -246,11 +231,8 @@ class LinuxcncVariables(SystemVariables):
 class FanucVariables(SystemVariables):
     """Modal information 4001 to 4120 and 4201 to 4320, positions 5001 to 5043, work offsets 5201 to 5326."""
 
-    numbers = frozenset(
-        (*range(4001, 4131), *range(4201, 4331), *range(5001, 5009), *range(5021, 5029), *range(5041, 5049))
-    ) | frozenset(
-        (*range(5201, 5209), *range(5221, 5327), *range(3000, 3020), *range(1000, 1200), *range(2000, 3000))
-    )
+    numbers = _numbers((1000, 1200), (2000, 3020), (4001, 4131), (4201, 4331), (5001, 5009), (5021, 5029),
+                       (5041, 5049), (5201, 5209), (5221, 5327))  # fmt: skip
 
     def get(self, parameter: int | str, depth: int) -> float:
         """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
@@ -283,9 +265,8 @@ class FanucVariables(SystemVariables):
             return self.offset(system, axis) if axis < 8 else 0.0
         if 5201 <= number <= 5208:
             return 0.0
-        raise ValueError(
-            f"parameter #{parameter} is known by the control only; assign the value it has there to a parameter of your own"
-        )
+        remedy = "assign the value it has there to a parameter of your own"
+        raise ValueError(f"parameter #{parameter} is known by the control only; {remedy}")
 
     def put(self, number: int, value: float | None) -> None:
         """Assign to a work offset. Raises ValueError for an alarm, and a state that codes change."""
@@ -293,16 +274,12 @@ class FanucVariables(SystemVariables):
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:
             return  # timers and what the operator may do: nothing moves
-        if 5221 <= number <= 5326 and (number - 5221) % 20 < 3:
-            self._set_offset(number - 5221, value or 0.0)
-            return
-        super().put(number, value)
-
-    def _set_offset(self, place: int, value: float) -> None:
+        system, axis = divmod(number - 5221, 20)
+        if not 5221 <= number <= 5326 or axis >= 3:
+            super().put(number, value)
         state = self.interpreter.state
-        code = SYSTEMS[place // 20]
-        old = state.work_system(code)
+        old = state.work_system(SYSTEMS[system])
         origin = old.origin.copy()
-        origin[place % 20] = value * state.unit
-        state.systems[code] = System(origin, old.rotation)
+        origin[axis] = (value or 0.0) * state.unit
+        state.systems[SYSTEMS[system]] = System(origin, old.rotation)
         state.apply_offsets()

@@ -67,33 +67,21 @@ NOTHING = frozenset(
 )
 OWN_LAST, OF_PATHS = 9, 89  # codes between them belong to the machine's builder, but for 13, 14, 19 and 30
 _ORIENTATION = 19  # of the spindle
-_MOVES = "it changes how the axes move"
-_FEED = "it changes feeds"
 REFUSED = {
     89: "it calls a cycle at every place",
     92: "its coordinates refer to a point of the machine",
     94: "it turns rotary axes by whole turns",
-    97: "it changes the corners of contours",
-    98: "it changes the corners of contours",
+    **dict.fromkeys((97, 98), "it changes the corners of contours"),
     101: "it changes tools by itself",
-    103: _FEED,
+    **dict.fromkeys((103, 109, 110, 116, 136), "it changes feeds"),
     104: "it brings an older datum back",
-    109: _FEED,
-    110: _FEED,
     112: "it puts arcs between lines",
-    114: _MOVES,
-    115: _MOVES,
-    116: _FEED,
+    **dict.fromkeys((114, 115, 126, 128, 138, 144), "it changes how the axes move"),
     118: "a handwheel moves the axes, too",
     124: "it leaves points out",
-    126: _MOVES,
-    128: _MOVES,
     130: "its coordinates are not those of the tilted plane",
-    136: _FEED,
-    138: _MOVES,
     140: "it retracts the tool",
     143: "it changes the datum",
-    144: _MOVES,
 }
 
 
@@ -105,25 +93,17 @@ def is_of_the_builder(code: int) -> bool:
 
 
 class Definitions(Flow):
-    """Definitions in force.
-
-    moves  : path functions, with the feed of the tool call
-    unit   : mm per unit of the program
-    cycles : numbers of those that the program defines
-    oversizes : a tool call of the program has DR
-    tool_names : numbers of tools that have names
-    source     : the file
-    """
+    """Definitions in force in the file `source`."""
 
     source: Source
 
     def __init__(self) -> None:
         super().__init__()
-        self.moves = Moves(1.0)
-        self.unit = 1.0
-        self.cycles: set[int] = set()
-        self.oversizes = False
-        self.tool_names: dict[str, int] = {}
+        self.moves = Moves(1.0)  # path functions, with the feed of the tool call
+        self.unit = 1.0  # mm per unit of the program
+        self.cycles: set[int] = set()  # numbers of those that the program defines
+        self.oversizes = False  # a tool call of the program has DR
+        self.tool_names: dict[str, int] = {}  # numbers of tools that have names
 
     def _begin(self, block: Block) -> Rows:
         inch = block.text.upper().split()[-1] == "INCH"
@@ -277,8 +257,7 @@ class Definitions(Flow):
 
     def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:
         column, given = block.column, items(block)
-        # M128 F: the largest feed of what the axes do to follow the tool, which the limits of the joints are
-        # for
+        # F of M128 is the largest feed of the axes that follow the tool: the joints' limits are for that
         feed = given.feed is not None and not any(code in TOOL_POINT_ON for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
             raise block.fault("only M codes are read here; write the move and its feed with L", column)

@@ -8,7 +8,6 @@ may move ($J jogs) and is refused.
 
 from __future__ import annotations
 
-import math
 import re
 
 from planner.nc import codes
@@ -116,7 +115,10 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
         code, value = int(words.letter[word]), float(words.value[word])
         if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
             if block.settings:
-                block.settings[-1].values.update(_bare_words(words, word))
+                start, end = int(words.at[word]), words.line_at(int(words.at[word]))[1]
+                text = words.data[start:end].partition(b";")[0].decode("latin-1").lower()
+                given = {letter: float(number or "nan") for letter, number in _BARE_WORD.findall(text)}
+                block.settings[-1].values.update(given)  # NaN where a letter has no number
             break
         if code == FAULT:
             if homed(words, word, block, ignored) or command(words, word, block, report, ignored):
@@ -212,12 +214,6 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
     block.events.append((letter, code / 10))
     block.stops |= found.stops
     return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
-
-
-def _bare_words(words: Words, word: int) -> dict[str, float]:
-    """The letters of a line from one without a number on, NaN where they have none."""
-    text = words.data[int(words.at[word]) :].partition(b"\n")[0].partition(b";")[0].decode("latin-1").lower()
-    return {letter: float(number) if number else math.nan for letter, number in _BARE_WORD.findall(text)}
 
 
 def _add_code(

@@ -241,7 +241,6 @@ class Cutter:
         return replace(side, centre=centre, radius=radius), side.turning * full
 
     def _stay(self, target: FloatArray, kind: Kind, line: int) -> None:
-        """A move along the normal: the place in the plane stays the tool's."""
         if not (self.started or self._placed):
             raise CutterFault(
                 "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"

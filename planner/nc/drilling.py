@@ -109,7 +109,6 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
 
 
 def _pecks(hole: Hole) -> Iterator[CycleStep]:
-    """Everything before the last feed down."""
     a, b = hole.place
     depth = hole.clear - hole.peck
     while depth > hole.bottom:
@@ -208,7 +207,6 @@ def _repeats(block: Block, hole: Hole) -> int:
 
 
 def _say(state: State, block: Block, findings: Findings) -> None:
-    """Keep what is assumed of a cycle."""
     name, word = f"G{codes.number(state.motion)}", block.motion_word()
     if not state.retract_given:
         text = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
@@ -250,7 +248,6 @@ def _meaning(letter: str) -> str:
 
 
 def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
-    """Execute a step."""
     table.make_room(1)
     if step.kind is None:
         table.add_event("M", step.spindle, line)
@@ -270,6 +267,5 @@ def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
 
 
 def _length(state: State, words: dict[str, float], axis: int) -> float:
-    """A coordinate in programmed units; of a diameter its half."""
     value = words["XYZ"[axis]]
     return value / 2.0 if axis == 0 and state.diameters else value

@@ -81,7 +81,6 @@ def with_extruder(
 
 
 def _refuse(program: Program, line: Array, what: str) -> NoReturn:
-    """Raise InputError for the first of the lines (n,)."""
     raise InputError(f"{what}; or give --extruder ignore", source=program.source, line=int(line[0]))
 
 

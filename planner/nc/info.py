@@ -125,7 +125,6 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
 
 
 def _rise(program: Program, start: FloatArray) -> FloatArray:
-    """(K,) travel along the arc's axis [mm]."""
     k, n = program.arc_block, program.arc_normal
     return program.end[k, n] - start[k, n]
 
@@ -153,7 +152,6 @@ def _spokes(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _plane_axes(program: Program) -> Array:
-    """(2, K) the two axes of each arc's plane, right-handed."""
     return np.array([IN_PLANE[n] for n in range(3)])[program.arc_normal].T.reshape(2, -1)
 
 

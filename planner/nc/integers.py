@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.units import MILLISECOND
 from planner.machine import Machine
 from planner.nc import codes
@@ -49,9 +49,9 @@ class DwellWords:
         for word in np.flatnonzero(words.letter == ord("P")).tolist():
             row = words.row(word)
             letter, value = words.of_rows(row)
-            if _DWELL in value[letter == ord("G")] or (
-                cycle[np.searchsorted(motion, words.first[row + 1])] and not _is_other(letter, value)
-            ):
+            in_cycle = cycle[np.searchsorted(motion, words.first[row + 1])]
+            other = any(np.isin(value[letter == ord(of)], codes).any() for of, codes in _OTHERS.items())
+            if _DWELL in value[letter == ord("G")] or (in_cycle and not other):
                 found.append(word)
         self._in_cycle = bool(cycle[-1])
         return found
@@ -64,10 +64,6 @@ class DwellWords:
         value = words.value.copy()
         value[times] *= MILLISECOND
         return dataclasses.replace(words, value=value)
-
-
-def _is_other(letter: Array, value: Array) -> bool:
-    return any(np.isin(value[letter == ord(of)], own).any() for of, own in _OTHERS.items())
 
 
 LENGTHS = frozenset(ord(letter) for letter in "XYZUVWIJKRQ")
@@ -97,7 +93,8 @@ class Integers:
         row = np.repeat(np.arange(len(words.line)), np.diff(words.first))
         value = words.value.copy()
         whole = value == np.rint(value)
-        lengths = _without_point(words, np.flatnonzero(whole & np.isin(words.letter, list(LENGTHS))))
+        lengths = np.flatnonzero(whole & np.isin(words.letter, list(LENGTHS)))
+        lengths = np.array([w for w in lengths.tolist() if "." not in words.text(w)], dtype=np.int64)
         value[lengths] *= self.scale(words)[row[lengths]]
         return dataclasses.replace(words, value=value)
 
@@ -106,8 +103,3 @@ def integers_of(machine: Machine | None) -> Integers:
     """The meaning of numbers without a point on a machine."""
     given = machine.dialect.least_increment if machine is not None and machine.dialect is not None else None
     return Integers(given)
-
-
-def _without_point(words: Words, found: Array) -> Array:
-    """Those of the words whose text has no point."""
-    return np.array([w for w in found.tolist() if "." not in words.text(w)], dtype=np.int64)

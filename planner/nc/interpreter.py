@@ -75,7 +75,7 @@ class Interpreter:
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
-        self._limits = LimitsInForce()
+        self.limits = LimitsInForce()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
         self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
         self.by_word = 0  # rows that were executed word by word, not by the compiled loop
@@ -98,9 +98,13 @@ class Interpreter:
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
-        self._end_compensation()
+        if self.mover.cutter is not None and self._words is not None:
+            try:
+                self.mover.cutter.fix()  # the last move, if the program just ends while compensation is on
+            except CutterFault as fault:
+                self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
         auxiliary.assume_rapids(self.table, self.ignored, self.findings)
-        limits = self._limits.throughout(self.table, self.setup.machine, self.findings)
+        limits = self.limits.throughout(self.table, self.setup.machine, self.findings)
         read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         read = dataclasses.replace(read, limits=limits)
         return read if self.findings.faults else at_the_tip(read, self.tool_point, self.setup.machine)
@@ -108,15 +112,6 @@ class Interpreter:
     def go_on_with(self, state: State, table: BlockTable) -> None:
         """Execute what follows in another `state` and into another `table`: a profile that is read aside."""
         self.mover.state, self.mover.table = state, table
-
-    def _end_compensation(self) -> None:
-        """Settle the last move, if the program just ends while compensation is on."""
-        if self.mover.cutter is None or self._words is None:
-            return
-        try:
-            self.mover.cutter.fix()
-        except CutterFault as fault:
-            self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
 
     @property
     def notes(self) -> Notes:
@@ -166,11 +161,6 @@ class Interpreter:
             self.findings.note(f"the program ends; what follows from line {after} on is not read", end)
 
     @property
-    def feed_factors(self) -> list[tuple[int, float]]:
-        """Factors of F that the program sets, and their lines."""
-        return self._limits.factors
-
-    @property
     def all_arcs_close_otherwise(self) -> bool:
         """True if there are arcs that do not close, and all of them would with their centres read the other
         way.
@@ -186,7 +176,6 @@ class Interpreter:
         return FaultList(self.findings.faults + self.mover.splines.faults())
 
     def _assume_units(self) -> None:
-        """Say it if there is a move before any G20 or G21."""
         moves = np.isin(self.table.block.kind[: self.table.blocks], MOVES)
         if self._units_known or self._words is None or not moves.any():
             return
@@ -226,7 +215,7 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             mover.check_unchanged(self.state, block)
-        self._limits.take(block.settings, self.state, self.table, block.line, self.findings)
+        self.limits.take(block.settings, self.state, self.table, block.line, self.findings)
         auxiliary.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.table, block, self.findings)
@@ -307,7 +296,6 @@ class Interpreter:
             offsets.shift_origin(self.state, block)
 
     def _check_parked(self, block: Block) -> None:
-        """Report words of axes that are not planned and would move."""
         for letter in codes.PARKABLE:
             if letter in self.state.further.letters or letter not in block.value:
                 continue

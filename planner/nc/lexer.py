@@ -79,11 +79,19 @@ class Words:
         """(n,) the words of a letter with one of the numbers, ascending."""
         return np.flatnonzero((self.letter == ord(letter)) & np.isin(self.value, numbers))
 
+    def line_at(self, at: int) -> tuple[int, int]:
+        """Where the source line of a byte begins and ends in `data`, without its end of line."""
+        end = self.data.find(b"\n", at)
+        return self.data.rfind(b"\n", 0, at) + 1, end if end >= 0 else len(self.data)
+
+    def column_at(self, at: int) -> int:
+        """1-based column of a byte, in characters."""
+        before = self.data[self.line_at(at)[0] : at].removeprefix(BOM)
+        return len(before.decode("utf-8", "replace")) + 1
+
     def column(self, word: int) -> int:
         """1-based column of a word, in characters."""
-        at = int(self.at[word])
-        before = self.data[self.data.rfind(b"\n", 0, at) + 1 : at].removeprefix(_BOM)
-        return len(before.decode("utf-8", "replace")) + 1
+        return self.column_at(int(self.at[word]))
 
     def text(self, word: int) -> str:
         """The word as written, up to what follows it; one character of what is unreadable."""
@@ -96,11 +104,10 @@ class Words:
     def rest(self, word: int) -> str:
         """The line behind the letter of a word, comments included."""
         at = int(self.at[word]) + 1
-        end = self.data.find(b"\n", at)
-        return self.data[at : end if end >= 0 else len(self.data)].decode("utf-8", "replace").strip()
+        return self.data[at : self.line_at(at)[1]].decode("utf-8", "replace").strip()
 
 
-_BOM = b"\xef\xbb\xbf"
+BOM = b"\xef\xbb\xbf"
 NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
 _WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
 
@@ -116,7 +123,7 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
     at = np.empty(capacity, dtype=np.int64 if len(data) > np.iinfo(np.int32).max else np.int32)
     line = np.empty(lines, dtype=np.int32)
     first = np.empty(lines + 1, dtype=np.int64)
-    start = len(_BOM) if data.startswith(_BOM) else 0
+    start = len(BOM) if data.startswith(BOM) else 0
     words, rows = _split(source, start, block_delete, letter, value, at, line, first)
     value = value[:words]
     for word in np.flatnonzero(np.isnan(value)):
@@ -159,7 +166,6 @@ _MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
 
 @njit(cache=True)
 def _count(source):  # pragma: no cover - compiled
-    """Upper bounds of the number of words and of lines."""
     letters, lines = 0, 1
     for c in source:
         if 97 <= c <= 122 or 65 <= c <= 90 or c in (_PERCENT, _COLON, _DOLLAR):

@@ -33,18 +33,15 @@ def check_unchanged(state: State, block: Block) -> None:
             raise WordFault(block.at[group], _refusal(f"G{codes.number(code)}"))
     one_shot = block.g.get("one-shot")
     sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
-    refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and _system_in_force(state, block))
+    number, in_force = round(block.value.get("P", 0.0)), state.system
+    of_force = number == 0 or (in_force in SYSTEMS and SYSTEMS.index(in_force) + 1 == number)
+    refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and of_force)
     if one_shot is not None and refused:
         raise block.fault(_refusal(f"G{codes.number(one_shot)}"), "one-shot")
     if block.homing:
         raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
     if "tool change" in block.m:
         raise block.fault(_refusal("M6"), "tool change")
-
-
-def _system_in_force(state: State, block: Block) -> bool:
-    number = round(block.value.get("P", 0.0))
-    return number == 0 or (state.system in SYSTEMS and SYSTEMS.index(state.system) + 1 == number)
 
 
 def _refusal(name: str) -> str:
@@ -206,7 +203,6 @@ class Mover:
             auxiliary.take_default(self.state, self.feed_default, block, self.findings)
 
     def _move(self, block: Block) -> None:
-        """A block with a motion code in force, and somewhere to go."""
         state = self.state
         if state.motion < 0:
             raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
@@ -234,7 +230,6 @@ class Mover:
             self._straight(block)
 
     def _straight(self, block: Block) -> None:
-        """G0, G1."""
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
         begin = state.further.position.copy() if state.further.letters else NOWHERE
@@ -270,7 +265,6 @@ class Mover:
             self.table.add(Kind.LINE, block.line, state)
 
     def _arc(self, block: Block) -> None:
-        """G2, G3."""
         state = self.state
         target = moves.target(state, block)
         offsets.move(state, block)

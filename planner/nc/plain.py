@@ -98,7 +98,6 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
 
 
 def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
-    """The last four fields of `_Fixed`."""
     further = state.further
     column = np.zeros(256, dtype=np.int64)
     for k, letter in enumerate(further.letters):

@@ -17,7 +17,7 @@ from planner.machine import Machine
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
-from planner.nc.interpreter import Interpreter, OpenArc
+from planner.nc.interpreter import Interpreter
 from planner.nc.language import detect
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
@@ -98,7 +98,13 @@ def interpret(
         absolute = dataclasses.replace(reading, arc_centres=ABSOLUTE)
         other, as_absolute, found = execute(data, machine, absolute, source)
         if not other.open_arcs:
-            return _with_note(as_absolute, run.open_arcs), found
+            arcs = run.open_arcs
+            note = (
+                f"line {arcs[0].line}: arc centres read as absolute, as after G90.1: {len(arcs):,} arcs close only so "
+                "(--arc-centres absolute|incremental says which)"
+            )
+            notes, assumptions = (note, *as_absolute.notes), (note, *as_absolute.assumptions)
+            return dataclasses.replace(as_absolute, notes=notes, assumptions=assumptions), found
     return program, faults
 
 
@@ -149,19 +155,8 @@ def execute(
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.ignored.follows and not len(faults):
-        program = with_extruder(program, words, interpreter.rows_read, interpreter.feed_factors)
+        program = with_extruder(program, words, interpreter.rows_read, interpreter.limits.factors)
     return interpreter, program, faults
-
-
-def _with_note(program: Program, open_arcs: Sequence[OpenArc]) -> Program:
-    """The program, with the arcs for whose sake it was read with absolute centres."""
-    note = (
-        f"line {open_arcs[0].line}: arc centres read as absolute, as after G90.1: {len(open_arcs):,} arcs close only so "
-        "(--arc-centres absolute|incremental says which)"
-    )
-    return dataclasses.replace(
-        program, notes=(note, *program.notes), assumptions=(note, *program.assumptions)
-    )
 
 
 def load(path: str | Path) -> bytes:

@@ -99,7 +99,6 @@ class LimitsInForce:
         return limits
 
     def _look(self, table: BlockTable) -> None:
-        """Keep the limits in force if there was a move under them."""
         kinds = table.block.kind[self._blocks : table.blocks]
         self._blocks = table.blocks
         if np.isin(kinds, MOVES).any() and self._now not in self._seen:

@@ -59,7 +59,6 @@ _CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # t
 
 
 def _fault(block: Block, message: str) -> WordFault:
-    """A fault of the first word of a line."""
     return WordFault(min(block.at.values()), message)
 
 
@@ -123,7 +122,6 @@ class SplineReader:
         return np.stack([start, start + near, end + far, end])[None], np.ones((1, 4))
 
     def _nurbs(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
-        """A line of G5.2, or G5.3."""
         opened, now = self.open, block.g.get("motion")
         if now == NURBS_END:
             if opened is None:
@@ -154,7 +152,6 @@ class SplineReader:
         return None
 
     def _fanuc(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
-        """A line of G6.2."""
         opened = self.open
         if opened is None:
             if block.g.get("motion") != NURBS_WITH_KNOTS:
@@ -202,7 +199,6 @@ def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
 
 
 def _split(pieces: FloatArray) -> Pieces:
-    """Control points and weights of homogeneous pieces (K, 4, 4)."""
     return pieces[..., :-1] / pieces[..., -1:], pieces[..., -1].copy()
 
 
@@ -222,7 +218,6 @@ def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
 
 
 def _offset(state: State, block: Block, letters: str) -> FloatArray:
-    """(3,) the vector of two words [mm]."""
     given = np.array([block.value.get(letter, 0.0) * state.unit for letter in letters] + [0.0])
     return state.work_system().turn(given)
 

@@ -195,7 +195,6 @@ def stop(state: State, table: BlockTable, line: int) -> None:
 
 
 def _cut(state: State, table: BlockTable, line: int, target: FloatArray, feed: float) -> None:
-    """A straight move in step with the spindle."""
     if not state.in_thread:
         stop(state, table, line)
     programmed, state.feed = state.feed, feed

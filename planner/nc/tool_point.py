@@ -227,7 +227,6 @@ class _Pieces:
             )
 
     def _of(self, function: Callable[[dict[str, Any]], dict[str, Any]], places: FloatArray) -> FloatArray:
-        """Places (n, A) with x, y, z from joints to points, or back."""
         axes = self.whole.axes
         found = places.copy()
         new = function({letter: places[:, k] for k, letter in enumerate(axes)})

@@ -111,7 +111,6 @@ def _removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
 
 
 def _along(contour: Contour, by: complex) -> Iterator[Leg]:
-    """The profile, moved."""
     yield replace(contour.legs[0].moved(by), fast=contour.fast)
     yield from (leg.moved(by) for leg in contour.legs[1:])
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -81,7 +80,11 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
     fastest[np.isinf(fastest)] = np.nan
     new = _New(rows, fastest, programmed[first], often[first])
-    return _spliced(source, _edits(words, f_word, unit, mode, new))
+    pieces, done = [], 0
+    for start, end, text in _edits(words, f_word, unit, mode, new):
+        pieces += [source[done:start], text]
+        done = end
+    return b"".join([*pieces, source[done:]])
 
 
 class _FeedModes(NamedTuple):
@@ -155,7 +158,6 @@ def round_down(value: float) -> str:
 
 
 def _rows(words: Words, line: Array) -> Array:
-    """The rows of source lines."""
     row = np.searchsorted(words.line, line)
     if len(line) and (row[-1] >= len(words.line) or (words.line[row] != line).any()):
         raise ValueError("retimed: the program has blocks on lines where the source has no word")
@@ -175,7 +177,6 @@ def _unit_before(words: Words) -> FloatArray:
 
 
 def _f_words(words: Words) -> Array:
-    """(R,) index of each row's F word, or -1."""
     f_word = np.full(len(words.line), -1, dtype=np.int64)
     found = np.flatnonzero(words.letter == _F)
     f_word[_row_of_word(words)[found]] = found
@@ -209,16 +210,7 @@ def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list
 
 
 def _end(words: Words, word: int) -> int:
-    """Where the digits of a word end in the source."""
     after = int(words.at[word]) + 1
     match = _NUMBER.match(words.data, after)
     assert match is not None
     return after + len(match.group().rstrip(b" \t"))
-
-
-def _spliced(source: bytes, edits: Iterable[Edit]) -> bytes:
-    pieces, done = [], 0
-    for start, end, text in edits:
-        pieces += [source[done:start], text]
-        done = end
-    return b"".join([*pieces, source[done:]])

@@ -217,7 +217,6 @@ class Drawing:
 
 
 def _in_space(points: Sequence[Point]) -> FloatArray:
-    """(n, 3) points in the x y plane."""
     space = np.zeros((len(points), 3))
     space[:, :2] = np.array(points, dtype=np.float64).reshape(-1, 2)
     return space

@@ -227,7 +227,6 @@ def _numbers_one_by_one(data: bytes, start: int, end: int, report: Report) -> li
 
 
 def _match(pattern: re.Pattern[bytes], data: bytes, at: int) -> re.Match[bytes]:
-    """The match of a pattern that fits everywhere."""
     match = pattern.match(data, at)
     assert match is not None
     return match

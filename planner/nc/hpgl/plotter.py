@@ -115,7 +115,6 @@ class _Run:
         ]
 
     def _word(self, at: int, end: int) -> str:
-        """The text there, as far as it can be shown."""
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
         return text if text.isprintable() else ""
 
@@ -147,7 +146,6 @@ class _Run:
         return Notes(tuple(assumed), (*notes, *self.notes))
 
     def _place(self, at: int) -> tuple[int, int]:
-        """Line and column of a byte, from 1."""
         line = bisect_left(self._line_ends, at)
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
@@ -183,7 +181,6 @@ class _Run:
         self.page_end = self.page_end or (it if self.drawn else None)
 
     def _scale(self, it: Instruction) -> None:
-        """IP, SC, and DF, which takes the scale back."""
         change = self.scaling.with_points if it.name == "IP" else self.scaling.with_range
         self.scaling = change(it.numbers)
         self.absolute |= it.name == "DF"
@@ -274,7 +271,6 @@ class _Run:
             self.speed, self.speed_of_pen = speed, {}
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
-        """Where user coordinates lead [mm]."""
         unit = self.plotter.unit
         if absolute:
             x, y = self.scaling.place(x, y)

@@ -70,8 +70,6 @@ def compile_procedures(
 
 
 class _Function:
-    """The Python source of one procedure."""
-
     def __init__(self, procedure: tree.Procedure, language: tree.Language, rows: AppendedRows):
         self.procedure, self.language, self.rows = procedure, language, rows
         self.say = Expressions(language)

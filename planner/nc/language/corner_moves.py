@@ -225,7 +225,6 @@ _TOO_LARGE = "the rounding or chamfer takes more of a move than there is; correc
 
 
 def _leaving(move: Move, normal: int) -> complex:
-    """Unit tangent at the end of a move."""
     start = move.tangent(normal)
     return start if move.arc is None else start * cmath.rect(1.0, move.arc.sweep)
 

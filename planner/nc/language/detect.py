@@ -21,9 +21,7 @@ from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, SIEMENS, Readi
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
 # that fits nowhere is tried in 2^n ways, such as n comments in a file of no language.
-_LOOKED_AT = (
-    20_000  # bytes at the start of a file that tell its language, and in which the first % is looked for
-)
+_LOOKED_AT = 20_000  # bytes at the start of a file that tell its language, and hold the first %
 _CONVERSATIONAL = re.compile(
     rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
 )
@@ -39,16 +37,8 @@ _SIEMENS = re.compile(
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
 # of an NC program.)
 _FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
-_HPGL = re.compile(
-    rb"\A(?:\s|\xef\xbb\xbf)*+(?>"
-    + CONTROL
-    + rb"[\s;]*)*+"
-    + _FIRST
-    + rb"(?=[-+.\d,;\s]|"
-    + _FIRST
-    + rb"|\Z)",
-    re.IGNORECASE,
-)
+_BEHIND_CONTROL = rb"\A(?:\s|\xef\xbb\xbf)*+(?>" + CONTROL + rb"[\s;]*)*+"
+_HPGL = re.compile(_BEHIND_CONTROL + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"|\Z)", re.IGNORECASE)
 _NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
 
@@ -120,7 +110,6 @@ LATHE_NOTE = (
     "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
     "([dialect] lathe = false in the machine file if it is none)"
 )
-G_FURTHER = 54.1
 # Codes that call and return, save and restore modes.
 _CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
@@ -184,7 +173,8 @@ def computes(text: str) -> bool:
 
 def dialect_of(words: Words, reading: Reading) -> str | None:
     """The language that a program computes in, or None; `Reading.dialect` decides where it is given."""
-    found, end = None, _first_end(words)
+    ends = words.find("M", 2, 30)
+    found, end = None, words.row(int(ends[0])) if len(ends) else len(words.line)
     for row in may_compute(words):
         if row > end and found is None:
             return None  # what follows the end of a program that computes nothing is not read
@@ -208,9 +198,8 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     (`_has_signs`)."""
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
-    if dialect == LINUXCNC and any(
-        _LINUXCNC.search(bare(row_text(words, row))) for row in may_compute(words)
-    ):
+    texts = (bare(row_text(words, row)) for row in may_compute(words))
+    if dialect == LINUXCNC and any(map(_LINUXCNC.search, texts)):
         return False
     if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
         return machine.dialect.lathe
@@ -267,19 +256,10 @@ def _has(words: Words, letter: str) -> bool:
 
 def has_further_systems(words: Words) -> bool:
     """True if a program with L words has G54.1, which only Fanuc's and Haas' controls know."""
-    return _has(words, "L") and len(words.find("G", G_FURTHER)) > 0
-
-
-def _first_end(words: Words) -> int:
-    """The first row with M2 or M30, or the number of rows."""
-    ends = words.find("M", 2, 30)
-    return words.row(int(ends[0])) if len(ends) else len(words.line)
+    return _has(words, "L") and len(words.find("G", 54.1)) > 0
 
 
 def row_text(words: Words, row: int) -> str:
     """The line of a row as text."""
-    at = int(words.at[words.first[row]])
-    end = words.data.find(b"\n", at)
-    return words.data[words.data.rfind(b"\n", 0, at) + 1 : end if end >= 0 else len(words.data)].decode(
-        "latin-1"
-    )
+    start, end = words.line_at(int(words.at[words.first[row]]))
+    return words.data[start:end].decode("latin-1")

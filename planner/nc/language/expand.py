@@ -90,8 +90,6 @@ def expand(
 
 @dataclass(frozen=True)
 class _Front:
-    """The reader of a dialect."""
-
     language: Language
     variables: type[SystemVariables]
     parser: Callable[[Source], Parser]
@@ -132,7 +130,7 @@ class _Files:
         procedures = parser.parse()
         if parser.faults:
             return sorted(parser.faults, key=lambda fault: fault.place.line)
-        marker = _marker(source.file)
+        marker = f"<nc {source.file}>"  # the name of the file in Python's tracebacks
         try:
             self.run.add(compile_procedures(procedures, self.front.language, self.rows, marker), marker)
         except ProgramFault as fault:
@@ -162,11 +160,6 @@ class _Files:
             if path.name.lower() in wanted and path.is_file() and path.stat().st_size <= FILE_MAX:
                 return path
         return None
-
-
-def _marker(file: int) -> str:
-    """The name of a file in Python's tracebacks."""
-    return f"<nc {file}>"
 
 
 def _below(folder: Path) -> Iterator[Path]:

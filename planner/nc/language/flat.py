@@ -52,19 +52,15 @@ class Flat:
                 if letters[w] not in _LEFT_OUT
             )
             if text:
-                self.lines.append(_with_points(text) if self.points else text)
+                if self.points:  # lengths have a point
+                    words_of_row = text.split(" ")
+                    text = " ".join(w if "." in w or w[0] not in _LENGTHS else f"{w}." for w in words_of_row)
+                self.lines.append(text)
 
     def text(self) -> str:
         """The program, with M2 at its end if it has no end of its own."""
         ended = bool(set(self.lines[-1].split()) & set(_ENDS))
         return "\n".join([*self.lines, *([] if ended else ["M2"]), ""])
-
-
-def _with_points(text: str) -> str:
-    """A line whose lengths have a point."""
-    return " ".join(
-        f"{word}." if word[0] in _LENGTHS and "." not in word else word for word in text.split(" ")
-    )
 
 
 def flat_number(value: float) -> str:
@@ -84,7 +80,6 @@ def flat_program(
         return None
     fanuc = program.expansion.dialect == FANUC
     flat = Flat(source, points=fanuc or (machine is not None and machine.dialect is not None))
-    execute(
-        data, machine, program.reading, source, flat.add
-    )  # once more, now that it is known how arc centres are read
+    # once more, now that it is known how arc centres are read
+    execute(data, machine, program.reading, source, flat.add)
     return flat.text(), program

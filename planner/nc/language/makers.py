@@ -73,7 +73,8 @@ def heidenhain(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
                 datum[axis] = given[letter] * unit
             elif "I" + letter in given:
                 datum[axis] += given["I" + letter] * unit
-        if not parts.only_shifted and datum.any():
+        only_shifted = (parts.mirror * parts.scale == 1.0).all() and parts.rotation % 360.0 == 0.0
+        if not only_shifted and datum.any():
             raise ValueError(
                 "a datum shift while a rotation, mirror image or scale is in force is not read: in whose axes it counts is "
                 "not documented; define the shift first"
@@ -154,7 +155,6 @@ def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
-    """Words that APPR and DEP have in common."""
     return {
         "kind": KINDS[round(given["kind"])],
         "line": making.place.line,
@@ -247,7 +247,6 @@ def arc_through(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _back(making: Making, rows: list[Row]) -> list[Row]:
-    """The rows, and G91 behind them where it was in force."""
     absolute = making.travel.absolute if making.travel.active else making.interpreter.state.absolute
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 

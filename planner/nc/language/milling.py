@@ -231,8 +231,6 @@ _NARROW = 1e-9  # relative room beside the tool below which there is none
 
 
 class _Cutting:
-    """Rows of words of one pocket."""
-
     def __init__(self, plan: PocketPlan, at: complex, turned: complex):
         self.plan, self.at, self.turned = plan, at, turned
 

@@ -122,7 +122,6 @@ class AppendedRows:
         self._tables = None
 
     def _settle(self) -> None:
-        """Put the rows that were added one by one into arrays."""
         if not self._new:
             return
         words = [word for _, row in self._new for word in row]

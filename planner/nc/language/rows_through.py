@@ -149,7 +149,6 @@ class RowsThrough(travel_rows.Coordinates):
         return False
 
     def _pass(self, row: travel_rows.TravelRow, out: list[travel_rows.TravelRow], *, last: bool) -> None:
-        """A row without a move."""
         if last and self._approach is not None:
             raise ValueError("APPR is followed by no contour")
         if self._corner is not None:
@@ -212,7 +211,6 @@ class RowsThrough(travel_rows.Coordinates):
             self._go(move, out)
 
     def _go(self, move: travel_rows.Move, out: list[travel_rows.TravelRow]) -> None:
-        """A move whose ends are known, on to the compensation."""
         rows: list[travel_rows.TravelRow] = []
         if self._approach is not None:
             rows, self._offset = self._approach.rows(move)
@@ -232,7 +230,6 @@ class RowsThrough(travel_rows.Coordinates):
         return self.interpreter.state.unit
 
     def _begin(self) -> None:
-        """Look at rows from now on."""
         if self.active:
             return
         state = self.interpreter.state
@@ -245,7 +242,6 @@ class RowsThrough(travel_rows.Coordinates):
             self._ahead.append(travel_rows.TravelRow([(travel_rows.G, 90.0, 0)], 1, 0))
 
     def _look(self) -> None:
-        """Ask the interpreter for the position."""
         self._mapped = self.interpreter.state.programmed().copy()
         self.place = self.unmapped(self._mapped)
         self._beside = False
@@ -274,7 +270,6 @@ class RowsThrough(travel_rows.Coordinates):
         return [travel_rows.TravelRow([(travel_rows.G, code, at)], line, frame) for code in codes]
 
     def _in_units(self, row: travel_rows.TravelRow) -> travel_rows.TravelRow:
-        """A row of lengths in mm in the program's unit."""
         if self._unit == 1.0:
             return row
         lengths = {*travel_rows.AXES, *travel_rows.CENTRES}

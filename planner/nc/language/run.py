@@ -91,9 +91,8 @@ class ProgramRun:
         stopped = self._run(main)
         left = self.leave_profile()
         if stopped is None and left is not None:
-            return ProgramFault(
-                left, "the program ends inside the profile of this cycle; end it behind the cycles"
-            )
+            text = "the program ends inside the profile of this cycle; end it behind the cycles"
+            return ProgramFault(left, text)
         return stopped
 
     def _run(self, main: str) -> ProgramFault | None:
@@ -111,7 +110,8 @@ class ProgramRun:
         except ProgramFault as fault:
             return self._stopped(fault)
         except NotFinite as fault:
-            place = SourcePlace(self._file_at(fault.at), fault.line, fault.at)
+            file = sum(begin <= fault.at for begin, _ in self.rows.files)
+            place = SourcePlace(file, fault.line, fault.at)
             return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
             return self._stopped(ProgramFault(statement_of(fault.__traceback__, self.units), sentence(fault)))
@@ -131,7 +131,6 @@ class ProgramRun:
             raise Ended
 
     def _pass_on(self, words: Words) -> None:
-        """Execute rows, in the frame and with the compensation in force."""
         for rows in self.travel.through(words):
             self._execute(rows)
 
@@ -235,11 +234,8 @@ class ProgramRun:
         self._messages += 1
         if self._messages > _MESSAGES_MAX:
             return
-        text = "".join(
-            piece if isinstance(piece, str) else "######" if piece is None else f"{piece:.6f}"
-            for piece in pieces
-        )
-        self.interpreter.findings.note(f"message: {text.strip()}", line)
+        texts = (p if isinstance(p, str) else "######" if p is None else f"{p:.6f}" for p in pieces)
+        self.interpreter.findings.note(f"message: {''.join(texts).strip()}", line)
 
     def modes(self, action: str, place: tuple[int, int, int]) -> None:
         """Save the modal state, forget it, or write the words that restore it."""
@@ -320,6 +316,3 @@ class ProgramRun:
         with contextlib.suppress(Ended, NotFinite, ProgramFault):
             self.flush()
         return ProgramFault(fault.place, message)
-
-    def _file_at(self, at: int) -> int:
-        return sum(begin <= at for begin, _ in self.rows.files)

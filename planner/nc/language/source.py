@@ -17,9 +17,8 @@ from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.language.detect import bare, computes, may_compute, row_text
 from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
-from planner.nc.lexer import Words
+from planner.nc.lexer import BOM, Words
 
-_BOM = b"\xef\xbb\xbf"
 _PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
 _MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
 
@@ -74,11 +73,10 @@ class Source:
         """The text of a row."""
         words = self.words
         at = int(words.at[words.first[row]])
-        start = words.data.rfind(b"\n", 0, at) + 1
-        end = words.data.find(b"\n", at)
-        text = words.data[start : end if end >= 0 else len(words.data)]
-        if start == 0 and text.startswith(_BOM):
-            start, text = len(_BOM), text[len(_BOM) :]
+        start, end = words.line_at(at)
+        if start == 0 and words.data.startswith(BOM):
+            start = len(BOM)
+        text = words.data[start:end]
         place = SourcePlace(self.file, int(words.line[row]), self.begin + at)
         return SourceLine(row, place, start + self.begin, text.decode("latin-1"), float(self.scale[row]))
 
@@ -123,9 +121,8 @@ class Source:
         return bool(((letter == ord("M")) & np.isin(value, (2, 30))).any())
 
     def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
-        place = SourcePlace(
-            self.file, int(self.words.line[first]), self.begin + int(self.words.at[self.words.first[first]])
-        )
+        at = self.begin + int(self.words.at[self.words.first[first]])
+        place = SourcePlace(self.file, int(self.words.line[first]), at)
         return PlainRows(place, self.first_row + first, self.first_row + last, may_end)
 
     def part(self, rows: PlainRows, first: int, last: int) -> PlainRows:
@@ -135,14 +132,7 @@ class Source:
 
     def fault(self, fault: ProgramFault, name: str = "") -> Fault:
         """A fault of this file as the reader reports it."""
-        data, at = self.words.data, fault.place.at - self.begin
-        start = data.rfind(b"\n", 0, at) + 1
-        column = len(data[start:at].removeprefix(_BOM).decode("utf-8", "replace")) + 1
-        word = re.match(rb"[^\s(;]{1,20}", data[at:])
-        return Fault(
-            fault.place.line,
-            column,
-            word.group().decode("utf-8", "replace") if word else "",
-            fault.message,
-            name,
-        )
+        at = fault.place.at - self.begin
+        match = re.match(rb"[^\s(;]{1,20}", self.words.data[at:])
+        word = match.group().decode("utf-8", "replace") if match else ""
+        return Fault(fault.place.line, self.words.column_at(at), word, fault.message, name)

@@ -11,7 +11,7 @@ left to right; a sign belongs to what follows it, so that -2**2 is 4.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from planner.nc.integers import LENGTHS
@@ -75,6 +75,13 @@ class LineReader(ExpressionReader):
             at += 1
         self.places = places
         return "".join([text[k] for k in places])
+
+    def messages(self) -> Iterator[tuple[str, str]]:
+        """Comments that are messages: DEBUG, PRINT or MSG, and the text."""
+        for comment in self.comments:
+            kind, comma, text = comment.partition(",")
+            if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
+                yield kind.strip().upper(), text
 
     def column(self, at: int) -> int:
         """Where a character stands in the text as it was given."""
@@ -192,12 +199,10 @@ class LineReader(ExpressionReader):
             parameter = self.parameter()
             self.expect("]", "the parameter")
             return tree.Exists(parameter)
-        operand = self.bracket()
-        return (
-            tree.op(name, operand, self.bracket())
-            if name == "ATAN" and self.take("/")
-            else tree.op(name, operand)
-        )
+        operands = [self.bracket()]
+        if name == "ATAN" and self.take("/"):
+            operands.append(self.bracket())
+        return tree.op(name, *operands)
 
     def operator(self) -> str:
         match = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
@@ -219,12 +224,8 @@ class LineReader(ExpressionReader):
             elif c.isalpha() and c.isascii():
                 self.at += 1
                 letter, value = c.upper(), self.value()
-                if (
-                    scale != 1.0
-                    and isinstance(value, tree.Number)
-                    and ord(letter) in LENGTHS
-                    and "." not in self.text[at : self.at]
-                ):
+                is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.at]
+                if scale != 1.0 and is_length and isinstance(value, tree.Number):
                     value = tree.Number(value.value * scale)
                 words.append(tree.Word(letter, self.line.start + self.column(at), value))
             else:

@@ -120,11 +120,6 @@ class FrameParts:
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     centre: FloatArray = field(default_factory=lambda: np.zeros(3))
 
-    @property
-    def only_shifted(self) -> bool:
-        """True if there is nothing but the datum shift."""
-        return (self.mirror * self.scale == 1.0).all() and self.rotation % 360.0 == 0.0
-
     def affine(self) -> tuple[FloatArray, FloatArray]:
         """Matrix (3, 3) and shift (3,). Raises ValueError for what depends on an order that is not known."""
         uneven = len({*np.abs(self.scale)}) > 1
@@ -187,8 +182,7 @@ class Coordinates:
 
     def unmapped(self, point: FloatArray) -> FloatArray:
         """(3,) the point of the program that is there."""
-        found: FloatArray = np.linalg.solve(self.matrix, point - self.shift).astype(np.float64)
-        return found
+        return np.asarray(np.linalg.solve(self.matrix, point - self.shift), dtype=np.float64)
 
     def check_even(self) -> None:
         """Arcs stay arcs. Raises ValueError."""

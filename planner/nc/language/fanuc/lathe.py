@@ -69,10 +69,9 @@ class LatheParser(LatheWords):
                 procedures.append(Procedure(_profile_name(pair), body[first].place, body[first:last]))
         if not self.source.file:
             start = procedures[0].place
-            after = int(
-                bool(procedures[0].body) and isinstance(procedures[0].body[0], PlainRows)
-            )  # the first %
-            procedures[0].body.insert(after, row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
+            body = procedures[0].body
+            percent = bool(body) and isinstance(body[0], PlainRows)  # stands before all else
+            body.insert(int(percent), row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
     def _line(self, line: SourceLine) -> None:
@@ -96,7 +95,8 @@ class LatheParser(LatheWords):
     def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
         given = {word.letter: word for word in words if word.letter in own}
-        if self._is_first(cycle, given):
+        first = not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ")
+        if first:  # of two blocks
             lengths = "QR" if cycle == "G76" else "UWR"
             self.waiting[cycle] = {
                 letter: self._length(word, cycle, line) if letter in lengths else word.value
@@ -109,10 +109,10 @@ class LatheParser(LatheWords):
         if cycle == "G76":
             self._thread(given, line)
             return
-        pair = tuple(
-            word.value.value if isinstance(word.value, Number) else -1.0 for word in (given["P"], given["Q"])
+        first_block, last_block = (
+            int(value.value) if isinstance(value := given[letter].value, Number) else -1 for letter in "PQ"
         )
-        profile = (int(pair[0]), int(pair[1]))
+        profile = (first_block, last_block)
         if profile not in self.pairs:
             raise line.fault(_no_profile(profile))
         self.cycles.append((profile, line.place))
@@ -128,29 +128,19 @@ class LatheParser(LatheWords):
         self.body += [shared(values, line), made(line.place, "profile"), call]
         self.body.append(of_shared(line.place, cycle, values))
 
-    @staticmethod
-    def _is_first(cycle: str, given: dict[str, Word]) -> bool:
-        """True if the block is the first of two."""
-        if cycle == "G76":
-            return not given.keys() & set("XZUWK")
-        return "P" not in given or "Q" not in given
-
     def _removal(self, given: dict[str, Expression], line: SourceLine, depth: str) -> dict[str, Expression]:
         """G71 (depth in U of its first block) and G72 (in W)."""
         before = self.waiting.get("G71" if depth == "U" else "G72", {})
         values = {letter: given[letter] for letter in "UWIK" if letter in given}
-        found = given.get("D", before.get(depth))
-        if found is None:
-            raise line.fault(
-                f"the depth of a pass is not given: D, or {depth} in a block before this one ({depth}2. R0.5)"
-            )
-        values["D"] = found
+        if "D" not in given and depth not in before:
+            remedy = f"D, or {depth} in a block before this one ({depth}2. R0.5)"
+            raise line.fault(f"the depth of a pass is not given: {remedy}")
+        values["D"] = given["D"] if "D" in given else before[depth]
         if "R" in before:
             values["R"] = before["R"]
         return values
 
     def _pattern(self, given: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
-        """G73: U W R of its first block are I K D of the form in one."""
         before = self.waiting.get("G73", {})
         values = {letter: given[letter] for letter in "UW" if letter in given}
         for letter, first in (("I", "U"), ("K", "W"), ("D", "R")):
@@ -177,25 +167,19 @@ class LatheParser(LatheWords):
                 raise line.fault("G76 needs D, the depth of the first pass")
             values.pop("Q", None)  # the angle of the spindle where the thread begins
             values.pop("R", None)
-            self._message_once(line)
+            text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"
+            self.body.append(Message(line.place, (text,)))
         values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
         values["F"] = self.feed
         self.body.append(made(line.place, "G76", **values))
         self.threading = False
 
-    def _message_once(self, line: SourceLine) -> None:
-        text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"
-        self.body.append(Message(line.place, (text,)))
-
     def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
         """A word of a cycle in the program's unit: a number without a point is in least increments."""
         letter = word.letter
         in_increments = _INCREMENTS.get(cycle, "D")
-        if (
-            letter not in in_increments
-            or not isinstance(word.value, Number)
-            or (cycle == "G73" and letter == "D")
-        ):
+        is_count = cycle == "G73" and letter == "D"
+        if letter not in in_increments or not isinstance(word.value, Number) or is_count:
             return word.value
         text = self.source.words.data[word.at - self.source.begin :]
         match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)

@@ -58,7 +58,6 @@ class LatheCycles:
         }
 
     def _begin_at_once(self, making: Making, given: Given) -> Iterable[Row]:
-        """G70 keeps where the tool is."""
         self._start = self._state.programmed().copy()
         return []
 
@@ -109,7 +108,6 @@ class LatheCycles:
         return self._rows(turning.stock_removal(contour, roughing, facing=cycle == "G72"))
 
     def _retract(self, making: Making, given: Given, cycle: str) -> float:
-        """R [mm], and what is assumed where it is not given."""
         if "R" in given:
             return abs(given["R"]) * self._unit
         text = f"the retract of {cycle} is not given: {RETRACT:g} mm"
@@ -173,7 +171,6 @@ class LatheCycles:
         return self._point(self._start)
 
     def _end(self, given: Given, start: complex) -> complex:
-        """The place of X and Z; the start's where they are not given."""
         x = given["X"] / self._of_radius * self._unit if "X" in given else start.imag
         return complex(given["Z"] * self._unit if "Z" in given else start.real, x)
 

@@ -77,7 +77,6 @@ class LatheWords(FanucParser):
         self.retract: dict[str, Expression] = {}  # R of the first blocks of G74 and G75
 
     def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
-        """A line with a cycle."""
         raise NotImplementedError
 
     def _words(self, words: Words, assignments: Assignments, line: SourceLine) -> None:
@@ -117,7 +116,6 @@ class LatheWords(FanucParser):
         return word
 
     def _threads(self, words: Words, codes: set[str]) -> Words:
-        """G32 with the lead F as G33 with K, on each of its lines."""
         if "G32" in codes:
             self.threading = True
         elif codes & {"G0", "G1", "G2", "G3", "G00", "G01", "G02", "G03"}:

@@ -43,9 +43,8 @@ class FanucParser(FanucControl):
         """All procedures of the file; the main program first, under the empty name."""
         items = list(self.source.in_order())
         texts = [item.text.upper().replace(" ", "") for item in items if not isinstance(item, tree.PlainRows)]
-        self.numbers = frozenset(
-            str(int(match.group(1))) for text in texts if (match := _PROGRAM.match(text))
-        )
+        found = filter(None, map(_PROGRAM.match, texts))
+        self.numbers = frozenset(str(int(match.group(1))) for match in found)
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
         self._begin("" if self.source.file == 0 else "file", tree.SourcePlace(self.source.file, 1, 0))
@@ -74,17 +73,13 @@ class FanucParser(FanucControl):
         self.modal = None
 
     def _local_call(self, number: int, place: tree.SourcePlace, procedure: tree.Procedure) -> None:
-        at = next(
-            (k for k, s in enumerate(procedure.body) if isinstance(s, tree.Label) and s.number == number),
-            None,
-        )
-        name = calls.block_name(number, procedure)
-        if at is None:
-            self.faults.append(
-                tree.ProgramFault(place, f"M97 P{number}: there is no block N{number} in this program")
-            )
+        name, body = calls.block_name(number, procedure), procedure.body
+        at = [k for k, s in enumerate(body) if isinstance(s, tree.Label) and s.number == number]
+        if not at:
+            text = f"M97 P{number}: there is no block N{number} in this program"
+            self.faults.append(tree.ProgramFault(place, text))
         elif all(known.name != name for known in self.procedures):
-            self.procedures.append(tree.Procedure(name, procedure.body[at].place, procedure.body[at:]))
+            self.procedures.append(tree.Procedure(name, body[at[0]].place, body[at[0] :]))
 
     def _plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement, used labels between them, and G66 calls after those that move."""
@@ -137,9 +132,8 @@ class FanucParser(FanucControl):
     def _program(self, number: str, line: SourceLine) -> None:
         self._end_of_program()
         only = self.procedures[-1]
-        if len(self.procedures) == 1 and all(
-            isinstance(s, tree.PlainRows) and _is_percent(self.source, s) for s in only.body
-        ):
+        empty = all(isinstance(s, tree.PlainRows) and _is_percent(self.source, s) for s in only.body)
+        if len(self.procedures) == 1 and empty:
             if self.source.file:
                 self.procedures[0] = tree.Procedure(number, line.place, only.body)
             return  # the first program of the file
@@ -148,10 +142,7 @@ class FanucParser(FanucControl):
         self._begin(number, line.place)
 
     def _messages(self, reader: LineReader, line: SourceLine) -> None:
-        for comment in reader.comments:
-            kind, comma, text = comment.partition(",")
-            if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
-                self.body.append(tree.Message(line.place, (text,)))
+        self.body += [tree.Message(line.place, (text,)) for _, text in reader.messages()]
 
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         if keyword == "GOTO":

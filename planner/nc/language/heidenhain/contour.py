@@ -18,13 +18,8 @@ from planner.nc.language.heidenhain.text import POSITION, Block, Items, Rows, ab
 from planner.nc.language.tree import ZERO, Expression, MadeRows, Number, assign
 
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
-_COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
+COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
 TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
-
-
-def compensates(text: str) -> bool:
-    """True if a block may switch compensation on or off."""
-    return bool(_COMPENSATES.search(text))
 
 
 def approach_rows(block: Block, feed: Expression | None) -> tuple[Rows, Items]:

@@ -138,7 +138,6 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 
 def _tapped(making: Making, given: Mapping[str, float], lead: float | None = None) -> Iterable[Row]:
-    """At the lead, or at the feed of cycle 206."""
     hole, speed = _hole(given), making.interpreter.state.spindle.speed
     lead = (given["Q206"] / speed if speed else 0.0) if lead is None else lead
     yield from tapped(making, hole, lead, speed)

@@ -229,7 +229,6 @@ def _arc_code(block: text.Block, given: text.Items) -> tree.Expression:
 
 
 def _assigned(ends: Ends) -> Assigned:
-    """The position at the end of a move."""
     return [(text.POSITION[axis], end) for axis, end in ends.items() if axis in text.POSITION]
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import text
-from planner.nc.language.heidenhain.contour import approach_rows, compensates, datum_rows
+from planner.nc.language.heidenhain.contour import COMPENSATES, approach_rows, datum_rows
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
 from planner.nc.language.source import Source
@@ -41,7 +41,7 @@ class HeidenhainParser(Definitions):
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(text.blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
-        self.compensates = any(compensates(block.text) for block in self.blocks)
+        self.compensates = any(COMPENSATES.search(block.text) for block in self.blocks)
         self.oversizes = any(re.match(r"TOOL CALL.*\bDR", b.text, re.IGNORECASE) for b in self.blocks)
         poles = [block.text.upper() for block in self.blocks if re.match(r"CC\b", block.text, re.IGNORECASE)]
         shared = bool(self.file) or any(re.match("CALL PGM", b.text, re.IGNORECASE) for b in self.blocks)
@@ -57,13 +57,9 @@ class HeidenhainParser(Definitions):
                 done.add(label)
                 if label in self.known:
                     first = self.known[label]
-                    procedures.append(
-                        tree.Procedure(
-                            procedure_name(label, source.file),
-                            self.blocks[first].place,
-                            self._body(first, self._end_of(first), True),
-                        )
-                    )
+                    body = self._body(first, self._end_of(first), True)
+                    name = procedure_name(label, source.file)
+                    procedures.append(tree.Procedure(name, self.blocks[first].place, body))
         set_up: list[tuple[tree.Parameter, tree.Expression]] = [
             (text.own(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
         ]
@@ -133,7 +129,6 @@ class HeidenhainParser(Definitions):
         return [*corner, *read(self, block)]
 
     def _call_program(self, block: text.Block) -> text.Rows:
-        """CALL PGM name: a file of the program's folder; its units end with it."""
         name = called_file(block.rest)
         if not name:
             raise block.wrong("CALL PGM is followed by the name of a program")
@@ -183,8 +178,8 @@ class HeidenhainParser(Definitions):
             rows = self.moves.polar_arc(block, given)
             self._need_pole(block)
             return [*before, *rows, *after]
-        if name != "C" or not self.moves.tilted:
-            text.refuse_arc_axes(block, given)
+        if (name != "C" or not self.moves.tilted) and "Z" in given.axes:
+            raise block.fault("an arc with Z; a helix is written as CP with IPA")
         how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
         rows = how(block, given, self._ends(block, given))
         if name == "C":

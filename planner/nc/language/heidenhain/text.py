@@ -132,11 +132,8 @@ def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
         content = content.rstrip("~ \t\r\x1a")
         cycle = waiting is not None and waiting[1].upper().startswith("CYCL DEF") and not numbered
         if waiting is not None and content and (open_end or (cycle and _CONTINUED.match(body))):
-            waiting = (
-                waiting[0],
-                waiting[1] + " " + content,
-                [*waiting[2], (start + first, len(waiting[1]) + 1)],
-            )
+            place, before, parts = waiting
+            waiting = place, f"{before} {content}", [*parts, (start + first, len(before) + 1)]
         elif content:
             if waiting is not None:
                 yield Block(waiting[0], waiting[1], tuple(waiting[2]))
@@ -271,9 +268,3 @@ def looked_up(block: Block) -> tree.Line:
     """Ask the interpreter for the position: behind offsets and moves in machine coordinates."""
     where = [tree.Numbered(tree.Number(float(FIRST_POSITION + k))) for k in range(3)]
     return tree.assign(block.place, *zip((X, Y, Z), where, strict=True))
-
-
-def refuse_arc_axes(block: Block, given: Items) -> None:
-    """Arcs of CR and CT, and C without other poles, lie in the working plane. Raises ProgramFault."""
-    if "Z" in given.axes:
-        raise block.fault("an arc with Z; a helix is written as CP with IPA")

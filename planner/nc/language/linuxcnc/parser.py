@@ -48,33 +48,23 @@ def _needed(condition: tree.Expression | None, keyword: str, line: SourceLine) -
     return condition
 
 
-def end_of(kind: str) -> str:
-    """The keyword that ends a control statement."""
-    return "while [condition]" if kind == "do" else f"end{kind}"
-
-
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _PROGRAM = ""
 
 
 class LinuxcncParser:
-    """Statements of one file; those that are open while it is read.
-
-    procedures : subprograms by their labels
-    main       : statements of the main program
-    base, body : statements outside of all that is open, and where the next one goes
-    open       : control statements whose end has not come, the outermost first
-    faults     : of all lines
-    """
+    """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
-        self.procedures: dict[str, tree.Procedure] = {}
-        self.main: list[tree.Statement] = []
-        self.open: list[tree.OpenStatement] = []
-        self.base = self.body = self.main
         self.source = source
         self.faults: list[tree.ProgramFault] = []
+        self.procedures: dict[str, tree.Procedure] = {}  # subprograms by their labels
+        self.main: list[tree.Statement] = []
+        # control statements whose end has not come, the outermost first
+        self.open: list[tree.OpenStatement] = []
+        # statements outside of all that is open, and where the next one goes
+        self.base = self.body = self.main
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
 
@@ -141,11 +131,10 @@ class LinuxcncParser:
 
     def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> tree.OpenStatement:
         if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
-            last = (
-                f"o{self.open[-1].label} {self.open[-1].kind} on line {self.open[-1].place.line} is open"
-                if self.open
-                else "nothing is open"
-            )
+            last = "nothing is open"
+            if self.open:
+                top = self.open[-1]
+                last = f"o{top.label} {top.kind} on line {top.place.line} is open"
             raise line.fault(f"o{label} {keyword} has no o{label} {kind} before it: {last}")
         return self.open[-1]
 
@@ -164,11 +153,9 @@ class LinuxcncParser:
             except tree.ProgramFault as fault:
                 self.faults.append(fault)
         for left in self.open[:1] if not self.faults else ():
-            self.faults.append(
-                tree.ProgramFault(
-                    left.place, f"this {left.kind} has no end; write o{left.label} {end_of(left.kind)}"
-                )
-            )
+            end = "while [condition]" if left.kind == "do" else f"end{left.kind}"
+            text = f"this {left.kind} has no end; write o{left.label} {end}"
+            self.faults.append(tree.ProgramFault(left.place, text))
         return [
             tree.Procedure(_PROGRAM, tree.SourcePlace(self.source.file, 1, 0), self.main),
             *self.procedures.values(),
@@ -197,14 +184,10 @@ class LinuxcncParser:
         self._messages(reader, line)
 
     def _messages(self, reader: LineReader, line: SourceLine) -> None:
-        for comment in reader.comments:
-            kind, comma, text = comment.partition(",")
-            if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
-                expanded = kind.strip().upper() != "MSG"
-                self.body.append(tree.Message(line.place, _pieces(text) if expanded else (text,)))
+        for kind, text in reader.messages():
+            self.body.append(tree.Message(line.place, (text,) if kind == "MSG" else _pieces(text)))
 
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
-        """M70 to M73, M98 and M99 as statements; False if the line has none of them."""
         match = _FLOW.match(reader.text, reader.at)
         if match is None:
             return False
@@ -259,16 +242,14 @@ class LinuxcncParser:
         """O100 alone: a program number, or a subprogram if an M99 follows before the next one."""
         if self.open:
             raise line.fault(f"O{label} stands inside {self.open[-1].kind}; write its end before it")
-        if self._returns(line):
+        behind = line.start - self.source.begin + len(line.text)
+        following = _NEXT_PROGRAM.search(self.source.words.data, behind)
+        if following is not None and following.group(1) is not None:
             self.plain_sub, self.base = label, []
             self._add(label, line.place, self.base)
         else:
             self.plain_sub, self.base = "", self.main
         self.body = self.base
-
-    def _returns(self, line: SourceLine) -> bool:
-        match = _NEXT_PROGRAM.search(self.source.words.data, line.start - self.source.begin + len(line.text))
-        return match is not None and match.group(1) is not None
 
     def _call(self, reader: LineReader, line: SourceLine, label: str | tree.Expression) -> None:
         arguments: list[tree.Expression] = []
@@ -276,10 +257,8 @@ class LinuxcncParser:
             arguments.append(reader.bracket())
         if len(arguments) > ARGUMENTS_MAX:
             raise line.fault(f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
-        word = f"o<{label}> call" if isinstance(label, str) and not label.isdigit() else "o call"
-        if isinstance(label, str) and label.isdigit():
-            word = f"o{label} call"
-        self.body.append(tree.Call(line.place, label, tuple(enumerate(arguments, 1)), word))
+        name = "" if not isinstance(label, str) else label if label.isdigit() else f"<{label}>"
+        self.body.append(tree.Call(line.place, label, tuple(enumerate(arguments, 1)), f"o{name} call"))
 
     def _nothing_left(self, reader: LineReader, after: str) -> None:
         if not reader.ended:
@@ -302,7 +281,6 @@ _PARAMETER = re.compile(r"#(?:<([^<>]*)>|(\d+))")
 
 
 def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:
-    """The text of a message with its parameters."""
     pieces: list[str | tree.Named | tree.Numbered] = []
     done = 0
     for found in _PARAMETER.finditer(text):
@@ -310,9 +288,8 @@ def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:
         done = found.end()
         if found.group(2):
             number = float(found.group(2))
-            pieces.append(
-                tree.Numbered(tree.Number(number)) if 1 <= number <= LANGUAGE.largest else found.group()
-            )
+            known = 1 <= number <= LANGUAGE.largest
+            pieces.append(tree.Numbered(tree.Number(number)) if known else found.group())
         else:
             name = re.sub(r"\s", "", found.group(1)).lower()
             pieces.append(tree.Named(name, name.startswith("_")))

@@ -35,7 +35,6 @@ class BlockWords(Commands):
     centre_feed = False  # the program has CFTCP
 
     def _words(self, reader: LineTokens) -> None:
-        """A row of words, commands that move nothing, and assignments."""
         words: list[tree.Word] = []
         assigned: list[tuple[tree.Parameter, tree.Expression]] = []
         found: set[float] = set()
@@ -117,7 +116,6 @@ class BlockWords(Commands):
     def _circle(
         self, reader: LineTokens, arc: str, words: list[tree.Word], through: dict[str, tree.Expression]
     ) -> list[tree.Word]:
-        """An arc of CIP or CT with the coordinates among the words; returns the other words."""
         if not arc:
             raise reader.fault(
                 "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3", 0

@@ -134,7 +134,6 @@ class Commands(SiemensControl):
         return given
 
     def _pattern(self, reader: LineTokens) -> None:
-        """HOLES1 and HOLES2: the modal cycle at every place of a pattern."""
         name = reader.peek(-1)
         if self.cycle is None:
             raise reader.fault(f"{name} stands behind MCALL with a drilling cycle, which it repeats", 0)
@@ -254,7 +253,6 @@ class Commands(SiemensControl):
         return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
 
     def _call(self, reader: LineTokens) -> None:
-        """NAME, NAME P3, NAME(values)."""
         name = reader.peek()
         reader.next += 1
         times: tree.Expression = tree.ONE
@@ -267,7 +265,6 @@ class Commands(SiemensControl):
         self._append_call(reader, name, given, times)
 
     def _call_text(self, reader: LineTokens) -> None:
-        """CALL "NAME"."""
         text = reader.peek().strip('"')
         if reader.ended or reader.tokens[reader.next].kind != "text":
             raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
@@ -293,7 +290,6 @@ class Commands(SiemensControl):
         self.body.append(tree.Call(reader.place, name.lower(), None, name, times))
 
     def _procedure(self, reader: LineTokens) -> None:
-        """PROC NAME(REAL A, INT B)."""
         if reader.ended or reader.tokens[reader.next].kind != "name":
             raise reader.fault("PROC is followed by the subprogram's name")
         reader.next += 1
@@ -313,7 +309,6 @@ class Commands(SiemensControl):
             self.body.append(tree.assign(reader.place, *taken))
 
     def _return(self, reader: LineTokens) -> None:
-        """RET."""
         self.body.append(tree.Return(reader.place))
 
 

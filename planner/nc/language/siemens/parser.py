@@ -58,7 +58,6 @@ class SiemensParser(BlockWords):
         return [Procedure("file" if self.source.file else "", start, [first, *self.main])]
 
     def _special(self) -> list[int]:
-        """Rows, ascending, that are not words of the same meaning in RS274NGC."""
         words = self.source.words
         letter, value = words.letter, words.value
         same = np.isin(letter, [ord(c) for c in commands.PLAIN_LETTERS])

@@ -91,7 +91,6 @@ class LineTokens(TokenReader):
         return super().value()
 
     def _take_apart(self) -> None:
-        """Split a word that is a variable and a sum: A+1 in an expression."""
         word = self.tokens[self.next]
         split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
         parts = [Token("name", word.text[:split], word.at)]
@@ -250,7 +249,6 @@ class SiemensControl:
         )
 
     def _repeat_block(self, reader: LineTokens) -> None:
-        """REPEATB label P=n: the line of the label, n times more."""
         label, counter, times = self._repeated(reader, self.lines)
         place = reader.place
         self.body.append(tree.assign(place, (counter, tree.ZERO)))

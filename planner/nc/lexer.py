@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -143,16 +143,7 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
 
 def text_alone(data: bytes) -> Words:
     """A text without words, for languages that are not split into words."""
-    none = np.zeros(0, dtype=np.int64)
-    return Words(
-        letter=none.astype(np.uint8),
-        value=np.zeros(0),
-        at=none,
-        line=none.astype(np.int32),
-        first=np.zeros(1, dtype=np.int64),
-        data=data,
-        frame=none.astype(np.int32),
-    )
+    return replace(split_words(b"\n", block_delete=False), data=data)
 
 
 # Characters by their codes: what a compiled loop compares bytes with.

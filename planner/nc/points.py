@@ -34,7 +34,6 @@ def program_of_points(
     `Program.line` counts the moves from 1.
     """
     moves = len(position) - 1
-    nothing, none = np.zeros(0), np.zeros((0, len(AXES)))
     return Program(
         source=source,
         axes=AXES,
@@ -46,10 +45,6 @@ def program_of_points(
         line=np.arange(1, moves + 1),
         path_control=np.full(moves, PathControl.BLEND),
         tolerance=np.full(moves, np.nan if tolerance is None else tolerance),
-        arc_block=nothing,
-        arc_center=none,
-        arc_normal=nothing,
-        arc_sweep=nothing,
     )
 
 
@@ -84,8 +79,6 @@ def read_points(data: bytes, source: str) -> Program:
     good = known and position.ndim == 2 and position.shape[1] == len(AXES) and len(position) > 1
     good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
     if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
-        raise InputError(
-            "begins like a file of points, and is none: format points, axes xyz, points (n+1, 3), n feeds above 0 or null",
-            source=source,
-        )
+        text = "begins like a file of points, and is none: format points, axes xyz, points (n+1, 3), n feeds above 0 or null"
+        raise InputError(text, source=source)
     return program_of_points(position, feed, tolerance, source)

@@ -151,6 +151,10 @@ class SplineTable:
         return len(self.block)
 
 
+def _nothing() -> FloatArray:
+    return np.zeros(0)
+
+
 def no_splines(axes: int) -> SplineTable:
     """The splines of a program that has none, over `axes` axes."""
     return SplineTable(block=np.zeros(0), points=np.zeros((0, 4, axes)), weights=np.zeros((0, 4)))
@@ -210,11 +214,11 @@ class Program:
     line: Array
     path_control: Array
     tolerance: FloatArray
-    arc_block: Array
-    arc_center: FloatArray
-    arc_normal: Array
-    arc_sweep: FloatArray
-    synchronised: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    arc_block: Array = field(default_factory=_nothing)
+    arc_center: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    arc_normal: Array = field(default_factory=_nothing)
+    arc_sweep: FloatArray = field(default_factory=_nothing)
+    synchronised: Array = field(default_factory=_nothing)
     splines: SplineTable = field(default_factory=lambda: no_splines(0))
     events: Sequence[Event] = field(default=())
     origins: Origins = field(
@@ -222,10 +226,10 @@ class Program:
     )
     notes: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
-    frame: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    frame: Array = field(default_factory=_nothing)
     frames: tuple[Frame, ...] = ()
     expansion: Expansion | None = None
-    extruded: FloatArray = field(default_factory=lambda: np.zeros(0))
+    extruded: FloatArray = field(default_factory=_nothing)
     limits: tuple[SetLimit, ...] = ()
     reading: Reading = AS_USUAL
     tool_point: ToolPoint | None = None

@@ -20,6 +20,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -151,29 +152,31 @@ Point = tuple[float, float]
 PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
 
 
+class DrawnBlock(NamedTuple):
+    """A block that ends at `end` [mm]; `at` its place in the source [bytes], feed [mm/s], dwell [s]."""
+
+    kind: Kind
+    end: Point
+    at: int
+    feed: float
+    dwell: float
+
+
 class Drawing:
-    """Blocks so far: kinds, ends [mm], feeds [mm/s], dwells [s], and places in the source [bytes]."""
+    """Blocks, arcs and events so far."""
 
     def __init__(self) -> None:
-        self.kind: list[Kind] = []
-        self.end: list[Point] = []
-        self.feed: list[float] = []
-        self.dwell: list[float] = []
-        self.at: list[int] = []
+        self.blocks: list[DrawnBlock] = []
         self.arcs: list[tuple[int, Point, float]] = []
         self.events: list[tuple[int, int, str, float]] = []
 
     def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
         """Append a block to `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source [bytes]."""
-        self.kind.append(kind)
-        self.end.append(end)
-        self.feed.append(feed)
-        self.dwell.append(dwell)
-        self.at.append(at)
+        self.blocks.append(DrawnBlock(kind, end, at, feed, dwell))
 
     def add_arc(self, centre: Point, sweep: float, end: Point, at: int, *, feed: float) -> None:
         """An arc about `centre` [mm]; sweep [rad], counter-clockwise positive."""
-        self.arcs.append((len(self.kind), centre, sweep))
+        self.arcs.append((len(self.blocks), centre, sweep))
         self.add(Kind.ARC, end, at, feed=feed)
 
     def add_stop(self, where: Point, seconds: float, at: int) -> None:
@@ -182,24 +185,24 @@ class Drawing:
 
     def add_event(self, letter: str, value: float, at: int) -> None:
         """An event before the next block."""
-        self.events.append((len(self.kind), at, letter, value))
+        self.events.append((len(self.blocks), at, letter, value))
 
     def finish(self, data: bytes, source: str, path_control: PathControl, notes: Notes) -> Program:
         """The program; `data` is the text it was read from."""
-        blocks, arcs = len(self.kind), len(self.arcs)
+        blocks, arcs = self.blocks, len(self.arcs)
         newline = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
         event_at = np.array([event[1] for event in self.events], dtype=np.int64)
         return Program(
             source=source,
             axes=LINEAR_AXES,
             start=np.zeros(3),
-            kind=np.array(self.kind, dtype=np.uint8),
-            end=_in_space(self.end),
-            feed=np.array(self.feed, dtype=np.float64),
-            dwell=np.array(self.dwell, dtype=np.float64),
-            line=1 + np.searchsorted(newline, np.array(self.at, dtype=np.int64)),
-            path_control=np.full(blocks, path_control),
-            tolerance=np.full(blocks, np.nan),
+            kind=np.array([block.kind for block in blocks], dtype=np.uint8),
+            end=_in_space([block.end for block in blocks]),
+            feed=np.array([block.feed for block in blocks], dtype=np.float64),
+            dwell=np.array([block.dwell for block in blocks], dtype=np.float64),
+            line=1 + np.searchsorted(newline, np.array([block.at for block in blocks], dtype=np.int64)),
+            path_control=np.full(len(blocks), path_control),
+            tolerance=np.full(len(blocks), np.nan),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
             arc_center=_in_space([arc[1] for arc in self.arcs]),
             arc_normal=np.full(arcs, 2),

@@ -67,9 +67,8 @@ def read_drawing(
         run.execute(instruction)
         found += 1
     if not found and not run.reports:
-        raise InputError(
-            "the plotter file is empty: there is no instruction in it", source=source, line=1, column=1
-        )
+        text = "the plotter file is empty: there is no instruction in it"
+        raise InputError(text, source=source, line=1, column=1)
     control = Setup.of(machine).path_control
     program = run.drawing.finish(data, source, control, run.all_notes())
     return dataclasses.replace(program, reading=reading), run.faults()
@@ -110,9 +109,8 @@ class _Run:
 
     def faults(self) -> list[Fault]:
         """All faults in the order of the file."""
-        return [
-            Fault(*self._place(at), self._word(at, end), message) for at, end, message in sorted(self.reports)
-        ]
+        reports = sorted(self.reports)
+        return [Fault(*self._place(at), self._word(at, end), message) for at, end, message in reports]
 
     def _word(self, at: int, end: int) -> str:
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
@@ -121,14 +119,10 @@ class _Run:
     def all_notes(self) -> Notes:
         notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]
         assumed = []
-        drawing = self.drawing
-        blocks = zip(drawing.kind, drawing.feed, drawing.at, strict=True)
-        at_will = (at for kind, feed, at in blocks if kind in (Kind.LINE, Kind.ARC) and feed == math.inf)
-        if (at := next(at_will, None)) is not None:
-            line = self._place(at)[0]
-            assumed.append(
-                f"line {line}: no speed (VS) before it; the pen runs as fast as the machine allows"
-            )
+        drawn = (block for block in self.drawing.blocks if block.kind in (Kind.LINE, Kind.ARC))
+        if (at := next((block.at for block in drawn if block.feed == math.inf), None)) is not None:
+            text = "no speed (VS) before it; the pen runs as fast as the machine allows"
+            assumed.append(f"line {self._place(at)[0]}: {text}")
         for ignored, said in ((self.changing, assumed), (self.ignored, notes)):
             for name, places in ignored.items():
                 times = f"{len(places)} times, first " if len(places) > 1 else ""
@@ -136,13 +130,9 @@ class _Run:
                 said.append(f"{name} ignored, {times}on line {self._place(places[0])[0]}: {why}")
         if self.unknown:
             count, first = len(self.unknown), self.unknown[0]
-            what = (
-                "instruction that this reader does not know"
-                if count == 1
-                else "instructions that this reader does not know"
-            )
+            what = f"{count:,} instruction{'s' if count > 1 else ''} that this reader does not know"
             word, line = self._word(first, first + 2), self._place(first)[0]
-            assumed.append(f"{count:,} {what}: left out, as plotters do; first {word} line {line}")
+            assumed.append(f"{what}: left out, as plotters do; first {word} line {line}")
         return Notes(tuple(assumed), (*notes, *self.notes))
 
     def _place(self, at: int) -> tuple[int, int]:

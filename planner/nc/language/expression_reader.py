@@ -1,17 +1,16 @@
-"""Reading expressions by the ranks of their operators (Pratt's method): one reader, and a table of operators
-for each dialect."""
+"""Reading expressions by the ranks of their operators (Pratt's method): one reader, and the table of a
+dialect (`tree.Language`)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from planner.nc.language.tree import Expression, Operation
+from planner.nc.language.tree import Expression, Language, Operation
 
 NESTED_MAX = (
-    40  # brackets in brackets; the line of 255 characters of RS274NGC holds no more that means anything
+    40  # brackets in brackets; the 255 characters of RS274NGC's lines hold no more that means anything
 )
 OPERATIONS_MAX = 80  # one inside the other: Python compiles no more brackets than 200
 
@@ -21,19 +20,17 @@ def ranked(*names: str) -> dict[str, int]:
     return {name: rank for rank, of_rank in enumerate(names, start=1) for name in of_rank.split()}
 
 
+def names(text: str) -> frozenset[str]:
+    """Names with blanks between."""
+    return frozenset(text.split())
+
+
 class ExpressionReader:
-    """Reads values with operators between them.
+    """Reads values with operators between them."""
 
-    ranks  : by operator
-    meant  : the operators' names in the tree, where they are others
-    nested : how many brackets and signs are open
-    pieces : what long expressions are divided into, for messages
-    """
-
-    ranks: Mapping[str, int]
-    meant: Mapping[str, str] = {}
-    nested = 0
-    pieces = "lines"
+    language: Language
+    nested = 0  # brackets and signs that are open
+    pieces = "lines"  # what long expressions are divided into, for messages
 
     def operator(self) -> str:
         """The operator that comes next; empty for none."""
@@ -53,15 +50,14 @@ class ExpressionReader:
 
     def expression(self, rank: int = 1) -> Expression:
         """Values with operators of at least that rank, those of one rank taken from left to right."""
-        left, count = self.value(), 0
-        while (its := self.ranks.get(operator := self.operator(), 0)) >= rank:
+        left, count, language = self.value(), 0, self.language
+        while (its := language.ranks.get(operator := self.operator(), 0)) >= rank:
             self.skip(operator)
-            left = Operation(self.meant.get(operator, operator), (left, self.expression(its + 1)))
+            left = Operation(language.meant.get(operator, operator), (left, self.expression(its + 1)))
             count += 1
             if count > OPERATIONS_MAX:
-                raise self.refused(
-                    f"more than {OPERATIONS_MAX} operations in a row; write them in several {self.pieces}"
-                )
+                text = f"more than {OPERATIONS_MAX} operations in a row; write them in several {self.pieces}"
+                raise self.refused(text)
         return left
 
     def deeper(self, more: str = "") -> None:

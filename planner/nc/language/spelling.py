@@ -11,8 +11,7 @@ left to right; a sign belongs to what follows it, so that -2**2 is 4.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language import tree
@@ -30,20 +29,11 @@ LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, 
 _IN_LINES = "; write the expression in several lines"
 
 
-@dataclass(frozen=True)
-class Spelling:
-    """functions : names of functions of one value;  ranks : operators with their rank, the highest first applied"""
-
-    functions: frozenset[str]
-    ranks: Mapping[str, int]
-    long_values: bool = False  # an assignment takes an expression without brackets
-
-
 class LineReader(ExpressionReader):
     """Reads one line from left to right; `at` counts its characters without blanks and comments."""
 
-    def __init__(self, line: SourceLine, spelling: Spelling):
-        self.line, self.spelling, self.ranks = line, spelling, spelling.ranks
+    def __init__(self, line: SourceLine, language: tree.Language):
+        self.line, self.language = line, language
         self.at = 0
         self.comments: list[str] = []
         self.places: list[int] | None = None  # of the characters that are left, in `text`
@@ -191,8 +181,8 @@ class LineReader(ExpressionReader):
     def _function(self) -> tree.Expression:
         at = self.at
         name = self.keyword().upper()
-        if name not in self.spelling.functions:
-            known = ", ".join(sorted(self.spelling.functions))
+        if name not in self.language.functions:
+            known = ", ".join(sorted(self.language.functions))
             raise self.refused(f"{name} is no function; there are {known}", at)
         if name == "EXISTS":
             self.expect("[", name)
@@ -220,7 +210,7 @@ class LineReader(ExpressionReader):
             if c == "#":
                 target = self.parameter()
                 self.expect("=", "the parameter")
-                assignments.append((target, self.expression() if self.spelling.long_values else self.value()))
+                assignments.append((target, self.expression() if self.language.long_values else self.value()))
             elif c.isalpha() and c.isascii():
                 self.at += 1
                 letter, value = c.upper(), self.value()

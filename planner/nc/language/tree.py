@@ -235,6 +235,12 @@ def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRow
     return MadeRows(place, maker, tuple(values))
 
 
+def repeated(place: SourcePlace, counter: Named, times: Expression, label: int) -> If:
+    """Go back to a label so many times; the counter is 0 before and behind it."""
+    again: list[Statement] = [assign(place, (counter, counter + ONE)), Goto(place, Number(float(label)))]
+    return If(place, ((op("LT", counter, times), again),), [assign(place, (counter, ZERO))])
+
+
 @dataclass
 class OpenStatement:
     """A branch or loop without its end: its body so far, and conditions and bodies before it."""
@@ -258,6 +264,32 @@ class OpenStatement:
         if self.condition is not None:
             self.another_branch(None)
         return If(self.place, tuple(self.branches), self.body)
+
+
+class Statements:
+    """The statements so far: `body` is where the next one goes, `base` where it goes outside of all that is
+    open; `open` has those without an end, the outermost first."""
+
+    def __init__(self) -> None:
+        self.main: list[Statement] = []
+        self.base = self.body = self.main
+        self.open: list[OpenStatement] = []
+
+    def begin(self, opened: OpenStatement) -> OpenStatement:
+        """What follows stands in this statement."""
+        self.open.append(opened)
+        self.body = opened.body
+        return opened
+
+    def close(self) -> OpenStatement:
+        """The innermost open statement ends."""
+        closed = self.open.pop()
+        self.body = self.open[-1].body if self.open else self.base
+        return closed
+
+    def add_loop(self, closed: OpenStatement, condition: Expression, kind: str = "while") -> None:
+        """A loop that has ended."""
+        self.body.append(Loop(closed.place, kind, f"{closed.kind} {closed.place.at}", condition, closed.body))
 
 
 Statement = (
@@ -287,10 +319,12 @@ class Procedure:
 
 @dataclass(frozen=True)
 class Language:
-    """The meaning of the operators and parameters of a language."""
+    """How a language writes expressions, and what its operators and parameters mean."""
 
     # Python text by operator or function and number of operands, with {0} and {1} for the operands
     operations: Mapping[tuple[str, int], str]
+    ranks: Mapping[str, int]  # of operators; those of a higher rank bind first
+    functions: frozenset[str]  # of one value
     conditions: frozenset[str]  # those among them that are true or false rather than a number
     locals: int  # parameters 1 to `locals` are a call's own
     largest: int  # largest number of a parameter
@@ -301,6 +335,10 @@ class Language:
     system_names: frozenset[str] = frozenset()
     read: str = "{0}"  # the Python text of a parameter's value in an expression, with {0} for what was stored
     raw: frozenset[str] = frozenset()  # operators that tell a parameter without a value from 0
+    meant: Mapping[str, str] = field(
+        default_factory=dict
+    )  # names of operators in the tree, where they are others
+    long_values: bool = False  # an assignment takes an expression without brackets
 
 
 class Parser(Protocol):

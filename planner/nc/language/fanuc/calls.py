@@ -4,17 +4,14 @@ M98, M99, G65, G66)."""
 from __future__ import annotations
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import ranked
+from planner.nc.language.expression_reader import names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.source import SourceLine
-from planner.nc.language.spelling import LineReader, Spelling
+from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tree import Language
 
 LOCALS = 33  # #1 to #33 are a call's own
-_FUNCTIONS = "ABS ACOS ADP ASIN ATAN BCD BIN COS EXP FIX FUP LN ROUND SIN SQR SQRT TAN"
-_RANKS = ranked("EQ NE GT GE LT LE", "+ - OR XOR", "* / MOD AND")
-SPELLING = Spelling(functions=frozenset(_FUNCTIONS.split()), ranks=_RANKS, long_values=True)
 LANGUAGE = Language(
     operations=ARITHMETIC
     | {
@@ -26,6 +23,9 @@ LANGUAGE = Language(
         ("FUP", 1): "copysign(ceil(abs({0})),{0})",
         ("ROUND", 1): "copysign(floor(abs({0})+0.5),{0})",
     },
+    ranks=ranked("EQ NE GT GE LT LE", "+ - OR XOR", "* / MOD AND"),
+    functions=names("ABS ACOS ADP ASIN ATAN BCD BIN COS EXP FIX FUP LN ROUND SIN SQR SQRT TAN"),
+    long_values=True,
     conditions=COMPARISONS,
     locals=LOCALS,
     largest=9999,
@@ -40,13 +40,8 @@ _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE
 
 
-class FanucControl:
-    """The statements so far, and the loops that are open."""
-
-    def __init__(self) -> None:
-        self.body: list[tree.Statement] = []  # where the next statement goes
-        # of each loop, the outermost first: its DO number, place, condition, and the body around it
-        self.open: list[tuple[int, tree.SourcePlace, tree.Expression, list[tree.Statement]]] = []
+class FanucControl(tree.Statements):
+    """The statements so far, and the loops that are open, by their DO numbers."""
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
@@ -57,28 +52,26 @@ class FanucControl:
 
     def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = _ALWAYS) -> None:
         number = _loop_number(reader)
-        if any(number == known for known, _, _, _ in self.open) or len(self.open) >= _NESTED_MAX:
-            raise line.fault(
-                f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
-            )
-        self.open.append((number, line.place, condition, self.body))
-        self.body = []
+        if any(number == loop.label for loop in self.open) or len(self.open) >= _NESTED_MAX:
+            text = f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
+            raise line.fault(text)
+        self.begin(tree.OpenStatement("DO", line.place, condition, number))
 
     def _end(self, reader: LineReader, line: SourceLine) -> None:
         number = _loop_number(reader)
-        if not self.open or self.open[-1][0] != number:
+        if not self.open or self.open[-1].label != number:
             raise line.fault(f"END {number} has no DO {number} before it")
-        _, place, condition, around = self.open.pop()
-        around.append(tree.Loop(place, "while", f"DO {number}", condition, self.body))
-        self.body = around
+        loop = self.close()
+        assert loop.condition is not None
+        self.add_loop(loop, loop.condition)
 
 
-def _loop_number(reader: LineReader) -> int:
+def _loop_number(reader: LineReader) -> str:
     at = reader.at
     value = reader.number()
     if value is None or value != int(value):
         raise reader.refused("DO and END are followed by a whole number", at)
-    return int(value)
+    return f"{value:.0f}"
 
 
 _NUMBERS = {  # parameters of the letters of G65

@@ -12,7 +12,7 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.fanuc import calls
-from planner.nc.language.fanuc.calls import SPELLING, FanucControl
+from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 
@@ -62,13 +62,13 @@ class FanucParser(FanucControl):
         return self.procedures
 
     def _begin(self, name: str, place: tree.SourcePlace) -> None:
-        self.body = []
+        self.base = self.body = []
         self.procedures.append(tree.Procedure(name, place, self.body))
 
     def _end_of_program(self) -> None:
         if self.open:
-            number, place, _, _ = self.open[0]
-            self.faults.append(tree.ProgramFault(place, f"DO {number} has no END {number}"))
+            number = self.open[0].label
+            self.faults.append(tree.ProgramFault(self.open[0].place, f"DO {number} has no END {number}"))
             self.open.clear()
         self.modal = None
 
@@ -105,7 +105,7 @@ class FanucParser(FanucControl):
             self.body.append(self.source.part(rows, begin, rows.last))
 
     def _line(self, line: SourceLine) -> None:
-        reader = LineReader(line, SPELLING)
+        reader = LineReader(line, LANGUAGE)
         if reader.take("/"):
             reader.number() if reader.peek().isdigit() else None
         program = _PROGRAM.match(reader.text, reader.at)

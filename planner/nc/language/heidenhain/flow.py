@@ -50,12 +50,7 @@ class Flow:
             return [tree.Call(block.place, procedure_name(label, self.file), None, block.text)]
         counter = own(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
-        again: Rows = [
-            tree.assign(block.place, (counter, counter + tree.ONE)),
-            tree.Goto(block.place, tree.Number(float(label))),
-        ]
-        more = tree.op("LT", counter, tree.Number(float(repeat[1])))
-        return [tree.If(block.place, ((more, again),), [tree.assign(block.place, (counter, tree.ZERO))])]
+        return [tree.repeated(block.place, counter, tree.Number(float(repeat[1])), label)]
 
     def _parameter(self, block: Block) -> Rows:
         block.column = 0

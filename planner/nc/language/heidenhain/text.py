@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import Token, TokenReader, ranked
+from planner.nc.language.expression_reader import Token, TokenReader, names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
 from planner.nc.language.tree import Expression
@@ -25,15 +25,14 @@ from planner.nc.language.tree import Expression
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
 LANGUAGE = tree.Language(
     operations=ARITHMETIC,
+    ranks=ranked("+ -", "* /", "^"),
+    meant={"^": "**"},
+    functions=names("SIN COS TAN ASIN ACOS ATAN SQRT ABS INT FRAC LN LOG EXP"),
     conditions=COMPARISONS,
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
     system_numbers=PositionVariables.numbers,
-)
-
-_FUNCTIONS = frozenset(
-    ["SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SQRT", "ABS", "INT", "FRAC", "LN", "LOG", "EXP"]
 )
 
 
@@ -149,8 +148,7 @@ class Formula(TokenReader):
     pattern = re.compile(
         r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)|(?P<name>Q[LRS]?\d*|[A-Z]+)|(?P<sign>.))", re.IGNORECASE
     )
-    ranks = ranked("+ -", "* /", "^")
-    meant = {"^": "**"}  # noqa: RUF012
+    language = LANGUAGE
     pieces = "blocks"
     ends = "the formula ends too early"
     no_value = "is no value, Q parameter or function of a formula"
@@ -186,7 +184,7 @@ class Formula(TokenReader):
             return operand * operand
         if text == "NEG":
             return -self.value()
-        return tree.op(text, self.value()) if text in _FUNCTIONS else None
+        return tree.op(text, self.value()) if text in LANGUAGE.functions else None
 
 
 _ITEM = (

@@ -11,21 +11,20 @@ from __future__ import annotations
 import re
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import ranked
+from planner.nc.language.expression_reader import names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.spelling import LineReader, Spelling
+from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import LinuxcncVariables
 from planner.nc.language.tree import Language
 
 ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
 EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
-_FUNCTIONS = "ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT TAN"
-_RANKS = ranked("AND OR XOR", "EQ NE GT GE LT LE", "+ -", "* / MOD", "**")
-SPELLING = Spelling(functions=frozenset(_FUNCTIONS.split()), ranks=_RANKS)
 LANGUAGE = Language(
     operations=ARITHMETIC
     | {("EQ", 2): f"(abs({{0}}-{{1}})<{EQUAL!r})", ("NE", 2): f"(abs({{0}}-{{1}})>={EQUAL!r})"},
+    ranks=ranked("AND OR XOR", "EQ NE GT GE LT LE", "+ -", "* / MOD", "**"),
+    functions=names("ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT TAN"),
     conditions=COMPARISONS | LOGICAL,
     locals=ARGUMENTS_MAX,
     largest=5601,
@@ -53,18 +52,14 @@ _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _PROGRAM = ""
 
 
-class LinuxcncParser:
+class LinuxcncParser(tree.Statements):
     """Statements of one file. Faults of all its lines are kept in `faults`."""
 
     def __init__(self, source: Source):
+        super().__init__()
         self.source = source
         self.faults: list[tree.ProgramFault] = []
         self.procedures: dict[str, tree.Procedure] = {}  # subprograms by their labels
-        self.main: list[tree.Statement] = []
-        # control statements whose end has not come, the outermost first
-        self.open: list[tree.OpenStatement] = []
-        # statements outside of all that is open, and where the next one goes
-        self.base = self.body = self.main
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
 
@@ -77,7 +72,7 @@ class LinuxcncParser:
     def _control(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
         top = self.open[-1] if self.open else None
         if keyword == "while" and top is not None and top.kind == "do" and top.label == label:
-            self._close(top)
+            self.close()
             self.body.append(tree.Loop(top.place, "do", label, _needed(condition, keyword, line), top.body))
         elif keyword in ("sub", "if", "while", "do", "repeat"):
             self._begin(keyword, label, condition, line)
@@ -101,11 +96,9 @@ class LinuxcncParser:
             raise line.fault(f"more than {_NESTED_MAX} loops and branches in each other")
         if keyword not in ("sub", "do"):
             _needed(condition, keyword, line)
-        opened = tree.OpenStatement(keyword, line.place, condition, label)
-        self.open.append(opened)
+        opened = self.begin(tree.OpenStatement(keyword, line.place, condition, label))
         if keyword == "sub":
             self._add(label, line.place, opened.body)
-        self.body = opened.body
 
     def _another_branch(
         self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine
@@ -119,7 +112,7 @@ class LinuxcncParser:
     def _end(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
         kind = _ENDS[keyword]
         top = self._innermost(kind, keyword, label, line)
-        self._close(top)
+        self.close()
         if kind == "sub":
             if condition is not None:
                 top.body.append(tree.Return(line.place, condition))
@@ -137,10 +130,6 @@ class LinuxcncParser:
                 last = f"o{top.label} {top.kind} on line {top.place.line} is open"
             raise line.fault(f"o{label} {keyword} has no o{label} {kind} before it: {last}")
         return self.open[-1]
-
-    def _close(self, top: tree.OpenStatement) -> None:
-        self.open.pop()
-        self.body = self.open[-1].body if self.open else self.base
 
     def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
@@ -168,7 +157,7 @@ class LinuxcncParser:
         self.ended |= in_main and rows.may_end and self.source.has_end(rows)
 
     def _line(self, line: SourceLine) -> None:
-        reader = LineReader(line, SPELLING)
+        reader = LineReader(line, LANGUAGE)
         reader.take("/")
         if reader.peek() in "oO" and not reader.ended:
             self._o_word(reader, line)

@@ -16,21 +16,21 @@ import re
 from collections.abc import Container
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import Token, TokenReader, ranked
+from planner.nc.language.expression_reader import Token, TokenReader, names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
 LANGUAGE = tree.Language(
     operations=ARITHMETIC | {("MOD", 2): "fmod({0},{1})"},
+    ranks=ranked("OR XOR", "AND", "== <> > >= < <=", "+ -", "* / DIV MOD"),
+    meant={"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"},
+    functions=names("SIN COS TAN ASIN ACOS SQRT ABS POT TRUNC ROUND LN EXP"),
     conditions=COMPARISONS | LOGICAL,
     locals=0,
     largest=FIRST_POSITION + 2,
     vacant=0.0,
     system_numbers=PositionVariables.numbers,
-)
-_FUNCTIONS = frozenset(
-    ["SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "POT", "TRUNC", "ROUND", "LN", "EXP"]
 )
 _TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values, by their names in the tree
 # Names of numbers.
@@ -65,8 +65,7 @@ class LineTokens(TokenReader):
         r"(?P<sign>==|<>|>=|<=|[-+*/()<>=,\[\]:]))",
         re.IGNORECASE,
     )
-    ranks = ranked("OR XOR", "AND", "== <> > >= < <=", "+ -", "* / DIV MOD")
-    meant = {"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"}  # noqa: RUF012
+    language = LANGUAGE
 
     def __init__(self, text: str, place: tree.SourcePlace, start: int, names: set[str]):
         self.place, self.start, self.names = place, start, names
@@ -107,7 +106,7 @@ class LineTokens(TokenReader):
             return tree.Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
         if token.kind != "name":
             return None
-        if name in _FUNCTIONS or name in _TWO:
+        if name in LANGUAGE.functions or name in _TWO:
             self.expect("(")
             operands = [self.expression()]
             if name in _TWO:
@@ -146,15 +145,11 @@ class LineTokens(TokenReader):
 _NESTED_MAX = 100  # loops and branches in each other
 
 
-class SiemensControl:
-    """The statements so far, and those that are open."""
+class SiemensControl(tree.Statements):
+    """Control statements."""
 
     def __init__(self) -> None:
-        # main and body: statements of the program, and where the next one goes
-        self.main: list[tree.Statement] = []
-        self.body = self.main
-        # control statements whose end has not come, the outermost first
-        self.open: list[tree.OpenStatement] = []
+        super().__init__()
         self.labels: dict[str, int] = {}  # their numbers in the tree, by name
         self.counters = 0  # how many sections are repeated by their labels
         self.lines: dict[str, list[tree.Statement]] = {}  # the statements of lines with labels
@@ -168,17 +163,12 @@ class SiemensControl:
     def _begin(self, kind: str, reader: LineTokens, condition: tree.Expression | None) -> tree.OpenStatement:
         if len(self.open) >= _NESTED_MAX:
             raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
-        opened = tree.OpenStatement(kind, reader.place, condition)
-        self.open.append(opened)
-        self.body = opened.body
-        return opened
+        return self.begin(tree.OpenStatement(kind, reader.place, condition))
 
     def _close(self, kind: str, reader: LineTokens) -> tree.OpenStatement:
         if not self.open or self.open[-1].kind != kind:
             raise reader.fault(f"there is no {kind} open that this ends", 0)
-        closed = self.open.pop()
-        self.body = self.open[-1].body if self.open else self.main
-        return closed
+        return self.close()
 
     def _if(self, reader: LineTokens) -> None:
         condition = reader.expression()
@@ -197,16 +187,13 @@ class SiemensControl:
         self.body = self.open[-1].body
 
     def _end_if(self, reader: LineTokens) -> None:
-        closed = self._close("IF", reader)
-        self.body.append(closed.branched())
+        branch = self._close("IF", reader)
+        self.body.append(branch.branched())
 
     def _end_loop(self, reader: LineTokens) -> None:
-        kind = {"ENDWHILE": "WHILE", "ENDLOOP": "LOOP"}[reader.peek(-1)]
-        closed = self._close(kind, reader)
+        closed = self._close(reader.peek(-1).removeprefix("END"), reader)
         assert closed.condition is not None
-        self.body.append(
-            tree.Loop(closed.place, "while", f"{kind} {closed.place.at}", closed.condition, closed.body)
-        )
+        self.add_loop(closed, closed.condition)
 
     def _for(self, reader: LineTokens) -> None:
         target = reader.parameter(reader.tokens[reader.next]) if not reader.ended else None
@@ -225,11 +212,7 @@ class SiemensControl:
         assert closed.count is not None
         target, last = closed.count
         closed.body.append(tree.assign(closed.place, (target, target + tree.ONE)))
-        self.body.append(
-            tree.Loop(
-                closed.place, "while", f"FOR {closed.place.at}", tree.op("LE", target, last), closed.body
-            )
-        )
+        self.add_loop(closed, tree.op("LE", target, last))
 
     def _repeat(self, reader: LineTokens) -> None:
         """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here, n times more."""
@@ -238,24 +221,14 @@ class SiemensControl:
             return
         label, counter, times = self._repeated(reader, self.labels)
         place = reader.place
-        again: list[tree.Statement] = [
-            tree.assign(place, (counter, counter + tree.ONE)),
-            tree.Goto(place, tree.Number(float(self.labels[label]))),
-        ]
-        self.body.append(
-            tree.If(
-                place, ((tree.op("LT", counter, times), again),), [tree.assign(place, (counter, tree.ZERO))]
-            )
-        )
+        self.body.append(tree.repeated(place, counter, times, self.labels[label]))
 
     def _repeat_block(self, reader: LineTokens) -> None:
         label, counter, times = self._repeated(reader, self.lines)
         place = reader.place
         self.body.append(tree.assign(place, (counter, tree.ZERO)))
         body = [*self.lines[label], tree.assign(place, (counter, counter + tree.ONE))]
-        self.body.append(
-            tree.Loop(place, "while", f"REPEATB {place.at}", tree.op("LT", counter, times), body)
-        )
+        self.add_loop(tree.OpenStatement("REPEATB", place, None, body=body), tree.op("LT", counter, times))
 
     def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
         """The label of a repeat, its counter, and how often. Raises ProgramFault for an unknown label."""
@@ -272,15 +245,7 @@ class SiemensControl:
 
     def _until(self, reader: LineTokens) -> None:
         closed = self._close("REPEAT", reader)
-        self.body.append(
-            tree.Loop(
-                closed.place,
-                "do",
-                f"REPEAT {closed.place.at}",
-                tree.op("NOT", reader.expression()),
-                closed.body,
-            )
-        )
+        self.add_loop(closed, tree.op("NOT", reader.expression()), "do")
 
     def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
         label = reader.peek()

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,40 +56,32 @@ def with_extruder(
     for row in words.rows_with(words.find("M", _FLOW)):
         letter, value = words.of_rows(row)
         if row < rows and (value[letter == ord("S")] != _WHOLE_FLOW).any():
-            _refuse(program, words.line[row : row + 1], "a flow that is not 100 % (M221)")
+            _refuse_any(program, words.line[row : row + 1], "a flow that is not 100 % (M221)")
     given = np.flatnonzero(fed.amount)
-    line = words.line[given]
-    unknown = np.flatnonzero(np.isnan(fed.amount[given]))
-    if len(unknown):
-        _refuse(program, line[unknown], "an E word beside a G code that is none of G0 to G3, G5 and G92")
-    moves = np.isin(program.kind, MOVES)
-    of_moves = np.flatnonzero(moves)
+    line, unknown = words.line[given], np.isnan(fed.amount[given])
+    _refuse_any(program, line[unknown], "an E word beside a G code that is none of G0 to G3, G5 and G92")
+    of_moves = np.flatnonzero(np.isin(program.kind, MOVES))
     first, last = (np.searchsorted(program.line[of_moves], line, side=side) for side in ("left", "right"))
-    several = np.flatnonzero(last - first > 1)
-    if len(several):
-        _refuse(
-            program, line[several], "an E word beside more than one move; write G0 to G3 alone on its line"
-        )
-    alone = last == first
-    without = np.flatnonzero(alone & (fed.feed[given] == 0.0))
-    if len(without):
-        _refuse(program, line[without], "an E word alone before the first F word; write its feed")
+    alone, several = last == first, last - first > 1
+    text = "an E word beside more than one move; write G0 to G3 alone on its line"
+    _refuse_any(program, line[several], text)
+    without = alone & (fed.feed[given] == 0.0)
+    _refuse_any(program, line[without], "an E word alone before the first F word; write its feed")
     extruded = np.zeros(len(program))
     extruded[of_moves[first[~alone]]] = fed.amount[given[~alone]]
     at = np.searchsorted(program.line, line[alone], side="right")
     return _with_stops(program, extruded, at, line[alone], _Fed(*(c[given[alone]] for c in fed)))
 
 
-def _refuse(program: Program, line: Array, what: str) -> NoReturn:
-    raise InputError(f"{what}; or give --extruder ignore", source=program.source, line=int(line[0]))
+def _refuse_any(program: Program, line: Array, what: str) -> None:
+    """Raise InputError for the first of the lines (n,), if there are any."""
+    if len(line):
+        raise InputError(f"{what}; or give --extruder ignore", source=program.source, line=int(line[0]))
 
 
 def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, alone: _Fed) -> Program:
     """The program with a full stop before each of the blocks `at` (n,), not decreasing, on lines (n,), where
-    the extruder moves alone.
-
-    extruded : (B,) of the blocks that are there
-    """
+    the extruder moves alone; `extruded` (B,) are those of the blocks that are there."""
 
     def put(values: Array, new: Any) -> Array:
         return np.insert(values, at, new, axis=0)
@@ -107,13 +99,9 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
         "line": put(program.line, line),
         "extruded": put(extruded, alone.amount),
     }
-    if len(program):
-        columns |= {
-            name: put(getattr(program, name), getattr(program, name)[before])
-            for name in ("path_control", "tolerance")
-        }
-    else:
-        columns |= {"path_control": np.zeros(len(at)), "tolerance": np.full(len(at), np.nan)}
+    for name, where_none in (("path_control", 0.0), ("tolerance", np.nan)):
+        old = getattr(program, name)
+        columns[name] = put(old, old[before] if len(program) else where_none)
     events = program.events
     if isinstance(events, EventTable):
         low, high = (np.searchsorted(at, events.block, side=side) for side in ("left", "right"))

@@ -84,22 +84,19 @@ class Scaling:
         if kind == _POINT_FACTOR:
             if self.p1 is None:
                 raise ScalingError(_NO_POINTS)
-            low, factor = (numbers[0], numbers[2]), (numbers[1], numbers[3])
-            left_over = (0.0, 0.0)
+            factor, left_over = (numbers[1], numbers[3]), (0.0, 0.0)
         else:
             if self.p1 is None or self.p2 is None:
                 raise ScalingError(_NO_POINTS)
-            low, size = (numbers[0], numbers[2]), (numbers[1] - numbers[0], numbers[3] - numbers[2])
+            size = numbers[1] - numbers[0], numbers[3] - numbers[2]
             if 0.0 in size:
                 raise ScalingError(f"a range of user units is empty; write {FORMS['SC']}")
             window = self.p2[0] - self.p1[0], self.p2[1] - self.p1[1]
             factor, left_over = _factors(window, size, numbers, kind)
         if 0.0 in factor:
             raise ScalingError("a scale of 0 leaves nothing of the drawing; check IP and SC")
-        origin = tuple(
-            p + rest - f * u for p, rest, f, u in zip(self.p1, left_over, factor, low, strict=True)
-        )
-        return Scaling(self.p1, self.p2, (origin[0], origin[1]), factor, tuple(numbers))
+        x, y = (self.p1[k] + left_over[k] - factor[k] * numbers[2 * k] for k in range(2))
+        return Scaling(self.p1, self.p2, (x, y), factor, tuple(numbers))
 
 
 _NO_POINTS = (
@@ -115,12 +112,9 @@ def _factors(window: Point, size: Point, numbers: Sequence[float], kind: float) 
         return (fx, fy), (0.0, 0.0)
     both = min(abs(fx), abs(fy))
     factor = math.copysign(both, fx), math.copysign(both, fy)
-    left, bottom = numbers[5:7] if len(numbers) == 7 else _MIDDLE
-    rest = (
-        (window[0] - factor[0] * size[0]) * left / 100.0,
-        (window[1] - factor[1] * size[1]) * bottom / 100.0,
-    )
-    return factor, rest
+    before = numbers[5:7] if len(numbers) == 7 else _MIDDLE
+    x, y = ((window[k] - factor[k] * size[k]) * before[k] / 100.0 for k in range(2))
+    return factor, (x, y)
 
 
 # Three points are on a line where the area of their parallelogram is below this share of |a| |b| [-]: a

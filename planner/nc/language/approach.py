@@ -36,8 +36,7 @@ class ContourWay:
     """The words of an APPR or DEP block."""
 
     kind: str  # one of KINDS
-    # line, at and frame: of the block
-    line: int
+    line: int  # of the block, as its `at` and `frame`
     at: int
     frame: int
     length: float = 0.0  # LEN [mm]
@@ -68,10 +67,9 @@ class ContourWay:
         """The far end of the arc at a contour point, its centre, and its direction (1 counter-clockwise).
         Raises ValueError if the line's other end is inside the circle.
 
-        tangent : at the contour point, along the path
-        normal  : towards the side of the tool
-        other   : where the line comes from (LCT)
-        """  # fmt: skip
+        tangent, normal : at the contour point, along the path and towards the side of the tool
+        other           : where the line comes from (LCT)
+        """
         radius = self.radius * self.scale
         centre = contour + radius * normal
         turning = 1 if (normal / tangent).imag * radius > 0 else -1
@@ -80,9 +78,8 @@ class ContourWay:
             return far, centre, turning
         away, size = other - centre, abs(radius)
         if abs(away) < size:
-            raise ValueError(
-                f"the other end of the straight move lies inside the arc of radius {size:.6g} mm: there is no tangent to it"
-            )
+            where = f"the other end of the straight move lies inside the arc of radius {size:.6g} mm"
+            raise ValueError(f"{where}: there is no tangent to it")
         touching = math.acos(size / abs(away))
         return centre + away / abs(away) * size * cmath.rect(1.0, turning * touching), centre, turning
 

@@ -120,9 +120,8 @@ class _Function:
     def _assign(self, target: tree.Parameter, value: str, place: tree.SourcePlace) -> str:
         if isinstance(target, tree.Named):
             if target.shared and target.name in self.language.system_names:
-                raise tree.ProgramFault(
-                    place, f"the control sets #<{target.name}> itself; it can only be read"
-                )
+                text = f"the control sets #<{target.name}> itself; it can only be read"
+                raise tree.ProgramFault(place, text)
             return f"{'G' if target.shared else 'L'}[{target.name!r}]={value}"
         if isinstance(target.index, tree.Number) and self.say.stored(target.index.value):
             return f"P[{int(target.index.value)}]={value}"
@@ -195,17 +194,13 @@ class _Function:
         """The label of that number: the next one, or else the first of the procedure."""
         found = [(k, label) for k, (known, label) in enumerate(self.blocks.numbers) if known == number]
         if not found:
-            raise tree.ProgramFault(
-                place, f"there is no block N{number} to go to; write its number at its start"
-            )
+            text = f"there is no block N{number} to go to; write its number at its start"
+            raise tree.ProgramFault(place, text)
         return next((label for k, label in found if k >= self._seen), found[0][1])
 
     def _call(self, call: tree.Call) -> None:
-        name = (
-            repr(call.procedure)
-            if isinstance(call.procedure, str)
-            else f"whole({self.say.value(call.procedure)})"
-        )
+        procedure = call.procedure
+        name = repr(procedure) if isinstance(procedure, str) else f"whole({self.say.value(procedure)})"
         given = "None"
         if call.arguments is not None:
             given = "(" + "".join(f"({k},{self.say.assigned(value)})," for k, value in call.arguments) + ")"
@@ -228,11 +223,10 @@ class _Function:
     def _message(self, message: tree.Message) -> None:
         pieces = []
         for piece in message.pieces:
+            known = self.language.system_names
             if isinstance(piece, str):
                 pieces.append(repr(piece))
-            elif isinstance(piece, tree.Named) and not (
-                piece.shared and piece.name in self.language.system_names
-            ):
+            elif isinstance(piece, tree.Named) and not (piece.shared and piece.name in known):
                 pieces.append(f"{'G' if piece.shared else 'L'}.get({piece.name!r})")
             else:
                 pieces.append(self.say.value(piece))

@@ -56,9 +56,8 @@ class OffsetMoves:
     def begin_at(self, place: FloatArray, tangent: complex) -> FloatArray:
         """The contour begins at a place (3,) with a unit tangent; returns where the tool is then (3,)."""
         self._state.position[:] = place
-        self._cutter = Cutter(
-            self._state, self._table, radius=self.radius, left=self.side > 0, normal=self.normal
-        )
+        left = self.side > 0
+        self._cutter = Cutter(self._state, self._table, radius=self.radius, left=left, normal=self.normal)
         self._cutter.begin_beside(tangent)
         self._start = self._state.place.copy()
         return self._start
@@ -102,9 +101,8 @@ class OffsetMoves:
         """The moves of the contour, at its end. Raises ValueError."""
         if not self.started:
             if self._first is not None:
-                raise CutterFault(
-                    "radius compensation is on for one move only, which no contour follows; remove it"
-                )
+                text = "radius compensation is on for one move only, which no contour follows; remove it"
+                raise CutterFault(text)
             return []
         assert self._cutter is not None
         self._cutter.fix()
@@ -142,21 +140,16 @@ class OffsetMoves:
             before, stops = stops_apart(move.rest)
             for block in range(first, last):
                 end = self._table.block.end[block].copy()
-                axes = [
-                    *IN_PLANE[self.normal],
-                    *([self.normal] if end[self.normal] != place[self.normal] else []),
-                ]
-                words = [(AXES[a], float(end[a]), move.at) for a in sorted(axes)]
+                rises = end[self.normal] != place[self.normal]
+                axes = range(3) if rises else sorted(IN_PLANE[self.normal])
+                words = [(AXES[a], float(end[a]), move.at) for a in axes]
                 code = 0 if self._table.block.kind[block] == Kind.RAPID else 1
                 if block in arcs and abs(arcs[block][1]) > 2.0 * FULL_TURN:
                     code = 3 if arcs[block][1] > 0 else 2
                     words += arc_words(Arc(*arcs[block]), place, self.normal, move.at)
-                yield TravelRow(
-                    [(G, float(code), move.at), *(before if block == first else []), *words,
-                     *(stops if block == last - 1 else [])],
-                    move.rest.line,
-                    move.rest.frame,
-                )  # fmt: skip
+                words = [(G, float(code), move.at), *(before if block == first else []), *words]
+                words += stops if block == last - 1 else []
+                yield TravelRow(words, move.rest.line, move.rest.frame)
                 place = end
 
 
@@ -187,9 +180,8 @@ class CornerMove:
         if self.kind != "RND":
             return self._chamfer(second, corner, (before, after), turn, normal)
         side = 1 if turn > 0 else -1
-        centre = meeting(
-            _beside(first, side * self.size, normal), _beside(second, side * self.size, normal), side
-        )
+        beside = (_beside(move, side * self.size, normal) for move in (first, second))
+        centre = meeting(*beside, side)
         if centre is None:
             raise ValueError(_TOO_LARGE)
         start, end = _foot(first, centre, normal), _foot(second, centre, normal)

@@ -85,9 +85,8 @@ class Making:
         found = self.travel.radius()
         if found == 0.0:
             number = self.interpreter.state.tool_loaded
-            raise ValueError(
-                f"the cycle needs the diameter of tool {number}; write it into [tools] of the machine file"
-            )
+            needed = f"the diameter of tool {number}; write it into [tools] of the machine file"
+            raise ValueError(f"the cycle needs {needed}")
         return found / self.unit
 
     def assume(self, text: str) -> None:
@@ -147,7 +146,7 @@ class HolePlan:
     top: float
     bottom: float
     retract: float
-    feed: float = 0.0
+    feed: float | None = 0.0  # None for that of the program
     dwell: float = 0.0
 
     def __post_init__(self) -> None:
@@ -173,6 +172,18 @@ def dwell_rows(seconds: float) -> Iterator[Row]:
         yield [("G", 4.0), ("P", seconds)]
 
 
+def feed_to(z: float, feed: float | None) -> Row:
+    """To z at a feed; None for that of the program."""
+    return [("G", 1.0), *([] if feed is None else [("F", feed)]), ("Z", z)]
+
+
+def drilled(hole: HolePlan) -> Iterator[Row]:
+    """To the clearance, at the feed to the bottom, and the dwell."""
+    yield go(hole.clear)
+    yield feed_to(hole.bottom, hole.feed)
+    yield from dwell_rows(hole.dwell)
+
+
 def tapped(
     making: Making,
     hole: HolePlan,
@@ -193,9 +204,8 @@ def tapped(
     if not (speed > 0.0 and lead != 0.0):
         raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
     size = abs(lead)
-    making.assume(
-        "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
-    )
+    text = "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
+    making.assume(text)
     first, second = (3.0, 4.0) if lead > 0.0 else (4.0, 3.0)
     if start:
         yield go(hole.clear)
@@ -220,10 +230,10 @@ class Pecks:
     """
 
     infeed: float
-    less: float
-    least: float
     back: float
     ahead: tuple[float, float]
+    less: float = 0.0
+    least: float = 0.0
     breaks: int = 0
     chip: float = 0.0
     above: float = 0.0
@@ -274,9 +284,8 @@ def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turni
     if size <= 0.0:
         raise ValueError("the bore is to be wider than the tool")
     if size > radius:
-        raise ValueError(
-            f"a helix of radius {size:.6g} leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
-        )
+        core = f"leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
+        raise ValueError(f"a helix of radius {size:.6g} {core}")
     x, y, _ = making.here()
     count = equal_steps(hole.top - hole.bottom, infeed)
     yield go(hole.clear)

@@ -3,6 +3,8 @@ M98, M99, G65, G66)."""
 
 from __future__ import annotations
 
+from collections import Counter
+
 from planner.nc.language import tree
 from planner.nc.language.expression_reader import names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
@@ -117,16 +119,17 @@ def of_block(
 def returned(words: tree.Words, line: SourceLine, *, restarts: bool) -> list[tree.Statement]:
     """M99. restarts : it stands in the main program, which a control then starts again."""
     rest, given = _split(words, "M99", "P")
-    said: list[tree.Statement] = [
-        tree.Message(line.place, ("M99 starts the main program again; it is read once",))
-    ] * restarts
-    return [*_row(rest, line), *said, tree.Return(line.place, None, given.get("P"))]
+    statements = _row(rest, line)
+    if restarts:
+        text = "M99 starts the main program again; it is read once"
+        statements.append(tree.Message(line.place, (text,)))
+    return [*statements, tree.Return(line.place, None, given.get("P"))]
 
 
 def macro(words: tree.Words, code: str, line: SourceLine) -> tree.Call:
     """G65, or the call that G66 makes after every move. Raises ProgramFault."""
     arguments: dict[int, tree.Expression] = {}
-    seen = dict.fromkeys(_TRIPLES, 0)
+    seen: Counter[str] = Counter()
     program: str | tree.Expression = ""
     times: tree.Expression = tree.Number(1.0)
     for word in words:
@@ -138,11 +141,8 @@ def macro(words: tree.Words, code: str, line: SourceLine) -> tree.Call:
         elif letter == "L":
             times = word.value
         elif letter in _NUMBERS:
-            turn = 0
-            if letter in _TRIPLES:
-                turn = seen[letter]
-                seen[letter] += 1
-            arguments[_NUMBERS[letter] + 3 * turn] = word.value
+            arguments[_NUMBERS[letter] + 3 * seen[letter]] = word.value
+            seen[letter] += letter in _TRIPLES
         else:
             raise line.fault(f"{code} has no parameter for {letter}", word.at)
     if program == "" or max(arguments, default=0) > LOCALS:

@@ -145,16 +145,11 @@ class FanucParser(FanucControl):
         self.body += [tree.Message(line.place, (text,)) for _, text in reader.messages()]
 
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
-        if keyword == "GOTO":
+        flow = {"IF": self._if, "WHILE": self._while, "DO": self._do, "END": self._end}
+        if keyword in flow:
+            flow[keyword](reader, line)
+        elif keyword == "GOTO":
             self.body.append(tree.Goto(line.place, reader.value()))
-        elif keyword == "IF":
-            self._if(reader, line)
-        elif keyword == "WHILE":
-            self._while(reader, line)
-        elif keyword == "DO":
-            self._do(reader, line)
-        elif keyword == "END":
-            self._end(reader, line)
         else:  # output to a file
             self.body.append(tree.Message(line.place, (reader.text,)))
             return

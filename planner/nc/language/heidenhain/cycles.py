@@ -35,7 +35,7 @@ from planner.nc.language.making import (
     Making,
     Pecks,
     Row,
-    dwell_rows,
+    drilled,
     equal_steps,
     go,
     milled,
@@ -58,7 +58,10 @@ _CORNERS = {
 }  # where the tool stands (Q367), in half sides
 
 
-def _hole(given: Mapping[str, float], feed: float = 0.0) -> HolePlan:
+Given = Mapping[str, float]
+
+
+def _hole(given: Given, feed: float = 0.0) -> HolePlan:
     top = given["Q203"]
     clear, second = top + given["Q200"], top + max(given["Q200"], given["Q204"])
     return HolePlan(clear, top, top - abs(given["Q201"]), second, feed, given["Q211"])
@@ -76,55 +79,45 @@ def parameters(making: Making) -> dict[str, float]:
     return {f"Q{n}": (value or 0.0) * (scale if n in _FEEDS else 1.0) for n, value in values}
 
 
-def _pecked(making: Making, given: Mapping[str, float], out: float = 0.0, **pecks: Any) -> Iterator[Row]:
+def _pecked(making: Making, given: Given, out: float = 0.0, **pecks: Any) -> Iterator[Row]:
     """Cycles 1, 200, 203 and 205: by infeeds, out at a feed or, where it is 0, at rapid speed."""
     hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
-    usual: dict[str, Any] = {
-        "infeed": given["Q202"],
-        "less": 0.0,
-        "least": 0.0,
-        "back": given["Q256"] or gap,
-        "ahead": (gap, gap),
-    }
+    usual = {"infeed": given["Q202"], "back": given["Q256"] or gap, "ahead": (gap, gap)}
     yield from pecked(hole, Pecks(**usual | pecks))
     yield go(hole.clear, out or None)
     yield from _end(hole)
 
 
-def _old_pecking(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+def _old_pecking(making: Making, given: Given) -> Iterator[Row]:
     """The tool stands at the clearance above the surface already."""
     surface = making.shared["_z"] - given["Q200"]
     making.numbered[203 + 1], making.numbered[204 + 1] = surface, 0.0
     return islice(_pecked(making, parameters(making), above=given["Q210"]), 1, None)
 
 
-def _universal(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+def _universal(making: Making, given: Given) -> Iterator[Row]:
     decreasing = {"less": given["Q212"], "least": given["Q205"], "breaks": round(given["Q213"])}
     return _pecked(making, given, given["Q208"], above=given["Q210"], **decreasing)
 
 
-def _pecking(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
+def _pecking(making: Making, given: Given) -> Iterator[Row]:
     if given["Q379"]:
         raise ValueError("Q379, a starting point that is drilled already, is not read")
     decreasing = {"less": given["Q212"], "least": given["Q205"], "chip": given["Q257"]}
     return _pecked(making, given, given["Q208"], ahead=(given["Q258"], given["Q259"]), **decreasing)
 
 
-def _at_once(making: Making, given: Mapping[str, float], out: float) -> Iterator[Row]:
+def _at_once(making: Making, given: Given, out: float) -> Iterator[Row]:
     """Cycles 201 and 240: without infeeds, out at a feed or, where it is 0, at rapid speed."""
     hole = _hole(given, given["Q206"])
-    yield go(hole.clear)
-    yield go(hole.bottom, hole.feed)
-    yield from dwell_rows(hole.dwell)
+    yield from drilled(hole)
     yield go(hole.clear, out if out > 0.0 else None)
     yield from _end(hole)
 
 
-def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _bored(making: Making, given: Given) -> Iterable[Row]:
     hole, (x, y, _) = _hole(given, given["Q206"]), making.here()
-    yield go(hole.clear)
-    yield go(hole.bottom, hole.feed)
-    yield from dwell_rows(hole.dwell)
+    yield from drilled(hole)
     yield [("M", 5.0)]
     if given["Q214"]:
         if given["Q214"] not in _AWAY:
@@ -137,14 +130,14 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     yield [("G", 0.0), ("X", x), ("Y", y)]
 
 
-def _tapped(making: Making, given: Mapping[str, float], lead: float | None = None) -> Iterable[Row]:
+def _tapped(making: Making, given: Given, lead: float | None = None) -> Iterable[Row]:
     hole, speed = _hole(given), making.interpreter.state.spindle.speed
     lead = (given["Q206"] / speed if speed else 0.0) if lead is None else lead
     yield from tapped(making, hole, lead, speed)
     yield from _end(hole)
 
 
-def _tapped_by_breaks(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _tapped_by_breaks(making: Making, given: Given) -> Iterable[Row]:
     hole, lead, speed = _hole(given), given["Q239"], making.interpreter.state.spindle.speed
     depth = hole.top - hole.bottom
     count = equal_steps(depth, given["Q257"])
@@ -158,7 +151,7 @@ def _tapped_by_breaks(making: Making, given: Mapping[str, float]) -> Iterable[Ro
     yield from _end(hole)
 
 
-def _milled(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _milled(making: Making, given: Given) -> Iterable[Row]:
     if given["Q342"]:
         raise ValueError("Q342, the diameter of a bore that is there already, is not read")
     hole = _hole(given, given["Q206"])
@@ -167,7 +160,7 @@ def _milled(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     yield from _end(hole)
 
 
-def _turning(making: Making, given: Mapping[str, float]) -> int:
+def _turning(making: Making, given: Given) -> int:
     """Climb milling inside goes round counter-clockwise with M3; a mirror image does not turn it round."""
     if given["Q351"] not in (1.0, -1.0, 0.0):
         raise ValueError(f"Q351 {given['Q351']:g} is none of 1 (climb) and -1 (conventional)")
@@ -177,14 +170,13 @@ def _turning(making: Making, given: Mapping[str, float]) -> int:
     return -turn if making.travel.mirrored else turn
 
 
-def _plan(making: Making, given: Mapping[str, float]) -> PocketPlan:
+def _plan(making: Making, given: Given) -> PocketPlan:
     kind, radius = round(given["Q215"]), making.tool_radius()
     if kind not in (0, 1, 2):
         raise ValueError(f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
     if given["Q366"]:
-        making.assume(
-            "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
-        )
+        text = "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
+        making.assume(text)
     making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
     top = given["Q203"]
     return PocketPlan(
@@ -208,49 +200,40 @@ def _plan(making: Making, given: Mapping[str, float]) -> PocketPlan:
     )
 
 
-def _place(
-    making: Making, given: Mapping[str, float], half: complex, angle: float, names: dict[int, complex]
-) -> complex:
+def _place(making: Making, given: Given, half: complex, angle: float, names: dict[int, complex]) -> complex:
     """The middle of a pocket whose half sides are given, from where the tool stands in it."""
     stands = names.get(round(given["Q367"]))
     if stands is None:
         raise ValueError(f"Q367 {given['Q367']:g}, where the tool stands in the pocket, is not read")
     x, y, _ = making.here()
-    return complex(x, y) - complex(stands.real * half.real, stands.imag * half.imag) * cmath.rect(
-        1.0, math.radians(angle)
-    )
+    inside = complex(stands.real * half.real, stands.imag * half.imag)
+    return complex(x, y) - inside * cmath.rect(1.0, math.radians(angle))
 
 
-def _cut(
-    making: Making, shape: PocketShape, given: Mapping[str, float], at: complex, angle: float
-) -> Iterator[Row]:
-    plan = _plan(making, given)
-    yield from pocket_rows(shape, plan, at, angle)
+def _cut(making: Making, shape: PocketShape, given: Given, at: complex, angle: float) -> Iterator[Row]:
+    yield from pocket_rows(shape, _plan(making, given), at, angle)
 
 
-def _rectangle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _rectangle(making: Making, given: Given) -> Iterable[Row]:
     a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
     if min(a, b) <= 0.0:
         raise ValueError("Q218 and Q219, the sides of the pocket, are to be above 0")
     corner = max(given["Q220"], making.tool_radius())
     if given["Q220"] > min(a, b):
         raise ValueError("Q220, the radius of the corners, is more than half a side")
-    shape = RoundedRectangle(a, b, min(corner, a, b))
-    return _cut(
-        making, shape, given, _place(making, given, complex(a, b), given["Q224"], _CORNERS), given["Q224"]
-    )
+    shape, angle = RoundedRectangle(a, b, min(corner, a, b)), given["Q224"]
+    return _cut(making, shape, given, _place(making, given, complex(a, b), angle, _CORNERS), angle)
 
 
-def _circle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _circle(making: Making, given: Given) -> Iterable[Row]:
     size = given["Q223"] / 2.0
     if size <= 0.0:
         raise ValueError("Q223, the diameter of the pocket, is to be above 0")
-    return _cut(
-        making, RoundedRectangle(size, size, size), given, _place(making, given, 0j, 0.0, {0: 0j}), 0.0
-    )
+    at = _place(making, given, 0j, 0.0, {0: 0j})
+    return _cut(making, RoundedRectangle(size, size, size), given, at, 0.0)
 
 
-def _slot(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _slot(making: Making, given: Given) -> Iterable[Row]:
     a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
     if not 0.0 < b <= a:
         raise ValueError("a slot has a width Q219 above 0 and a length Q218 of at least that")
@@ -259,14 +242,15 @@ def _slot(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     return _cut(making, RoundedRectangle(a, b, b), given, at, given["Q374"])
 
 
-def _slots_on_circle(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
     if given["Q367"]:
         raise ValueError("Q367 of cycle 254 other than 0 is not read; give the centre as Q216 and Q217")
     radius, b, sweep = given["Q375"] / 2.0, given["Q219"] / 2.0, math.radians(given["Q248"])
     if not 0.0 < b < radius or not 0.0 < abs(sweep) < 2.0 * math.pi:
-        raise ValueError(
+        text = (
             "a slot on a circle has a width above 0 and below the diameter, and an opening below 360 degrees"
         )
+        raise ValueError(text)
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
     for k in range(max(1, equal_steps(given["Q377"], 1.0))):
         yield from _cut(making, shape, given, at, k * given["Q378"])

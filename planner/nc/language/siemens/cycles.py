@@ -30,6 +30,7 @@ Controls may begin a row at its other end, if that is nearer; here it begins at 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from planner.nc.language import tree
 from planner.nc.language.making import (
@@ -39,8 +40,10 @@ from planner.nc.language.making import (
     Row,
     around,
     coarse_lead,
+    drilled,
     dwell_rows,
     equal_steps,
+    feed_to,
     go,
     tapped,
 )
@@ -147,7 +150,7 @@ def _hole(name: str, given: Mapping[str, float]) -> HolePlan:
     _require_depth(name, given, "DP", "DPR")
     top = given["RFP"]
     clear, bottom = top + abs(given["SDIS"]), _depth(given, "DP", "DPR")
-    return HolePlan(clear, top, bottom, given["RTP"], dwell=given.get("DTB", 0.0))
+    return HolePlan(clear, top, bottom, given["RTP"], None, given.get("DTB", 0.0))
 
 
 def _lead(given: Mapping[str, float], unit: float) -> float:
@@ -176,9 +179,7 @@ def _chuck(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 def _reamed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     hole = _hole("CYCLE85", given)
     _required("CYCLE85", given, "FFR", "RFF")
-    yield go(hole.clear)
-    yield go(hole.bottom, given["FFR"])
-    yield from dwell_rows(hole.dwell)
+    yield from drilled(replace(hole, feed=given["FFR"]))
     yield go(hole.clear, given["RFF"])
     yield go(hole.retract)
 
@@ -186,9 +187,7 @@ def _reamed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 def _drilled(hole: HolePlan, given: Mapping[str, float]) -> Iterator[Row]:
     if "SDIR" in given:
         yield [("M", 4.0 if given["SDIR"] == _LEFT else 3.0)]
-    yield go(hole.clear)
-    yield _in(hole.bottom)
-    yield from dwell_rows(hole.dwell)
+    yield from drilled(hole)
 
 
 def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
@@ -209,7 +208,7 @@ def _straight(name: str, *behind: Row, out: bool = False) -> Maker:
         yield from _drilled(hole, given)
         yield from behind
         if out:
-            yield _in(hole.clear)
+            yield feed_to(hole.clear, None)
         yield go(hole.retract)
 
     return rows
@@ -221,7 +220,7 @@ def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
     depth, step = max(first, hole.bottom), hole.top - first
     equal_steps(hole.top - hole.bottom, less or max(step, _SHORT))
     yield go(hole.clear)
-    yield _in(depth)
+    yield feed_to(depth, None)
     while depth > hole.bottom:
         yield from dwell_rows(hole.dwell)
         if given.get("VARI", 0.0):
@@ -230,14 +229,9 @@ def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
         yield go(depth + apart)
         step = max(step - less, less) if less > 0.0 else step
         depth = max(depth - step, hole.bottom)
-        yield _in(depth)
+        yield feed_to(depth, None)
     yield from dwell_rows(hole.dwell)
     yield go(hole.retract)
-
-
-def _in(z: float) -> Row:
-    """To z at the feed of the program."""
-    return [("G", 1.0), ("Z", z)]
 
 
 def _pocket(name: str) -> Maker:
@@ -245,16 +239,14 @@ def _pocket(name: str) -> Maker:
         _required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
         for key in ("AP1", "AP2", "AD"):
             if given.get(key):
-                raise ValueError(
-                    f"{key} of {name}, a pocket that is there already, is not read; leave it out"
-                )
+                text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
+                raise ValueError(text)
         if making.interpreter.state.normal != 2:
             raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
         radius = making.tool_radius()
         plan = _plan(making, name, given, radius)
-        making.assume(
-            f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
-        )
+        text = f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
+        making.assume(text)
         place = complex(given["PA"], given["PO"])
         return pocket_rows(_shape(name, given, radius), plan, place, given.get("STA", 0.0))
 

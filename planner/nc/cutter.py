@@ -105,10 +105,8 @@ class Cutter:
             self._placed = False
         elif not self.started:
             if length <= self._radius:
-                raise CutterFault(
-                    f"the first move of cutter radius compensation is {length:.6g} mm long; it must be longer than the tool's "
-                    f"radius, {self._radius:.6g} mm"
-                )
+                first = f"the first move of cutter radius compensation is {length:.6g} mm long"
+                raise CutterFault(f"{first}; it must be longer than the tool's radius, {self._radius:.6g} mm")
         else:
             self._corner(start, side, kind, line)
         self._add(side, target, kind, line)
@@ -122,9 +120,8 @@ class Cutter:
         size = abs(end - centre)
         first, last = (1j * turning * (p - centre) / abs(p - centre) for p in (start, end))
         if nearer >= size:
-            raise CutterFault(
-                f"the arc's radius, {size:.6g} mm, must be larger than the tool's, {self._radius:.6g} mm, where the tool is inside"
-            )
+            larger = f"must be larger than the tool's, {self._radius:.6g} mm, where the tool is inside"
+            raise CutterFault(f"the arc's radius, {size:.6g} mm, {larger}")
         side = OffsetMove(self._beside(end, last), first, last, turning, centre, size - nearer)
         sweep = arc.sweep
         if self._placed:
@@ -229,10 +226,9 @@ class Cutter:
         chord = start - side.end
         reach = dot(chord, inwards)
         if abs(self._plane(self._state.position) - side.centre) <= self._radius or reach <= 0.0:
-            raise CutterFault(
-                "the first arc of cutter radius compensation must have a radius larger than the tool's, "
-                f"{self._radius:.6g} mm, and leave room for it; begin with a straight move"
-            )
+            first = "the first arc of cutter radius compensation must have a radius larger than the tool's"
+            room = f"{self._radius:.6g} mm, and leave room for it; begin with a straight move"
+            raise CutterFault(f"{first}, {room}")
         radius = abs(chord) ** 2 / (2.0 * reach)
         centre = side.end + radius * inwards
         turn = side.turning * cmath.phase((side.end - centre) / (start - centre))
@@ -242,9 +238,8 @@ class Cutter:
 
     def _stay(self, target: FloatArray, kind: Kind, line: int) -> None:
         if not (self.started or self._placed):
-            raise CutterFault(
-                "the first move of cutter radius compensation does not move in its plane; write G41 or G42 after it"
-            )
+            first = "the first move of cutter radius compensation does not move in its plane"
+            raise CutterFault(f"{first}; write G41 or G42 after it")
         state = self._state
         place = self._plane(state.place)
         state.position[:] = target

@@ -131,7 +131,10 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
     a, b = IN_PLANE[state.normal]
     c = state.normal
     here = state.programmed() / state.unit
-    series = _series(state, state.motion, float(here[c]))
+    if state.series is None or state.series.code != state.motion:  # the words in force are those of a code
+        level = float(here[c]) if state.series is None else state.series.level
+        state.series = CycleSeries(state.motion, {}, level)
+    series = state.series
     words = _words(state, block, series)
     _check_words(state, block, words, findings)
     hole = _hole(state, block, series, words)
@@ -217,13 +220,6 @@ def _say(state: State, block: Block, findings: Findings) -> None:
     if state.motion in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"
         findings.assume(f"{name} is synchronised with the spindle: {text}", block.line)
-
-
-def _series(state: State, code: int, level: float) -> CycleSeries:
-    """The series the line belongs to; the words in force are those of its code only."""
-    if state.series is None or state.series.code != code:
-        state.series = CycleSeries(code, {}, level if state.series is None else state.series.level)
-    return state.series
 
 
 def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:

@@ -167,8 +167,8 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
     plane = f"{arcs.AXES[a]} {arcs.AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
     way = arcs.ArcWay(turned, (state.motion == 2) != opposite, turns, unit)
-    along = block.value.get("IJK"[normal])  # many programs write K0 in G17
-    if along is not None and (along != 0.0 or state.strict):
+    axial = block.value.get("IJK"[normal])  # many programs write K0 in G17
+    if axial is not None and (axial != 0.0 or state.strict):
         raise arcs.ArcError(
             f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
         )
@@ -215,9 +215,9 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     """True if I J K are meant the other way: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
+        if arcs.not_closed(state.position, end, other, normal, state.unit):
+            raise arcs.ArcError
     except arcs.ArcError:
-        return "correct the centre or the end point"
-    if arcs.not_closed(state.position, end, other, normal, state.unit):
         return "correct the centre or the end point"
     way = "incremental: write G91.1" if state.absolute_centre else "absolute: write G90.1"
     return f"{_CLOSES_IF} {way} before it"

@@ -52,13 +52,11 @@ def read_program(
     if (path is None) == (text is None):
         raise InputError("give a program file, or its text as text=...")
     if path is not None and not isinstance(path, str | os.PathLike):
-        raise InputError(
-            f"a program is a file, or planner.path(points), or planner.read_program(text=...); found a {type(path).__name__}"
-        )
+        allowed = "a program is a file, or planner.path(points), or planner.read_program(text=...)"
+        raise InputError(f"{allowed}; found a {type(path).__name__}")
     if text is not None:
-        return dataclasses.replace(
-            parse_program(text, machine, reading), text=text.encode() if isinstance(text, str) else text
-        )
+        data = text.encode() if isinstance(text, str) else text
+        return dataclasses.replace(parse_program(text, machine, reading), text=data)
     assert path is not None
     data = load(path)
     program = parse_program(data, machine, reading, source=source_name(path))
@@ -182,9 +180,6 @@ def _check_text(data: bytes, source: str) -> None:
     if nul >= 0:
         line = data.count(b"\n", 0, nul) + 1
         column = nul - data.rfind(b"\n", 0, nul)
-        what = (
-            "UTF-16 text; save it as UTF-8"
-            if data[:2] in (b"\xff\xfe", b"\xfe\xff")
-            else "a binary file; give a text file"
-        )
+        is_utf16 = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+        what = "UTF-16 text; save it as UTF-8" if is_utf16 else "a binary file; give a text file"
         raise InputError(f"NUL byte found: this looks like {what}", source=source, line=line, column=column)

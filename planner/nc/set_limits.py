@@ -60,11 +60,17 @@ class LimitsInForce:
             given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
             for key, value in given.items():
                 if not value > 0.0:
-                    raise WordFault(
-                        setting.word, f"{setting.name} {key.upper()} must be positive, found {value:g}"
-                    )
+                    text = f"{setting.name} {key.upper()} must be positive, found {value:g}"
+                    raise WordFault(setting.word, text)
             if setting.name == SPEED_FACTOR:
-                self._take_factor(setting.values, state, line)
+                given = setting.values
+                if "b" in given:
+                    self._kept = state.feed_factor
+                factor = self._kept if "r" in given else state.feed_factor
+                factor = given["s"] / 100.0 if "s" in given else factor
+                state.feed *= factor / state.feed_factor
+                state.feed_factor = factor
+                self.factors.append((line, factor))
                 continue
             self._line = self._line or line
             self._take_limits(setting.name, given, state.unit, line, findings)
@@ -76,10 +82,9 @@ class LimitsInForce:
         self._look(table)
         if not self._line:
             return ()
-        lowest = {
-            key: min(seen[key] for seen in self._seen if key in seen)
-            for key in {k for seen in self._seen for k in seen}
-        }
+        lowest: dict[tuple[str, str], float] = {}
+        for seen in self._seen:
+            lowest |= {key: min(value, lowest.get(key, math.inf)) for key, value in seen.items()}
         limits = tuple(SetLimit(quantity=q, axis=a, value=v) for (q, a), v in sorted(lowest.items()))
         if len(self._seen) > 1:
             text = (

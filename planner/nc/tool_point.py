@@ -129,7 +129,9 @@ def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | Non
     """The program as one of the controlled point throughout, if the tool centre point is on somewhere while
     rotary axes are off 0; else the program itself. Raises InputError for feed moves while it is off and a
     rotary axis is off 0, and for tools of two lengths."""
-    on = _where_on(program, switch.switches)
+    on = np.zeros(len(program), dtype=bool)  # the blocks that are run with the switch on
+    for change in switch.switches:
+        on[change.block :] = bool(change.word)
     tilted = _tilted(program, switch.chain)
     moves_on = (on & np.isin(program.kind, MOVES)).any()
     if switch.chain is None or machine is None or not moves_on or not tilted.any():
@@ -143,14 +145,6 @@ def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | Non
         said += f"; {off:,} rapid moves with it off and a rotary axis off 0 are straight lines of the joints"
     point = ToolPoint(word=first.word, line=first.line, length=first.length, rapids_off=off)
     return dataclasses.replace(made, tool_point=point, notes=(*program.notes, said))
-
-
-def _where_on(program: Program, switches: list[Switch]) -> Array:
-    """(B,) True for the blocks that are run with the switch on."""
-    on = np.zeros(len(program), dtype=bool)
-    for switch in switches:
-        on[switch.block :] = bool(switch.word)
-    return on
 
 
 def _tilted(program: Program, chain: Chain | None) -> Array:
@@ -209,22 +203,19 @@ class _Pieces:
     def __init__(self, program: Program, on: Array, tilted: Array, chain: Chain, machine: Machine):
         self.whole, self.chain = program, chain
         self.off = ~on & tilted
-        self._refuse_feed_moves()
-        given = program.tolerance[np.isfinite(program.tolerance)]
-        self.within = CHORD_SHARE * min(machine.tolerance, float(given.min(initial=np.inf)))
-        self.end = program.end.copy()
-        self.end[self.off] = self._of(chain.point, program.end[self.off])
-
-    def _refuse_feed_moves(self) -> None:
-        feed = np.flatnonzero(self.off & np.isin(self.whole.kind, FEED_MOVES))
+        feed = np.flatnonzero(self.off & np.isin(program.kind, FEED_MOVES))
         if len(feed):
             raise InputError(
                 "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
                 f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
                 "the rotary axes to 0",
-                source=self.whole.source,
-                line=int(self.whole.line[feed[0]]),
+                source=program.source,
+                line=int(program.line[feed[0]]),
             )
+        given = program.tolerance[np.isfinite(program.tolerance)]
+        self.within = CHORD_SHARE * min(machine.tolerance, float(given.min(initial=np.inf)))
+        self.end = program.end.copy()
+        self.end[self.off] = self._of(chain.point, program.end[self.off])
 
     def _of(self, function: Callable[[dict[str, Any]], dict[str, Any]], places: FloatArray) -> FloatArray:
         axes = self.whole.axes

@@ -178,7 +178,10 @@ class CornerMove:
         if abs(turn) < _STRAIGHT_ON or self.size == 0.0:
             return [first], second
         if self.kind != "RND":
-            return self._chamfer(second, corner, (before, after), turn, normal)
+            if first.arc is not None or second.arc is not None:
+                raise ValueError("a chamfer is read between two straight moves; write its points out")
+            distance = self.size if self.kind == "CHR" else self.size / (2.0 * math.cos(turn / 2.0))
+            return self._parts(second, corner - distance * before, corner + distance * after, None, normal)
         side = 1 if turn > 0 else -1
         beside = (_beside(move, side * self.size, normal) for move in (first, second))
         centre = meeting(*beside, side)
@@ -190,14 +193,6 @@ class CornerMove:
             raise ValueError(_TOO_LARGE)
         arc = Arc(at_place(centre, first.end, normal), sweep)
         return self._parts(second, start, end, arc, normal)
-
-    def _chamfer(
-        self, second: Move, corner: complex, ways: tuple[complex, complex], turn: float, normal: int
-    ) -> tuple[list[Move], Move]:
-        if self.first is None or self.first.arc is not None or second.arc is not None:
-            raise ValueError("a chamfer is read between two straight moves; write its points out")
-        distance = self.size if self.kind == "CHR" else self.size / (2.0 * math.cos(turn / 2.0))
-        return self._parts(second, corner - distance * ways[0], corner + distance * ways[1], None, normal)
 
     def _parts(
         self, second: Move, start: complex, end: complex, arc: Arc | None, normal: int

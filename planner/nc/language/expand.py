@@ -139,7 +139,11 @@ class _Files:
 
     def load(self, name: str) -> bool:
         """Read a subprogram in the program's folder or below; False for none. Raises ProgramFault."""
-        path = self._find(name)
+        program, wanted = Path(self.run.interpreter.source), self.front.files(name)
+        if not program.is_file() or not _CALLED.fullmatch(name):
+            return False
+        found = (path for path in _below(program.parent) if path.name.lower() in wanted and path.is_file())
+        path = next((path for path in found if path.stat().st_size <= FILE_MAX), None)
         if path is None:
             return False
         words = split_words(path.read_bytes(), block_delete=self.run.interpreter.reading.block_delete)
@@ -150,16 +154,6 @@ class _Files:
         if nameless is not None:
             self.run.functions.setdefault(name, nameless)
         return True
-
-    def _find(self, name: str) -> Path | None:
-        folder = Path(self.run.interpreter.source).parent
-        if not Path(self.run.interpreter.source).is_file() or not _CALLED.fullmatch(name):
-            return None
-        wanted = self.front.files(name)
-        for path in _below(folder):
-            if path.name.lower() in wanted and path.is_file() and path.stat().st_size <= FILE_MAX:
-                return path
-        return None
 
 
 def _below(folder: Path) -> Iterator[Path]:

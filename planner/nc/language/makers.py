@@ -114,9 +114,8 @@ def _origin(making: Making) -> list[Row]:
     """G52 with the shift where the frame is nothing else."""
     matrix, shift = making.travel.programmed
     if making.travel.compensated:
-        raise ValueError(
-            "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
-        )
+        text = "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
+        raise ValueError(text)
     only = (matrix == np.eye(3)).all()
     values = shift / making.unit if only else np.zeros(3)
     return [[("G", 52.0), *zip(AXES, values.tolist(), strict=True)]]
@@ -179,9 +178,8 @@ def _direction(making: Making) -> complex:
     """Unit tangent at the end of the last move in the program's plane. Raises ValueError for none."""
     travel, interpreter = making.travel, making.interpreter
     if travel.compensated:
-        raise ValueError(
-            "CT while cutter radius compensation is on is not read; write the arc with CR= or I and J"
-        )
+        text = "CT while cutter radius compensation is on is not read; write the arc with CR= or I and J"
+        raise ValueError(text)
     table, normal = interpreter.table, interpreter.state.normal
     k = table.blocks - 1
     if k < 0 or table.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):

@@ -221,9 +221,10 @@ class RowsThrough(travel_rows.Coordinates):
     def _no_corner(self) -> None:
         waits = self._corner or self._coming
         if waits is not None:
-            raise ValueError(
+            text = (
                 f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind it"
             )
+            raise ValueError(text)
 
     @property
     def _unit(self) -> float:

@@ -55,9 +55,8 @@ class Travel(RowsThrough):
             return
         if self._offset is not None:
             if self._offset.side != side:
-                raise ValueError(
-                    "the side of compensation changes between two moves; switch it off before (R0, G40)"
-                )
+                text = "the side of compensation changes between two moves; switch it off before (R0, G40)"
+                raise ValueError(text)
             return
         radius = self._known_radius(assume)
         if radius == 0.0:
@@ -70,9 +69,8 @@ class Travel(RowsThrough):
         radius = self.radius()
         if radius == 0.0:
             number = self.interpreter.state.tool_loaded
-            assume(
-                f"tool {number} has no diameter in the machine file: radius compensation does not move the path"
-            )
+            text = "has no diameter in the machine file: radius compensation does not move the path"
+            assume(f"tool {number} {text}")
         return radius
 
     def approach(self, approach: Approach, assume: Callable[[str], None]) -> None:

@@ -96,9 +96,8 @@ def stops_apart(row: TravelRow) -> tuple[list[tuple[int, float, int]], list[tupl
 
 def travel_rows_of(words: Words) -> Iterator[TravelRow]:
     """The rows of words that the interpreter would take."""
-    letter, value, at, first = (
-        column.tolist() for column in (words.letter, words.value, words.at, words.first)
-    )
+    columns = words.letter, words.value, words.at, words.first
+    letter, value, at, first = (column.tolist() for column in columns)
     for row, (line, frame) in enumerate(zip(words.line.tolist(), words.frame.tolist(), strict=True)):
         span = slice(first[row], first[row + 1])
         yield TravelRow(list(zip(letter[span], value[span], at[span], strict=True)), line, frame)
@@ -191,9 +190,8 @@ class Coordinates:
         size = abs(self._plane_size())
         off = max(abs(inner.T @ inner - size * np.eye(2)).max(), abs(self.matrix[normal, plane]).max())
         if max(off, abs(self.matrix[plane, normal]).max()) > _EVEN * max(size, 1.0):
-            raise ValueError(
-                "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
-            )
+            text = "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
+            raise ValueError(text)
 
     def arc(
         self, start: FloatArray, end: FloatArray, given: Mapping[int, float], clockwise: bool, unit: float

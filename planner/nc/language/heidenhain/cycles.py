@@ -95,16 +95,15 @@ def _old_pecking(making: Making, given: Given) -> Iterator[Row]:
     return islice(_pecked(making, parameters(making), above=given["Q210"]), 1, None)
 
 
-def _universal(making: Making, given: Given) -> Iterator[Row]:
-    decreasing = {"less": given["Q212"], "least": given["Q205"], "breaks": round(given["Q213"])}
-    return _pecked(making, given, given["Q208"], above=given["Q210"], **decreasing)
+def _decreasing(making: Making, given: Given, **pecks: Any) -> Iterator[Row]:
+    """Cycles 203 and 205."""
+    return _pecked(making, given, given["Q208"], less=given["Q212"], least=given["Q205"], **pecks)
 
 
 def _pecking(making: Making, given: Given) -> Iterator[Row]:
     if given["Q379"]:
         raise ValueError("Q379, a starting point that is drilled already, is not read")
-    decreasing = {"less": given["Q212"], "least": given["Q205"], "chip": given["Q257"]}
-    return _pecked(making, given, given["Q208"], ahead=(given["Q258"], given["Q259"]), **decreasing)
+    return _decreasing(making, given, chip=given["Q257"], ahead=(given["Q258"], given["Q259"]))
 
 
 def _at_once(making: Making, given: Given, out: float) -> Iterator[Row]:
@@ -261,7 +260,7 @@ CYCLES: dict[int, Maker] = {
     200: lambda making, given: _pecked(making, given, above=given["Q210"]),
     201: lambda making, given: _at_once(making, given, given["Q208"]),
     202: _bored,
-    203: _universal,
+    203: lambda making, given: _decreasing(making, given, above=given["Q210"], breaks=round(given["Q213"])),
     205: _pecking,
     206: _tapped,
     207: lambda making, given: _tapped(making, given, given["Q239"]),

@@ -204,9 +204,8 @@ class HeidenhainParser(Definitions):
         column, given = block.column, text.items(block)
         ends = self._ends(block, given) if given.axes else {"X": text.X, "Y": text.Y}
         if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
-            raise block.fault(
-                "the plane of a pole is that of its two coordinates; write CC with both of them", column
-            )
+            why = "the plane of a pole is that of its two coordinates; write CC with both of them"
+            raise block.fault(why, column)
         named = [(text.POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
         return [tree.assign(block.place, *named, (text.PLANE, tree.Number(float(normal))))]

@@ -77,7 +77,11 @@ class LinuxcncParser(tree.Statements):
         elif keyword in ("sub", "if", "while", "do", "repeat"):
             self._begin(keyword, label, condition, line)
         elif keyword in ("elseif", "else"):
-            self._another_branch(keyword, label, condition, line)
+            branch = self._innermost("if", keyword, label, line)
+            if branch.condition is None:
+                raise line.fault(f"{keyword} after else; else comes last")
+            branch.another_branch(_needed(condition, keyword, line) if keyword == "elseif" else None)
+            self.body = branch.body
         elif keyword in _ENDS:
             self._end(keyword, label, condition, line)
         elif keyword == "return":
@@ -99,15 +103,6 @@ class LinuxcncParser(tree.Statements):
         opened = self.begin(tree.OpenStatement(keyword, line.place, condition, label))
         if keyword == "sub":
             self._add(label, line.place, opened.body)
-
-    def _another_branch(
-        self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine
-    ) -> None:
-        top = self._innermost("if", keyword, label, line)
-        if top.condition is None:
-            raise line.fault(f"{keyword} after else; else comes last")
-        top.another_branch(_needed(condition, keyword, line) if keyword == "elseif" else None)
-        self.body = top.body
 
     def _end(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
         kind = _ENDS[keyword]

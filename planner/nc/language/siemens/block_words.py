@@ -94,9 +94,8 @@ class BlockWords(Commands):
             seconds = [one._replace(letter="P") for one in words if one.letter == "F"]
             words = [one for one in words if one.letter not in "FS"] + seconds
             if not any(one.letter == "P" for one in words):
-                raise reader.fault(
-                    "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds", 0
-                )
+                text = "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds"
+                raise reader.fault(text, 0)
         returns = commands.RETURNS if self.source.file else (17,)
         ended = [one for one in words if one.code in {f"M{number}" for number in returns}]
         words = [one for one in words if one not in ended]
@@ -117,9 +116,8 @@ class BlockWords(Commands):
         self, reader: LineTokens, arc: str, words: list[tree.Word], through: dict[str, tree.Expression]
     ) -> list[tree.Word]:
         if not arc:
-            raise reader.fault(
-                "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3", 0
-            )
+            text = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
+            raise reader.fault(text, 0)
         given = dict(through)
         for one in words:
             letter = one.letter
@@ -162,18 +160,16 @@ class BlockWords(Commands):
         if code in (70, 71, 700, 710):
             self.unit = MM_PER_INCH if code in (70, 700) else 1.0
         if code == 451 and self.compensates:
-            raise reader.fault(
-                "G451, outer corners by their intersection, is not read; write G450", at - reader.start
-            )
+            text = "G451, outer corners by their intersection, is not read; write G450"
+            raise reader.fault(text, at - reader.start)
         if code == 621:
             self.body.append(assumed_row(reader.place, "corner feed"))
         if code in (41, 42) and not self.centre_feed:
             self.body.append(assumed_row(reader.place, "tool centre feed"))
         if code == 500:
             origin = (("G", 10.0), ("L", 2.0), ("P", 9.0), ("X", 0.0), ("Y", 0.0), ("Z", 0.0))
-            self.body.append(
-                tree.Line(reader.place, tuple(tree.word(letter, at, value) for letter, value in origin))
-            )
+            words = tuple(tree.word(letter, at, value) for letter, value in origin)
+            self.body.append(tree.Line(reader.place, words))
         if code in (*_SIDES, 9):
             return [tree.word("G", at, float(code))]
         if code == 641:

@@ -105,10 +105,10 @@ class Commands(SiemensControl):
         known = cycles.ARGUMENTS[name]
         for k, more in enumerate(given[len(known) :]):
             if more not in (None, tree.ZERO, tree.Number(-0.0)):
-                raise reader.fault(
-                    f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out",
-                    0,
+                text = (
+                    f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out"
                 )
+                raise reader.fault(text, 0)
         values = {key: value for key, value in zip(known, given, strict=False) if value is not None}
         try:
             cycles.check(name, values)
@@ -166,11 +166,8 @@ class Commands(SiemensControl):
             single = token.kind == "word" or len(token.text) == len(letter)
             if letter not in ("X", "Y", "Z", "RPL") or not single:
                 raise reader.fault(f"{name} takes X, Y and Z; {token.text} comes", token.at)
-            value = (
-                tree.Number(float(token.text[1:]))
-                if token.kind == "word"
-                else self._given(reader, letter, at)
-            )
+            is_word = token.kind == "word"
+            value = tree.Number(float(token.text[1:])) if is_word else self._given(reader, letter, at)
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
@@ -211,9 +208,8 @@ class Commands(SiemensControl):
         if self.at_tip:
             self.body.append(tree.row(reader.place, ("M", TOOL_POINT[name])))
         elif name == "TRAORI":
-            raise reader.fault(
-                "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file", at
-            )
+            text = "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file"
+            raise reader.fault(text, at)
 
     def _given(self, reader: LineTokens, letter: str, at: int) -> tree.Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
@@ -226,28 +222,20 @@ class Commands(SiemensControl):
             reader.next += 2
             value = reader.expression()
             reader.expect(")")
-            return self._coordinate(letter, value, kind == "AC", reader, at)
+            if letter in "IJK":
+                return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
+            if letter not in "XYZ":
+                raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
+            if (kind == "AC") == self.absolute:
+                return value
+            return value - position(letter) if kind == "AC" else position(letter) + value
         return reader.expression()
-
-    def _coordinate(
-        self, letter: str, value: tree.Expression, absolute: bool, reader: LineTokens, at: int
-    ) -> tree.Expression:
-        if letter in "IJK":
-            return value - position("XYZ"["IJK".index(letter)]) if absolute else value
-        if letter not in "XYZ":
-            raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
-        if absolute == self.absolute:
-            return value
-        return value - position(letter) if absolute else position(letter) + value
 
     def _is_call(self, reader: LineTokens) -> bool:
         """True if the line is a call by a name."""
-        name = reader.peek()
-        if (
-            reader.tokens[reader.next].kind != "name"
-            or not _CALLED.fullmatch(name)
-            or name in self.names | IDLE | IDLE_CALLS | SAID.keys()
-        ):
+        name, known = reader.peek(), self.names | IDLE | IDLE_CALLS | SAID.keys()
+        is_name = reader.tokens[reader.next].kind == "name" and _CALLED.fullmatch(name)
+        if not is_name or name in known:
             return False
         behind = reader.peek(1)
         return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
@@ -269,11 +257,8 @@ class Commands(SiemensControl):
         if reader.ended or reader.tokens[reader.next].kind != "text":
             raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
         reader.next += 1
-        name = re.sub(
-            r"(?i)(_SPF|\.SPF|_MPF|\.MPF)\Z",
-            "",
-            re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1]),
-        )
+        stem = re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1])
+        name = re.sub(r"(?i)(_SPF|\.SPF|_MPF|\.MPF)\Z", "", stem)
         self._append_call(reader, name.upper(), [], tree.ONE)
 
     def _append_call(

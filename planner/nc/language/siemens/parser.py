@@ -48,9 +48,8 @@ class SiemensParser(BlockWords):
                 except ProgramFault as fault:
                     self.faults.append(fault)
                 except RecursionError:
-                    self.faults.append(
-                        ProgramFault(self.source.line(row).place, "the line is nested too deep")
-                    )
+                    place = self.source.line(row).place
+                    self.faults.append(ProgramFault(place, "the line is nested too deep"))
             done = row + 1
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
@@ -106,7 +105,8 @@ class SiemensParser(BlockWords):
             self.absolute = bool(modes[-1] == 90)
 
     def _line(self, line: SourceLine) -> None:
-        text = _without_comment(line.text)
+        # without the comment; a semicolon in a text is none
+        text = re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", line.text.rstrip("\r\n\x1a"))
         at = 0
         if text.lstrip().startswith("/"):
             at = text.index("/") + 1  # the lexer has left out skipped lines
@@ -139,11 +139,6 @@ class SiemensParser(BlockWords):
             self._call(reader)
         else:
             self._words(reader)
-
-
-def _without_comment(text: str) -> str:
-    """A line without its comment; a semicolon in a text is none."""
-    return re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", text.rstrip("\r\n\x1a"))
 
 
 _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {

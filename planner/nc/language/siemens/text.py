@@ -85,17 +85,15 @@ class LineTokens(TokenReader):
         return self.start + self.column()
 
     def value(self) -> tree.Expression:
-        if not self.ended and self.tokens[self.next].kind == "word":
-            self._take_apart()
-        return super().value()
-
-    def _take_apart(self) -> None:
-        word = self.tokens[self.next]
+        if self.ended or self.tokens[self.next].kind != "word":
+            return super().value()
+        word = self.tokens[self.next]  # is a variable, or one and a sum: A+1
         split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
         parts = [Token("name", word.text[:split], word.at)]
         if split == 1:
             parts += [Token("sign", word.text[1], word.at + 1), Token("number", word.text[2:], word.at + 2)]
         self.tokens[self.next : self.next + 1] = parts
+        return super().value()
 
     def operand(self, token: Token) -> tree.Expression | None:
         name = token.text

@@ -31,7 +31,7 @@ from planner.nc.plain import run_plain
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
 from planner.nc.set_limits import LimitsInForce
-from planner.nc.state import REFUSED_MOTION, Setup, State
+from planner.nc.state import REFUSED_MOTION, State, begins_in_inches, state_of
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
 # Nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s].
@@ -51,14 +51,14 @@ class Interpreter:
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`,
     `faults()`, `notes`.
 
-    Between two chunks `state`, `setup` and `table` say where the program stands: what parameters of a program
+    Between two chunks `state` and `table` say where the program stands: what parameters of a program
     ask for.
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
-        self.setup = Setup.of(machine)
-        state = self.setup.start()
+        self.machine = machine
+        state = state_of(machine)
         state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
         self.tool_point = ToolPointSwitch.of(machine)
         self.ignored = IgnoredWords(
@@ -70,7 +70,8 @@ class Interpreter:
         table = BlockTable(len(state.further.letters))
         table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)
-        self.mover = Mover(state, table, self.ignored, self.setup.feed_default, self.findings)
+        feed_default = None if machine is None else machine.feed_default
+        self.mover = Mover(state, table, self.ignored, feed_default, self.findings)
         self.state.strict = reading.strict
         self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
@@ -104,10 +105,10 @@ class Interpreter:
             except CutterFault as fault:
                 self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
         auxiliary.assume_rapids(self.table, self.ignored, self.findings)
-        limits = self.limits.throughout(self.table, self.setup.machine, self.findings)
+        limits = self.limits.throughout(self.table, self.machine, self.findings)
         read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
         read = dataclasses.replace(read, limits=limits)
-        return read if self.findings.faults else at_the_tip(read, self.tool_point, self.setup.machine)
+        return read if self.findings.faults else at_the_tip(read, self.tool_point, self.machine)
 
     def go_on_with(self, state: State, table: BlockTable) -> None:
         """Execute what follows in another `state` and into another `table`: a profile that is read aside."""
@@ -181,7 +182,7 @@ class Interpreter:
             return
         self._units_known = True
         line = int(self.table.block.line[moves.argmax()])
-        if self.setup.inch:
+        if begins_in_inches(self.machine):
             self.findings.note("no G20 or G21 before the first move: inches, as the machine file says", line)
             return
         row = int((self._words.line == line).argmax())

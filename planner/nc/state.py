@@ -222,56 +222,32 @@ class State:
         return system.origin + self.tool_offset + system.turn(point + self.g92)
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Settings of the machine for a program, all zero without one; a feed [mm/s] where it gives none."""
-
-    path_control: PathControl = PathControl.BLEND
-    systems: dict[int, FloatArray] = field(default_factory=dict)
-    positions: dict[int, FloatArray] = field(default_factory=dict)
-    tools: dict[int, Tool] = field(default_factory=dict)
-    feed_default: float | None = None
-    machine: Machine | None = None
-
-    @classmethod
-    def of(cls, machine: Machine | None) -> Setup:
-        """A machine's setup; None for no machine."""
-        if machine is None:
-            return cls()
-        return cls(
+def state_of(machine: Machine | None) -> State:
+    """The modal state at the start of a program, with the machine's offsets, positions and tools."""
+    state = State()
+    if machine is not None:
+        unit = MM_PER_INCH if begins_in_inches(machine) else 1.0
+        origins = {name: _vector(given, LINEAR_AXES) for name, given in machine.work_offsets.items()}
+        state = State(
+            unit=unit,
+            feed_unit=unit,
             path_control=PathControl[machine.path_control.upper()],
-            systems={system_code(name): _vector(p, LINEAR_AXES) for name, p in machine.work_offsets.items()},
-            positions={_HOMES[name]: _vector(p, LINEAR_AXES) for name, p in machine.positions.items()},
-            feed_default=machine.feed_default,
-            machine=machine,
+            systems={system_code(name): System(origin) for name, origin in origins.items()},
+            homes={_HOMES[name]: _vector(p, LINEAR_AXES) for name, p in machine.positions.items()},
             tools={
                 int(number): Tool(np.array([tool.x, 0.0, tool.length]), tool.diameter)
                 for number, tool in machine.tools.items()
             },
+            change_timed=machine.times is not None and machine.times.tool_change is not None,
+            further=ExtraAxes.of(machine),
         )
+    state.apply_offsets()
+    return state
 
-    @property
-    def inch(self) -> bool:
-        """True if the machine file says that programs begin in inches."""
-        dialect = self.machine.dialect if self.machine is not None else None
-        return dialect is not None and dialect.inch
 
-    def start(self) -> State:
-        """The modal state at the start of a program."""
-        times = self.machine.times if self.machine is not None else None
-        unit = MM_PER_INCH if self.inch else 1.0
-        state = State(
-            unit=unit,
-            feed_unit=unit,
-            path_control=self.path_control,
-            systems={code: System(origin) for code, origin in self.systems.items()},
-            homes=dict(self.positions),
-            tools=dict(self.tools),
-            change_timed=times is not None and times.tool_change is not None,
-            further=ExtraAxes.of(self.machine),
-        )
-        state.apply_offsets()
-        return state
+def begins_in_inches(machine: Machine | None) -> bool:
+    """True if the machine file says that programs begin in inches."""
+    return machine is not None and machine.dialect is not None and machine.dialect.inch
 
 
 def system_code(name: str) -> int:

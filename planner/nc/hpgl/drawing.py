@@ -1,7 +1,6 @@
-"""The blocks and events of a drawing while it is read, its user units, and circles through three points.
+"""User units of a plotter file, and circles through three points.
 
-The pen is an event with a full stop, because it takes its time to rise and to fall: M3 down, M5 up, T a pen
-from the carousel. With a = through - start and b = end - start the centre of AT and RT is start + c,
+With a = through - start and b = end - start the centre of AT and RT is start + c,
 
     c = ( (b_y |a|^2 - a_y |b|^2),  (a_x |b|^2 - b_x |a|^2) ) / (2 (a_x b_y - a_y b_x)),
 
@@ -20,15 +19,10 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-import numpy as np
-
-from planner.base.arrays import FloatArray
-from planner.machine import LINEAR_AXES
-from planner.nc.faults import Notes
 from planner.nc.hpgl.instructions import FORMS
-from planner.nc.program import EventTable, Kind, PathControl, Program
+
+Point = tuple[float, float]
 
 SAME_FACTOR = 1e-9  # of two axes [-]: the rounding of the file's numbers
 # The fifth number of SC: what the scales of the two axes are.
@@ -139,81 +133,3 @@ def circle_through(start: Point, through: Point, end: Point) -> tuple[Point, flo
     angle = math.atan2(by - cy, bx - cx) - math.atan2(-cy, -cx)
     sweep = angle % (2.0 * math.pi)
     return (start[0] + cx, start[1] + cy), sweep if cross > 0 else sweep - 2.0 * math.pi
-
-
-Point = tuple[float, float]
-
-PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
-
-
-class DrawnBlock(NamedTuple):
-    """A block that ends at `end` [mm]; `at` its place in the source [bytes], feed [mm/s], dwell [s]."""
-
-    kind: Kind
-    end: Point
-    at: int
-    feed: float
-    dwell: float
-
-
-class Drawing:
-    """Blocks, arcs and events so far."""
-
-    def __init__(self) -> None:
-        self.blocks: list[DrawnBlock] = []
-        self.arcs: list[tuple[int, Point, float]] = []
-        self.events: list[tuple[int, int, str, float]] = []
-
-    def add(self, kind: Kind, end: Point, at: int, *, feed: float = math.inf, dwell: float = 0.0) -> None:
-        """Append a block to `end` [mm]; feed [mm/s], dwell [s], `at` its place in the source [bytes]."""
-        self.blocks.append(DrawnBlock(kind, end, at, feed, dwell))
-
-    def add_arc(self, centre: Point, sweep: float, end: Point, at: int, *, feed: float) -> None:
-        """An arc about `centre` [mm]; sweep [rad], counter-clockwise positive."""
-        self.arcs.append((len(self.blocks), centre, sweep))
-        self.add(Kind.ARC, end, at, feed=feed)
-
-    def add_stop(self, where: Point, seconds: float, at: int) -> None:
-        """A full stop, with a dwell if `seconds` is positive."""
-        self.add(Kind.DWELL if seconds > 0 else Kind.STOP, where, at, dwell=seconds)
-
-    def add_event(self, letter: str, value: float, at: int) -> None:
-        """An event before the next block."""
-        self.events.append((len(self.blocks), at, letter, value))
-
-    def finish(self, data: bytes, source: str, path_control: PathControl, notes: Notes) -> Program:
-        """The program; `data` is the text it was read from."""
-        blocks, arcs = self.blocks, len(self.arcs)
-        newline = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
-        event_at = np.array([event[1] for event in self.events], dtype=np.int64)
-        return Program(
-            source=source,
-            axes=LINEAR_AXES,
-            start=np.zeros(3),
-            kind=np.array([block.kind for block in blocks], dtype=np.uint8),
-            end=_in_space([block.end for block in blocks]),
-            feed=np.array([block.feed for block in blocks], dtype=np.float64),
-            dwell=np.array([block.dwell for block in blocks], dtype=np.float64),
-            line=1 + np.searchsorted(newline, np.array([block.at for block in blocks], dtype=np.int64)),
-            path_control=np.full(len(blocks), path_control),
-            tolerance=np.full(len(blocks), np.nan),
-            arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
-            arc_center=_in_space([arc[1] for arc in self.arcs]),
-            arc_normal=np.full(arcs, 2),
-            arc_sweep=np.array([arc[2] for arc in self.arcs]),
-            events=EventTable(
-                block=np.array([event[0] for event in self.events], dtype=np.int64),
-                line=1 + np.searchsorted(newline, event_at),
-                letter=np.array([ord(event[2]) for event in self.events], dtype=np.uint8),
-                value=np.array([event[3] for event in self.events], dtype=np.float64),
-            ),
-            notes=notes.assumptions + notes.others,
-            assumptions=notes.assumptions,
-            pen=True,
-        )
-
-
-def _in_space(points: Sequence[Point]) -> FloatArray:
-    space = np.zeros((len(points), 3))
-    space[:, :2] = np.array(points, dtype=np.float64).reshape(-1, 2)
-    return space

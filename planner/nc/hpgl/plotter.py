@@ -19,12 +19,10 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
+from planner.nc.arcs import Arc
+from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl.drawing import (
-    PEN_CHANGE,
-    PEN_DOWN,
-    PEN_UP,
-    Drawing,
     Point,
     Scaling,
     ScalingError,
@@ -43,8 +41,11 @@ from planner.nc.hpgl.instructions import (
 )
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
-from planner.nc.state import Setup
+from planner.nc.state import State, state_of
 
+# The pen is an event with a full stop, because it takes its time to rise and to fall.
+PEN_DOWN, PEN_UP, PEN_CHANGE = 3.0, 5.0, 6.0  # M3, M5 and M6
+_NORMAL = 2  # a drawing lies in x and y
 MM_PER_CM = 10.0  # the speed of VS is in cm/s
 FULL_TURN = 360.0  # [deg]
 WORD_SHOWN = 20  # characters of an instruction in a message
@@ -69,9 +70,8 @@ def read_drawing(
     if not found and not run.reports:
         text = "the plotter file is empty: there is no instruction in it"
         raise InputError(text, source=source, line=1, column=1)
-    control = Setup.of(machine).path_control
-    program = run.drawing.finish(data, source, control, run.all_notes())
-    return dataclasses.replace(program, reading=reading), run.faults()
+    program = run.table.finish(source, run.all_notes(), reading=reading)
+    return dataclasses.replace(program, pen=True), run.faults()
 
 
 class _Run:
@@ -83,7 +83,7 @@ class _Run:
         self.strict = reading.strict
         self.unknown: list[int] = []
         self.plotter = (machine.plotter if machine is not None else None) or Plotter()
-        self.drawing = Drawing()
+        self.table, self.state = BlockTable(), State(path_control=state_of(machine).path_control)
         self.reports: list[tuple[int, int, str]] = []
         self.notes: dict[str, None] = {}  # ordered, each once
         self.ignored: dict[str, list[int]] = {}
@@ -94,7 +94,7 @@ class _Run:
         self.page_end: Instruction | None = None
         self.pen = 0
         self._initialise()
-        self.drawing.add_event("M", PEN_UP, 0)
+        self._add_event("M", PEN_UP, 0)
 
     def _initialise(self) -> None:
         self.scaling = Scaling()
@@ -119,10 +119,11 @@ class _Run:
     def all_notes(self) -> Notes:
         notes = [f"read as a plotter file (HPGL), 1 plotter unit = {self.plotter.unit:g} mm"]
         assumed = []
-        drawn = (block for block in self.drawing.blocks if block.kind in (Kind.LINE, Kind.ARC))
-        if (at := next((block.at for block in drawn if block.feed == math.inf), None)) is not None:
+        block, used = self.table.block, slice(0, self.table.blocks)
+        at_will = np.isin(block.kind[used], (Kind.LINE, Kind.ARC)) & np.isinf(block.feed[used])
+        if at_will.any():
             text = "no speed (VS) before it; the pen runs as fast as the machine allows"
-            assumed.append(f"line {self._place(at)[0]}: {text}")
+            assumed.append(f"line {block.line[at_will.argmax()]}: {text}")
         for ignored, said in ((self.changing, assumed), (self.ignored, notes)):
             for name, places in ignored.items():
                 times = f"{len(places)} times, first " if len(places) > 1 else ""
@@ -245,9 +246,9 @@ class _Run:
         was_down = self.down
         self._move_pen(False, it.at)
         self.pen = int(pen)
-        self.drawing.add_event("T", pen, it.at)
-        self.drawing.add_event("M", PEN_CHANGE, it.at)
-        self.drawing.add_stop(self.position, 0.0, it.at)
+        self._add_event("T", pen, it.at)
+        self._add_event("M", PEN_CHANGE, it.at)
+        self.table.add_dwell(0.0, self._ready(it.at), self.state)
         self._move_pen(was_down, it.at)
 
     def _select_speed(self, it: Instruction) -> None:
@@ -271,18 +272,27 @@ class _Run:
     def _go(self, end: Point, at: int) -> None:
         if self.down:
             self._begin_to_draw()
-            self.drawing.add(Kind.LINE, end, at, feed=self._feed())
-        else:
-            self.drawing.add(Kind.RAPID, end, at)
         self.position = end
+        self.table.add(Kind.LINE if self.down else Kind.RAPID, self._ready(at), self.state)
 
     def _turn(self, centre: Point, sweep: float, end: Point, at: int) -> None:
         if not self.down or abs(sweep) < SWEEP_MIN:
             self._go(end, at)
             return
         self._begin_to_draw()
-        self.drawing.add_arc(centre, sweep, end, at, feed=self._feed())
         self.position = end
+        arc = Arc(np.array([*centre, 0.0]), sweep)
+        self.table.add_arc(arc, _NORMAL, self._ready(at), self.state)
+
+    def _ready(self, at: int) -> int:
+        """Bring the state to where the pen is, and make room for a block and an event; returns the line."""
+        self.state.position[:2] = self.position
+        self.state.feed = self.speed_of_pen.get(self.pen, self.speed)
+        self.table.make_room(1)
+        return self._place(at)[0]
+
+    def _add_event(self, letter: str, value: float, at: int) -> None:
+        self.table.add_event(letter, value, self._ready(at))
 
     def _begin_to_draw(self) -> None:
         self.drawn = True
@@ -295,11 +305,9 @@ class _Run:
         """Lower or raise the pen, if it is not there already, at a full stop."""
         if down != self.down:
             self.down = down
-            self.drawing.add_event("M", PEN_DOWN if down else PEN_UP, at)
-            self.drawing.add_stop(self.position, self.plotter.pen_down if down else self.plotter.pen_up, at)
-
-    def _feed(self) -> float:
-        return self.speed_of_pen.get(self.pen, self.speed)
+            self._add_event("M", PEN_DOWN if down else PEN_UP, at)
+            seconds = self.plotter.pen_down if down else self.plotter.pen_up
+            self.table.add_dwell(seconds, self._ready(at), self.state)
 
 
 _EXECUTE: dict[str, Callable[[_Run, Instruction], None]] = {

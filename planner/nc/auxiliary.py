@@ -141,18 +141,6 @@ _READ_INPUT = 660
 _NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
 
 
-def signal(table: BlockTable, block: Block) -> None:
-    """Execute the block's code. Raises WordFault if a word is missing, or for an input that is waited for."""
-    code = block.m["signals"]
-    for letter in _NEEDED[code]:
-        if letter not in block.value:
-            raise block.fault(f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}", "signals")
-    if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
-        text = "M66 waits for an input of the control, which only the machine knows"
-        raise block.fault(f"{text}; plan the parts before and after it", "signals")
-    table.add_event("M", code / 10, block.line)
-
-
 # By ten times the G code.
 _EXACT_PATH = 610
 _PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
@@ -175,7 +163,13 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
         state.tool_selected = integer(block, "T", 0)
         table.add_event("T", state.tool_selected, line)
     if "signals" in block.m:
-        signal(table, block)
+        code = block.m["signals"]
+        if not block.value.keys() >= set(_NEEDED[code]):
+            raise block.fault(f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}", "signals")
+        if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
+            text = "M66 waits for an input of the control, which only the machine knows"
+            raise block.fault(f"{text}; plan the parts before and after it", "signals")
+        table.add_event("M", code / 10, line)
     if "tool number" in block.m:
         if "Q" not in block.value:
             raise block.fault("M61 needs the tool's number as a Q word", "tool number")

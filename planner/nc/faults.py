@@ -174,9 +174,8 @@ class IgnoredWords:
         self._used: dict[str, int] = {}
 
     def _treatment(self, letter: str) -> int:
-        if letter in self.reading.ignore or (
-            letter == "E" and (self.follows or self.reading.extruder == IGNORE)
-        ):
+        no_axis = letter == "E" and (self.follows or self.reading.extruder == IGNORE)
+        if letter in self.reading.ignore or no_axis:
             return LEFT_OUT
         return PARKED if letter in PARKABLE and not self.strict else REFUSED
 
@@ -240,11 +239,8 @@ class IgnoredWords:
 
     def notes(self) -> list[Said]:
         """Everything that was assumed, by its first line."""
-        return [
-            Said(
-                found.line,
-                f"{what.named(found.times)}: {what.said}; first {found.word} line {found.line}",
-                what.changes,
-            )
-            for what, found in self._counted.items()
-        ]
+        notes = []
+        for what, found in self._counted.items():
+            text = f"{what.named(found.times)}: {what.said}; first {found.word} line {found.line}"
+            notes.append(Said(found.line, text, what.changes))
+        return notes

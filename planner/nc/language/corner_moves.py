@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
-from planner.nc.cutter import Cutter, CutterFault
+from planner.nc.cutter import Cutter, CutterFault, OffsetMove, meeting
 from planner.nc.language.travel_rows import AXES, STANDS, G, Move, TravelRow, arc_words, stops_apart
-from planner.nc.offset_lines import OffsetMove, meeting
 from planner.nc.program import Kind
 from planner.nc.state import State
 

@@ -21,7 +21,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain import patterns
+from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import ASSUMED, Maker, Making, Row
 from planner.nc.language.run import ProgramRun
@@ -273,7 +273,7 @@ MAKERS: dict[str, Maker] = {
     "out of plane": out_of_plane,
     "assume": _assume,
     **siemens_cycles.MAKERS,
-    **patterns.MAKERS,
+    **heidenhain_cycles.MAKERS,
     "corner": corner,
     "tangent arc": tangent_arc,
     "arc through": arc_through,

@@ -123,11 +123,8 @@ class RowsThrough(travel_rows.Coordinates):
         if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
         moved = {letter for letter, _, _ in row.words} & {*travel_rows.AXES, *travel_rows.CENTRES}
-        kept = [
-            word
-            for word in row.words
-            if not (word[0] == travel_rows.G and word[1] in (90.0, 91.0))
-        ]  # fmt: skip
+        distance = [(travel_rows.G, 90.0), (travel_rows.G, 91.0)]
+        kept = [word for word in row.words if word[:2] not in distance]
         foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
         ends = any(letter == travel_rows.M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == travel_rows.M and value == 6.0 for letter, value, _ in row.words)
@@ -179,11 +176,8 @@ class RowsThrough(travel_rows.Coordinates):
         mapped, arc = self.mapped(target), None
         if self.motion in (2, 3):
             arc = self.arc(self.place, target, given, self.motion == 2, self._unit)
-        axes = [
-            a
-            for a in range(3)
-            if any(travel_rows.AXES[b] in given and self.matrix[a, b] != 0.0 for b in range(3))
-        ]
+        named = [b for b in range(3) if travel_rows.AXES[b] in given]
+        axes = [a for a in range(3) if (self.matrix[a, named] != 0.0).any()]
         if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self.normal])):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):

@@ -1,2 +1,1 @@
-"""Macros of Fanuc and Haas: `text` their expressions, `control` loops, `calls` calls and returns, `parser`
-all of it as statements."""
+"""Macros of Fanuc and Haas: `calls` loops, calls and returns, `parser` all of it as statements, `lathe*` lathes."""

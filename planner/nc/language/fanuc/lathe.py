@@ -206,12 +206,9 @@ def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expr
         raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")
     often, rest = divmod(int(digits.value), 10_000)
     chamfer, angle = divmod(rest, 100)
-    values: dict[str, Expression] = {
-        "L": Number(float(max(often, 1))),
-        "E": Number(chamfer / 10.0),
-        "A": Number(float(angle)),
-    }
-    return {**values, "Q": first.get("Q", Number(0.0)), "R": first.get("R", Number(0.0))}
+    values = {"L": float(max(often, 1)), "E": chamfer / 10.0, "A": float(angle)}
+    rest = {letter: first.get(letter, Number(0.0)) for letter in "QR"}
+    return {letter: Number(value) for letter, value in values.items()} | rest
 
 
 def _no_profile(pair: tuple[int, int]) -> str:

@@ -225,11 +225,8 @@ def _contour_of(program: Program, offset: np.ndarray, start: complex) -> turning
             centre, normal, sweep = next(arcs)
             if normal != 1 or abs(sweep) > 2.0 * math.pi:
                 raise ValueError("an arc of the profile lies in another plane than z x; write G18 before it")
-            legs.append(
-                turning.Leg(
-                    point, 1 if sweep > 0 else -1, complex(centre[2] - offset[2], centre[0] - offset[0])
-                )
-            )
+            middle = complex(centre[2] - offset[2], centre[0] - offset[0])
+            legs.append(turning.Leg(point, 1 if sweep > 0 else -1, middle))
         else:
             legs.append(turning.Leg(point))
     if not legs:

@@ -132,11 +132,9 @@ class LatheWords(FanucParser):
         """T0203 as rows of its own; the other words are left."""
         if not isinstance(number, Number) or number.value < 0 or number.value != int(number.value):
             raise line.fault("T takes a number, such as T0203 (tool 2, offset 3)")
-        tool, offset = (
-            divmod(int(number.value), _TOOL_DIGITS)
-            if number.value >= _TOOL_DIGITS
-            else (int(number.value),) * 2
-        )
+        tool = offset = int(number.value)
+        if tool >= _TOOL_DIGITS:
+            tool, offset = divmod(tool, _TOOL_DIGITS)
         if tool != self.tool:
             self.body.append(row(line.place, ("T", float(tool)), ("M", 6.0)))
         self.tool = tool

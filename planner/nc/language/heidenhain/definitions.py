@@ -11,7 +11,7 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
-from planner.nc.language.heidenhain import contour, cycles, patterns
+from planner.nc.language.heidenhain import cycles, moves
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.heidenhain.text import Block, Items, Rows, items, looked_up, own, parameter
@@ -42,7 +42,7 @@ def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Exp
     return found
 
 
-READ = (*cycles.CYCLES, *patterns.PATTERNS)
+READ = (*cycles.CYCLES, *cycles.PATTERNS)
 _OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
 # Q parameters that are read where they are 0 only.
 _REFUSED = {
@@ -52,7 +52,7 @@ _REFUSED = {
 
 
 def _not_read(cycle: int) -> str:
-    read = sorted({*READ, 9, 32, *contour.TITLES})
+    read = sorted({*READ, 9, 32, *moves.TITLES})
     return f"cycle {cycle} is not read; read are {', '.join(map(str, read))}"
 
 
@@ -187,16 +187,16 @@ class Definitions(Flow):
             if q in _REFUSED and number != tree.ZERO:
                 raise block.fault(_REFUSED[q], entry.start())
             given.append((self._q(block, q), number))
-        if cycle in patterns.PATTERNS:
+        if cycle in cycles.PATTERNS:
             self._call_cycle(block)
             return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
         return [tree.assign(block.place, *given, (own("cycle"), tree.Number(float(cycle))))]
 
     def _old_cycle(self, block: Block, cycle: int, part: int) -> Rows:
-        if cycle in (9, 32, *contour.TITLES) and part == 0:
+        if cycle in (9, 32, *moves.TITLES) and part == 0:
             return []
-        if cycle in contour.TITLES:
-            return contour.transformed(block, cycle)
+        if cycle in moves.TITLES:
+            return moves.transformed(block, cycle)
         if cycle == 32:
             if block.take(r"\s*T\s*(?=[-+.\dQ])"):
                 return [tree.row(block.place, ("G", 64.0), ("P", block.value()))]

@@ -11,10 +11,13 @@ end; behind CR the direction is that of the moves that were executed (`makers.ta
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from planner.nc.arcs import IN_PLANE
 from planner.nc.language import tree
+from planner.nc.language.approach import KINDS
 from planner.nc.language.heidenhain import text
 
 Words = list[tuple[str, tree.Expression]]
@@ -52,10 +55,8 @@ class Moves:
         feed = self.feed_words(block, given)
         assigned = _assigned(ends)
         if "X" in ends or "Y" in ends:
-            assigned += [
-                (text.DIRECTION[0], ends.get("X", text.X) - text.X),
-                (text.DIRECTION[1], ends.get("Y", text.Y) - text.Y),
-            ]
+            way = ends.get("X", text.X) - text.X, ends.get("Y", text.Y) - text.Y
+            assigned += zip(text.DIRECTION, way, strict=True)
         if not ends:
             return [tree.row(block.place, *feed)] if feed else []
         codes: Words = [("G", tree.Number(53.0))] if machine else []
@@ -120,12 +121,8 @@ class Moves:
             raise block.fault("CR needs R and its direction, DR+ or DR-")
         if given.fast:
             raise block.fault(_FAST_ARC)
-        words = [
-            ("G", _arc_code(block, given)),
-            *self.feed_words(block, given),
-            *ends.items(),
-            ("R", given.radius),
-        ]
+        words = [("G", _arc_code(block, given)), *self.feed_words(block, given), *ends.items()]
+        words.append(("R", given.radius))
         return [tree.row(block.place, *words, assigned=(*_assigned(ends), *_NO_DIRECTION))]
 
     def tangent_arc(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
@@ -203,11 +200,9 @@ class Moves:
         if by is None and "PA" not in given.polar:
             raise block.fault("CP needs PA or IPA")
         radius, angle = text.POLAR
-        turns = (
-            None
-            if by is None
-            else tree.op("FUP", tree.op("ABS", by) / tree.Number(360.0) - tree.Number(1e-9))
-        )
+        turns = None
+        if by is not None:
+            turns = tree.op("FUP", tree.op("ABS", by) / tree.Number(360.0) - tree.Number(1e-9))
 
         def rows(normal: int) -> text.Rows | None:
             first, second = (text.POSITION[_AXES[a]] - text.POLE[a] for a in IN_PLANE[normal])
@@ -238,3 +233,89 @@ _NO_DIRECTION = (
 )  # behind arcs whose end has no direction here
 OUT_OF_PLANE = "out of the pole's plane, or in it beside polar coordinates, belongs to no such move"
 _FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"
+
+
+_EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
+COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
+TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
+
+
+def approach_rows(block: text.Block, feed: tree.Expression | None) -> tuple[text.Rows, text.Items]:
+    """APPR or DEP, with its M codes among the items; `feed` is what F AUTO means. Raises ProgramFault."""
+    departs, column = block.function == "DEP", block.column
+    kind = block.take(r"\s*(P?)(LT|LN|CT|LCT)\b")
+    if kind is None:
+        raise block.wrong(f"{block.function} is followed by LT, LN, CT or LCT")
+    if kind[1]:
+        what = f"{kind[0].strip()}, with polar coordinates, is not read; write {kind[2]} with X and Y"
+        raise block.fault(what, column)
+    given: dict[str, tree.Expression | float] = {"kind": KINDS.index(kind.group(2).upper())}
+    rest = block.text
+    for extra in _EXTRA.finditer(block.text, kind.end()):
+        block.column = extra.end()
+        given[extra.group(1).upper()] = block.value()
+        rest = rest[: extra.start()] + " " * (block.column - extra.start()) + rest[block.column :]
+    found = text.items(replace(block, text=rest, column=kind.end()))
+    ends = {axis: text.absolute(axis, number) for axis, number in found.axes.items()}
+    given |= ends
+    if found.polar or found.turn or found.fast:
+        raise block.fault("APPR and DEP take X Y Z, LEN, R, CCA, RL or RR, and F", column)
+    if found.radius is not None:
+        given["R"] = found.radius
+    fed = feed if found.automatic else found.feed
+    if fed is not None:
+        given["F"] = fed
+    if departs:
+        if found.side:
+            raise block.fault("DEP switches radius compensation off; RL and RR do not belong to it", column)
+        return [tree.made(block.place, "depart", **given), text.looked_up(block)], found
+    approach = tree.made(block.place, "approach", **given, side=found.side or 0)
+    return [approach, tree.assign(block.place, *_assigned(ends))], found
+
+
+def frame_rows(block: text.Block, given: dict[str, tree.Expression], cycle: int) -> text.Rows:
+    """A part of the frame; the position is asked for behind it, since it has other coordinates then."""
+    frame = tree.made(block.place, "heidenhain frame", cycle=cycle, **given)
+    return [frame, tree.made(block.place, "frame in force"), text.looked_up(block)]
+
+
+def datum_rows(block: text.Block) -> text.Rows:
+    """TRANS DATUM AXIS X Y Z, and TRANS DATUM RESET. Raises ProgramFault."""
+    match = block.take(r"\s*(AXIS|RESET)\b")
+    if match is None:
+        raise block.wrong("TRANS DATUM is followed by AXIS and coordinates, or by RESET")
+    if match[1].upper() == "RESET":
+        return frame_rows(block, dict.fromkeys("XYZ", tree.ZERO), 7)
+    return frame_rows(block, _shifts(block), 7)
+
+
+def transformed(block: text.Block, cycle: int) -> text.Rows:
+    """The line n.1 (or n.2 ...) of a cycle of the frame. Raises ProgramFault."""
+    if cycle == 7:
+        return frame_rows(block, _shifts(block), 7)
+    if cycle == 8:
+        axes = block.rest.upper().split()
+        if any(axis not in ("X", "Y", "Z") for axis in axes):
+            raise block.wrong("a mirror image takes the axes X, Y and Z, or none to end it")
+        return frame_rows(block, dict.fromkeys(axes, tree.ZERO), cycle)
+    if cycle == 26:
+        given: dict[str, tree.Expression] = {}
+        while block.rest.strip():
+            axis = block.take(r"\s*(CC[XYZ]|[XYZ])\s*(?=[-+.\dQ])")
+            if axis is None:
+                raise block.wrong("cycle 26 takes factors X Y Z and their centre CCX CCY CCZ")
+            given[axis[1].upper()] = block.value()
+        return frame_rows(block, given, cycle)
+    column, word = block.column, block.take(r"\s*(I?ROT|SCL)\s*")
+    if word is None or (word[1].upper() == "SCL") != (cycle == 11):
+        raise block.fault("ROT or IROT of cycle 10, or SCL of cycle 11 is expected here", column)
+    number = block.value()
+    block.end()
+    return frame_rows(block, {word[1].upper(): number}, cycle)
+
+
+def _shifts(block: text.Block) -> dict[str, tree.Expression]:
+    column, given = block.column, text.items(block)
+    if not given.axes or given.codes or given.polar or given.feed is not None:
+        raise block.fault("a datum shift by X, Y or Z is read, not from a table", column)
+    return {"I" * relative + axis: end for axis, (end, relative) in given.axes.items()}

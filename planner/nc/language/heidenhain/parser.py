@@ -12,9 +12,9 @@ from collections.abc import Callable
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import text
-from planner.nc.language.heidenhain.contour import COMPENSATES, approach_rows, datum_rows
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, procedure_name
+from planner.nc.language.heidenhain.moves import COMPENSATES, approach_rows, datum_rows
 from planner.nc.language.source import Source
 
 _FUNCTION = re.compile(

@@ -1,2 +1,2 @@
-"""Siemens' language (Sinumerik): `text` its expressions, words, loops and jumps, `commands` its tables and
-what is no word, `cycles`, `block_words` rows of words, `parser` all of it as statements."""
+"""Siemens' language (Sinumerik): `text` expressions, loops and jumps, `commands` and `block_words` commands and
+words, `cycles`, `parser` all of it as statements."""

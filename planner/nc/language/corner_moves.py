@@ -182,8 +182,8 @@ class CornerMove:
             distance = self.size if self.kind == "CHR" else self.size / (2.0 * math.cos(turn / 2.0))
             return self._parts(second, corner - distance * before, corner + distance * after, None, normal)
         side = 1 if turn > 0 else -1
-        beside = (_beside(move, side * self.size, normal) for move in (first, second))
-        centre = meeting(*beside, side)
+        one, other = (_beside(move, side * self.size, normal) for move in (first, second))
+        centre = meeting(one, other, side)
         if centre is None:
             raise ValueError(_TOO_LARGE)
         start, end = _foot(first, centre, normal), _foot(second, centre, normal)

@@ -286,13 +286,13 @@ def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turni
     if size > radius:
         core = f"leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
         raise ValueError(f"a helix of radius {size:.6g} {core}")
-    x, y, _ = making.here()
+    (x, y, _), feed = making.here(), hole.feed or 0.0
     count = equal_steps(hole.top - hole.bottom, infeed)
     yield go(hole.clear)
-    yield [("G", 1.0), ("F", hole.feed), ("X", x + size), ("Y", y)]
-    yield go(hole.top, hole.feed)
+    yield [("G", 1.0), ("F", feed), ("X", x + size), ("Y", y)]
+    yield go(hole.top, feed)
     code = 3.0 if turning > 0 else 2.0
     for k in range(1, count + 2):
         z = hole.bottom if k >= count else hole.top + (hole.bottom - hole.top) * k / count
-        yield [("G", code), ("F", hole.feed), ("X", x + size), ("Y", y), ("Z", z), ("I", -size), ("J", 0.0)]
+        yield [("G", code), ("F", feed), ("X", x + size), ("Y", y), ("Z", z), ("I", -size), ("J", 0.0)]
     yield [("G", 1.0), ("X", x), ("Y", y)]

@@ -207,8 +207,8 @@ def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expr
     often, rest = divmod(int(digits.value), 10_000)
     chamfer, angle = divmod(rest, 100)
     values = {"L": float(max(often, 1)), "E": chamfer / 10.0, "A": float(angle)}
-    rest = {letter: first.get(letter, Number(0.0)) for letter in "QR"}
-    return {letter: Number(value) for letter, value in values.items()} | rest
+    found: dict[str, Expression] = {letter: first.get(letter, Number(0.0)) for letter in "QR"}
+    return found | {letter: Number(value) for letter, value in values.items()}
 
 
 def _no_profile(pair: tuple[int, int]) -> str:

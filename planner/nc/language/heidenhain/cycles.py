@@ -86,7 +86,7 @@ def parameters(making: Making) -> dict[str, float]:
 def _pecked(making: Making, given: Given, out: float = 0.0, **pecks: Any) -> Iterator[Row]:
     """Cycles 1, 200, 203 and 205: by infeeds, out at a feed or, where it is 0, at rapid speed."""
     hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
-    usual = {"infeed": given["Q202"], "back": given["Q256"] or gap, "ahead": (gap, gap)}
+    usual: dict[str, Any] = {"infeed": given["Q202"], "back": given["Q256"] or gap, "ahead": (gap, gap)}
     yield from pecked(hole, Pecks(**usual | pecks))
     yield go(hole.clear, out or None)
     yield from _end(hole)

@@ -25,7 +25,6 @@ from planner.base.units import MM_PER_INCH
 
 AXES = "xyz"
 IN_PLANE = {2: (0, 1), 1: (2, 0), 0: (1, 2)}  # the plane's axes by its normal, right-handed
-
 # By programmed unit [mm]; LinuxCNC's own numbers, sqrt(2) * 0.02 mm and sqrt(2) * 0.002 inch, found again by
 # bisection on it.
 CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_PER_INCH}

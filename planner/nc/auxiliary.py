@@ -29,6 +29,17 @@ _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per
 # Below this feed [programmed units per minute] LinuxCNC takes this one under G93
 # (inverse_time_rate_straight).
 LINUXCNC_SLOWEST = 0.1
+# Ten times M codes: the one that reads an input, and the words that each needs.
+_READ_INPUT = 660
+_NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
+# By ten times the G code.
+_EXACT_PATH = 610
+_PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
+# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point,
+# a dwell, M6, M0. Cycles make room for themselves.
+ROWS_AT_ONCE = 4
+_LONG = 60.0  # a dwell of a minute is no usual one [s]
+TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
 def set_feed(state: State, block: Block, findings: Findings) -> None:
@@ -134,21 +145,6 @@ def feed_of_time(state: State, block: Block, length: float, findings: Findings) 
     if 0.0 < per_minute < LINUXCNC_SLOWEST:
         text = f"G93 asks for less than {LINUXCNC_SLOWEST:g} units/min, and keeps its time; LinuxCNC takes {LINUXCNC_SLOWEST:g}"
         findings.assume(text, block.line, block.at["F"])
-
-
-# Ten times M codes: the one that reads an input, and the words that each needs.
-_READ_INPUT = 660
-_NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
-
-
-# By ten times the G code.
-_EXACT_PATH = 610
-_PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point,
-# a dwell, M6, M0. Cycles make room for themselves.
-ROWS_AT_ONCE = 4
-_LONG = 60.0  # a dwell of a minute is no usual one [s]
-TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
 def events(state: State, table: BlockTable, block: Block, findings: Findings) -> None:

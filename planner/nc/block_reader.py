@@ -29,7 +29,6 @@ from planner.nc.settings import (
 )
 
 MESSAGE = "message"  # the rest of the line is text
-
 COMMAND = Assumption("command{|s} to the control ($)", "assumed not to move anything")
 _IGNORED = Assumption("command{|s} to the control", "left out, as --ignore says")
 # Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files
@@ -45,6 +44,20 @@ _LONGEST = 80  # characters of bare axis letters that are looked at
 # Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in
 # 3^n ways.
 _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNORECASE)
+CODE_MAX = 1e4  # larger G and M numbers are all unknown
+_CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
+_ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
+_TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
+_BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
+NAME_SHOWN = 20  # characters of a name in a note
+PROGRAM_NAME = Assumption("program name{|s}", "nothing is done with them")
+PROGRAM_NUMBER = Assumption("program number{|s}", "kept, nothing is done with them")
+_UNREADABLE = {
+    Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
+    Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",
+    Unreadable.COMMENT_NESTED: "a comment inside a comment is not allowed; remove the inner parenthesis",
+}
+_NO_WORD = "this character starts no word; a word is a letter and a number"
 
 
 def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
@@ -92,18 +105,6 @@ def homed(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
     block.homing = "".join(letter for letter in "XYZ" if letter.encode() in named) or "XYZ"
     del block.g["one-shot"]
     return True
-
-
-CODE_MAX = 1e4  # larger G and M numbers are all unknown
-_CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
-_ALWAYS = frozenset("XYZFST$" + codes.PARKABLE)  # words that need no code beside them
-
-_TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
-
-_BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
-NAME_SHOWN = 20  # characters of a name in a note
-PROGRAM_NAME = Assumption("program name{|s}", "nothing is done with them")
-PROGRAM_NUMBER = Assumption("program number{|s}", "kept, nothing is done with them")
 
 
 def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) -> Block | None:
@@ -259,14 +260,6 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
         elif ignored.treatment[ord(letter)] != LEFT_OUT:
             report(block.at[letter], unused(letter))
         del block.value[letter]
-
-
-_UNREADABLE = {
-    Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
-    Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",
-    Unreadable.COMMENT_NESTED: "a comment inside a comment is not allowed; remove the inner parenthesis",
-}
-_NO_WORD = "this character starts no word; a word is a letter and a number"
 
 
 def _unreadable(words: Words, word: int) -> str:

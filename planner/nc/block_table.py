@@ -16,6 +16,8 @@ from planner.nc.program import FEED_MOVES, EventTable, Frame, Kind, Origins, Pro
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import LETTERS, ROTARY, State, rotary_feed
 
+_COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
+
 
 class BlockColumns(NamedTuple):
     """The blocks of a program, fields of `Program`, with room to spare."""
@@ -198,9 +200,6 @@ class BlockTable:
             frame=self.block.frame[used].copy() if frames else np.zeros(0, dtype=np.int32),
             frames=tuple(frames),
         )
-
-
-_COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
 
 
 def _grown(array: Array, needed: int) -> Array:

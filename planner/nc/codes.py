@@ -10,6 +10,94 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+_ONE_OR_MANY = re.compile(r"\{(.*?)\|(.*?)\}")
+G_GROUP: dict[int, str] = {
+    **dict.fromkeys((0, 10, 20, 30), "motion"),
+    **dict.fromkeys((50, 51, 52, 53, 62), "motion"),
+    **dict.fromkeys((330, 331, 730, 740, 760, *range(810, 900, 10)), "motion"),
+    **dict.fromkeys((40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923), "one-shot"),
+    **dict.fromkeys((170, 180, 190), "plane"),
+    **dict.fromkeys((200, 210), "units"),
+    **dict.fromkeys((900, 910), "distance mode"),
+    **dict.fromkeys((901, 911), "arc centre mode"),
+    **dict.fromkeys((540, 541, 550, 560, 570, 580, 590, 591, 592, 593), "work offset"),
+    **dict.fromkeys((610, 611, 640), "path control"),
+    **dict.fromkeys((430, 431, 432, 434, 490), "tool length"),
+    **dict.fromkeys((400, 410, 411, 420, 421), "cutter compensation"),
+    **dict.fromkeys((930, 940, 950), "feed mode"),
+    **dict.fromkeys((960, 970), "spindle mode"),
+    **dict.fromkeys((980, 990), "retract mode"),
+    **dict.fromkeys((70, 80), "lathe diameter mode"),
+    800: "cycle end",  # a motion code on its line beats it
+}
+# Codes that are kept as events: what S means, revolutions per minute or surface speed.
+G_EVENTS = frozenset((960, 970))
+# Motion codes of a kind, ten times the G code.
+ARCS = frozenset((20, 30))
+CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS = 50, 51, 52, 53, 62
+SPLINES = frozenset((CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS))
+THREADS = frozenset((330, 331))  # G33 and G33.1
+THREADING = 760  # the cycle of many passes
+CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
+# Words beside X Y Z F S T N that a code uses, by its group letter and tenths.
+WORDS: dict[tuple[str, int], str] = {
+    **{("G", code): "IJKRP" for code in ARCS},
+    ("G", 50): "IJPQ", ("G", 51): "IJ", ("G", 52): "PL", ("G", 62): "PKR",
+    ("G", 541): "P", ("G", 40): "P", ("G", 100): "LPRQIJ", ("G", 640): "PQ", **{("G", code): "H" for code in (430, 432, 434)},
+    ("G", 960): "D",
+    **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},
+    ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
+    ("G", 730): "RLQ", ("G", 740): "RP", ("G", 810): "RL", ("G", 820): "RLP", ("G", 830): "RLQ", ("G", 840): "RLP",
+    ("G", 850): "RL", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
+    **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
+    ("M", 610): "Q",
+}  # fmt: skip
+MOTION_WORDS = "IJKRPQLH"  # that a motion code in force may use
+M_GROUP: dict[int, str] = {
+    **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),
+    **dict.fromkeys((30, 40, 50), "spindle"),
+    60: "tool change",
+    190: "spindle orientation",
+    **dict.fromkeys((70, 80, 90), "coolant"),
+    **dict.fromkeys((480, 490, 500, 510, 520, 530), "override"),
+    **dict.fromkeys(range(620, 690, 10), "signals"),
+    610: "tool number",
+}
+_STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
+_POST = "give the machine a table of this axis, or choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
+_ANGLES = "choose a post-processor that writes the angles of the rotary axes, with G43.4"
+# Axes that are not planned: they may be named as long as they stand still.
+PARKABLE = "ABCUVW"
+# Letters that only some words use: "I word without G2 or G3".
+LETTER_NEEDS = {
+    "I": "G2, G3, G5, G5.1, G10, G33.1, G76 or G87",
+    "J": "G2, G3, G5, G5.1, G10, G76 or G87",
+    "K": "G2, G3, G6.2, G33, G33.1, G76 or G87",
+    "R": "G2, G3, G6.2, G10 or a canned cycle",
+    "P": "G4, G10, G64, G2, G3, G5, G5.2, G6.2, a canned cycle that dwells or M62 to M66",
+    "Q": "G10, G64, G5, G73, G76, G83, M61 or M66 to M68",
+    "H": "G43, G43.2, G43.4 or G76",
+    "D": "G41, G42 or G96",
+    "L": "G10, G41.1, G42.1, G5.2, M66 or a canned cycle",
+    "E": "G76 or M66 to M68",
+}
+# Characters that start no word, and what they mean in the dialects that use them.
+CHARACTERS: dict[str, str] = {
+    "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
+    "[": "expressions are not supported; write the number out",
+    "<": "named parameters are not supported; write the number out",
+    "$": "this command to the control is not supported: it may move ($J does); write what it moves as G0 or G1",
+    "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
+    '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
+    "@": "polar coordinates are not supported; write x and y",
+    "^": "polar coordinates are not supported; write x and y",
+    "/": "block delete is allowed at the start of a line only",
+    ")": "a comment is closed that was not opened",
+    ",": "corner roundings and chamfers (,R and ,C) are not supported: write the arc or the line; a decimal comma is written as a "
+    "point: 10.5",
+    "!": "a comment starts with ( or ;",
+}
+
 
 @dataclass(frozen=True)
 class Refusal:
@@ -37,73 +125,9 @@ class Assumption:
         return f"{times:,} " + _ONE_OR_MANY.sub(lambda both: both[1 if times == 1 else 2], self.name)
 
 
-_ONE_OR_MANY = re.compile(r"\{(.*?)\|(.*?)\}")
-
-
-G_GROUP: dict[int, str] = {
-    **dict.fromkeys((0, 10, 20, 30), "motion"),
-    **dict.fromkeys((50, 51, 52, 53, 62), "motion"),
-    **dict.fromkeys((330, 331, 730, 740, 760, *range(810, 900, 10)), "motion"),
-    **dict.fromkeys((40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923), "one-shot"),
-    **dict.fromkeys((170, 180, 190), "plane"),
-    **dict.fromkeys((200, 210), "units"),
-    **dict.fromkeys((900, 910), "distance mode"),
-    **dict.fromkeys((901, 911), "arc centre mode"),
-    **dict.fromkeys((540, 541, 550, 560, 570, 580, 590, 591, 592, 593), "work offset"),
-    **dict.fromkeys((610, 611, 640), "path control"),
-    **dict.fromkeys((430, 431, 432, 434, 490), "tool length"),
-    **dict.fromkeys((400, 410, 411, 420, 421), "cutter compensation"),
-    **dict.fromkeys((930, 940, 950), "feed mode"),
-    **dict.fromkeys((960, 970), "spindle mode"),
-    **dict.fromkeys((980, 990), "retract mode"),
-    **dict.fromkeys((70, 80), "lathe diameter mode"),
-    800: "cycle end",  # a motion code on its line beats it
-}
-
-# Codes that are kept as events: what S means, revolutions per minute or surface speed.
-G_EVENTS = frozenset((960, 970))
-
-# Motion codes of a kind, ten times the G code.
-ARCS = frozenset((20, 30))
-CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS = 50, 51, 52, 53, 62
-SPLINES = frozenset((CUBIC, QUADRATIC, NURBS, NURBS_END, NURBS_WITH_KNOTS))
-THREADS = frozenset((330, 331))  # G33 and G33.1
-THREADING = 760  # the cycle of many passes
-CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
-
-# Words beside X Y Z F S T N that a code uses, by its group letter and tenths.
-WORDS: dict[tuple[str, int], str] = {
-    **{("G", code): "IJKRP" for code in ARCS},
-    ("G", 50): "IJPQ", ("G", 51): "IJ", ("G", 52): "PL", ("G", 62): "PKR",
-    ("G", 541): "P", ("G", 40): "P", ("G", 100): "LPRQIJ", ("G", 640): "PQ", **{("G", code): "H" for code in (430, 432, 434)},
-    ("G", 960): "D",
-    **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},
-    ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
-    ("G", 730): "RLQ", ("G", 740): "RP", ("G", 810): "RL", ("G", 820): "RLP", ("G", 830): "RLQ", ("G", 840): "RLP",
-    ("G", 850): "RL", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
-    **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
-    ("M", 610): "Q",
-}  # fmt: skip
-MOTION_WORDS = "IJKRPQLH"  # that a motion code in force may use
-
-M_GROUP: dict[int, str] = {
-    **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),
-    **dict.fromkeys((30, 40, 50), "spindle"),
-    60: "tool change",
-    190: "spindle orientation",
-    **dict.fromkeys((70, 80, 90), "coolant"),
-    **dict.fromkeys((480, 490, 500, 510, 520, 530), "override"),
-    **dict.fromkeys(range(620, 690, 10), "signals"),
-    610: "tool number",
-}
-
-_STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
-_POST = "give the machine a table of this axis, or choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
-_ANGLES = "choose a post-processor that writes the angles of the rotary axes, with G43.4"
 _PROBE = Refusal(
     "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
 )
-
 G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
@@ -115,7 +139,6 @@ G_REFUSED: dict[int, Refusal] = {
     ),
     **dict.fromkeys((700, 710, 711, 712, 720, 721, 722), Refusal("a lathe cycle is", _STRAIGHT, True)),
 }
-
 M_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((700, 710, 720, 730), Refusal("saving and restoring modes is", "write the modes out")),
     **dict.fromkeys((980, 990), Refusal("a subprogram is", "write its blocks out")),
@@ -144,40 +167,6 @@ LETTERS_REFUSED: dict[str, Refusal] = {
         "give the machine a table [axes.e], or --extruder ignore to plan the other axes without it",
     ),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
-}
-
-# Axes that are not planned: they may be named as long as they stand still.
-PARKABLE = "ABCUVW"
-
-# Letters that only some words use: "I word without G2 or G3".
-LETTER_NEEDS = {
-    "I": "G2, G3, G5, G5.1, G10, G33.1, G76 or G87",
-    "J": "G2, G3, G5, G5.1, G10, G76 or G87",
-    "K": "G2, G3, G6.2, G33, G33.1, G76 or G87",
-    "R": "G2, G3, G6.2, G10 or a canned cycle",
-    "P": "G4, G10, G64, G2, G3, G5, G5.2, G6.2, a canned cycle that dwells or M62 to M66",
-    "Q": "G10, G64, G5, G73, G76, G83, M61 or M66 to M68",
-    "H": "G43, G43.2, G43.4 or G76",
-    "D": "G41, G42 or G96",
-    "L": "G10, G41.1, G42.1, G5.2, M66 or a canned cycle",
-    "E": "G76 or M66 to M68",
-}
-
-# Characters that start no word, and what they mean in the dialects that use them.
-CHARACTERS: dict[str, str] = {
-    "#": "parameters are not supported; run the program through its control's interpreter and plan the resulting moves",
-    "[": "expressions are not supported; write the number out",
-    "<": "named parameters are not supported; write the number out",
-    "$": "this command to the control is not supported: it may move ($J does); write what it moves as G0 or G1",
-    "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
-    '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
-    "@": "polar coordinates are not supported; write x and y",
-    "^": "polar coordinates are not supported; write x and y",
-    "/": "block delete is allowed at the start of a line only",
-    ")": "a comment is closed that was not opened",
-    ",": "corner roundings and chamfers (,R and ,C) are not supported: write the arc or the line; a decimal comma is written as a "
-    "point: 10.5",
-    "!": "a comment starts with ( or ;",
 }
 
 

@@ -34,6 +34,12 @@ from planner.nc.program import Kind
 from planner.nc.state import State
 
 NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
+STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
+_ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
+_GOUGE = (
+    "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
+    "smaller tool"
+)
 
 
 @dataclass(frozen=True)
@@ -97,15 +103,6 @@ def cross(one: complex, other: complex) -> float:
 def dot(one: complex, other: complex) -> float:
     """The scalar product."""
     return (one.conjugate() * other).real
-
-
-STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
-_ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
-
-_GOUGE = (
-    "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
-    "smaller tool"
-)
 
 
 class CutterFault(ValueError):

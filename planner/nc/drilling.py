@@ -32,11 +32,29 @@ from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 
 CLEARANCE = 0.01 * MM_PER_INCH  # between pecks [mm]: a hundredth of an inch, as LinuxCNC has it
-
 DWELLING = frozenset((820, 860, 880, 890))  # cycles that need P
 PECKING = frozenset((730, 830))  # cycles that need Q
 TAPPING = {740: -1, 840: 1}  # how the spindle must turn
 STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which must turn
+# The steps of each cycle from above the hole at R on: moves at the feed (down to the depth, back to R, out to
+# where the cycle ends) and fast (up to where it ends; beside, deep, in and away, of the back bore, whose feed
+# leads to the counterbore), the dwell, the spindle (stop, other way, again as before), and a full stop.
+_STEPS = {
+    **dict.fromkeys(PECKING, "pecks down up"),
+    **dict.fromkeys(TAPPING, "down stop other dwell out stop again"),
+    810: "down up",
+    820: "down dwell up",
+    850: "down back up",
+    860: "down dwell stop up again",
+    870: "beside stop deep in again counterbore down stop deep away up again",
+    880: "down dwell stop halt up again",
+    890: "down dwell out",
+}
+STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
+_BY_HAND = 880  # G88
+_PER_HOLE = 16  # steps of a hole without pecks, at most
+_PER_PECK = 3  # down, out and back in
+_ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
 
 
 @dataclass(frozen=True)
@@ -65,22 +83,6 @@ class CycleStep:
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seconds: float = 0.0
     spindle: int = 0
-
-
-# The steps of each cycle from above the hole at R on: moves at the feed (down to the depth, back to R, out to
-# where the cycle ends) and fast (up to where it ends; beside, deep, in and away, of the back bore, whose feed
-# leads to the counterbore), the dwell, the spindle (stop, other way, again as before), and a full stop.
-_STEPS = {
-    **dict.fromkeys(PECKING, "pecks down up"),
-    **dict.fromkeys(TAPPING, "down stop other dwell out stop again"),
-    810: "down up",
-    820: "down dwell up",
-    850: "down back up",
-    860: "down dwell stop up again",
-    870: "beside stop deep in again counterbore down stop deep away up again",
-    880: "down dwell stop halt up again",
-    890: "down dwell out",
-}
 
 
 def steps(hole: Hole) -> Iterator[CycleStep]:
@@ -117,13 +119,6 @@ def _pecks(hole: Hole) -> Iterator[CycleStep]:
             yield CycleStep(Kind.RAPID, (a, b, hole.clear))
         yield CycleStep(Kind.RAPID, (a, b, depth + CLEARANCE / hole.unit))
         depth -= hole.peck
-
-
-STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
-_BY_HAND = 880  # G88
-_PER_HOLE = 16  # steps of a hole without pecks, at most
-_PER_PECK = 3  # down, out and back in
-_ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
 
 
 def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> None:

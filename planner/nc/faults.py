@@ -20,6 +20,10 @@ from planner.nc.program import MadeWhenAsked, plain
 from planner.nc.reading import IGNORE, Reading
 from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, TOOL_POINT_M
 
+# How a letter is treated whatever stands beside it, in `Assumed.treatment`.
+READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
+LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -134,12 +138,6 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
     if more:
         text += f" ({more} more in this program; 'planner info' shows them)"
     raise InputError(text, source=first.source or source, line=first.line, column=first.column)
-
-
-# How a letter is treated whatever stands beside it, in `Assumed.treatment`.
-READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
-
-LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 
 
 @dataclass(slots=True)

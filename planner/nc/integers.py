@@ -33,6 +33,8 @@ _OTHERS = {
     ])
     for letter, calls in (("G", (65.0, 66.0)), ("M", (97.0, 98.0, 99.0)))
 }  # fmt: skip
+LENGTHS = frozenset(ord(letter) for letter in "XYZUVWIJKRQ")
+INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 
 
 class DwellWords:
@@ -64,10 +66,6 @@ class DwellWords:
         value = words.value.copy()
         value[times] *= MILLISECOND
         return dataclasses.replace(words, value=value)
-
-
-LENGTHS = frozenset(ord(letter) for letter in "XYZUVWIJKRQ")
-INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,15 @@ from planner.base.kernels import njit
 # program's.
 LINE_MAX = 4096
 FAULT = 0
+BOM = b"\xef\xbb\xbf"
+NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
+_WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
+# Characters by their codes: what a compiled loop compares bytes with.
+_NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
+_OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
+_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36
+_POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
+_MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
 
 
 class Unreadable(IntEnum):
@@ -107,11 +116,6 @@ class Words:
         return self.data[at : self.line_at(at)[1]].decode("utf-8", "replace").strip()
 
 
-BOM = b"\xef\xbb\xbf"
-NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
-_WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
-
-
 def split_words(data: bytes, *, block_delete: bool) -> Words:
     """Split a program into words; with `block_delete` lines that start with "/" are left out."""
     if b"\n" not in data:
@@ -146,13 +150,7 @@ def text_alone(data: bytes) -> Words:
     return replace(split_words(b"\n", block_delete=False), data=data)
 
 
-# Characters by their codes: what a compiled loop compares bytes with.
-_NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
-_OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
-_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36
 _CHARACTER, _NUMBER, _COMMENT_OPEN, _COMMENT_NESTED, _LONG = (int(code) for code in Unreadable)
-_POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
-_MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
 
 
 @njit(cache=True)

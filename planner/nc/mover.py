@@ -23,6 +23,14 @@ _LEFT = (410, 411)
 _DYNAMIC = (411, 421)
 _REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retract mode")
 _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while it is on
+# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
+# stand beside them.
+COVET_AXES = (100, 280, 300, 520, 920)
+NOWHERE = np.zeros(0)  # where further axes stand that the machine does not have
+_WHY_NO_MOTION = {
+    NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
+    REFUSED_MOTION: "an axis word under a motion code that is not supported",
+}
 
 
 def check_unchanged(state: State, block: Block) -> None:
@@ -138,16 +146,6 @@ def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
     if state.rotated and block.has("XY"):
         there[:2] = (system.origin + system.turn(point))[:2]
     return there
-
-
-# G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
-# stand beside them.
-COVET_AXES = (100, 280, 300, 520, 920)
-NOWHERE = np.zeros(0)  # where further axes stand that the machine does not have
-_WHY_NO_MOTION = {
-    NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
-    REFUSED_MOTION: "an axis word under a motion code that is not supported",
-}
 
 
 class Mover:

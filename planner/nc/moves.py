@@ -26,6 +26,8 @@ OFFSET_NUMBER = codes.Assumption(
     "number{|s} of {an offset|offsets} (D, H) without a code that uses {it|them}", "left out"
 )
 Report = Callable[[int, str], None]
+_CLOSES_IF = "the arc would close if its centre were"
+_ROUNDING = {**dict.fromkeys("THDLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
 
 
 class WordFault(Exception):
@@ -83,10 +85,6 @@ def unused(letter: str) -> str:
     if letter in codes.LETTERS_REFUSED:
         return str(codes.LETTERS_REFUSED[letter])
     return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
-
-
-_CLOSES_IF = "the arc would close if its centre were"
-_ROUNDING = {**dict.fromkeys("THDLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
 
 
 class ArcFault(WordFault):

@@ -40,6 +40,7 @@ from planner.nc.state import (
 )
 
 _TURN = 360.0  # degrees
+_FIXTURE = 593  # the system of G10 L11
 
 
 def _zeros() -> FloatArray:
@@ -141,9 +142,6 @@ def length_moved(state: State, start: FloatArray, xyz: float) -> float:
     moved = state.further.position - start
     parallel = float(np.linalg.norm(moved[ROTARY:]))
     return parallel if parallel > 0.0 else float(np.linalg.norm(moved[:ROTARY])) * state.unit
-
-
-_FIXTURE = 593  # the system of G10 L11
 
 
 def set_tool_offset(state: State, block: Block, findings: Findings) -> None:

@@ -17,6 +17,8 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.nc.reading import AS_USUAL, Reading
 
+One = TypeVar("One")
+
 
 class Kind(IntEnum):
     """Kinds of blocks."""
@@ -280,9 +282,6 @@ class Program:
             text += f"{elsewhere} ({at.name}), called from line {at.line}"
             frame = at.caller
         return text
-
-
-One = TypeVar("One")
 
 
 class MadeWhenAsked(Sequence[One]):

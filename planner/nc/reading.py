@@ -23,7 +23,6 @@ EXTRUDERS = (REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
 LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
 DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
-
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")
 _SAY = "write G and M codes, rotary or second axes (A B C U V W) or commands of the control ($X), such as M428,G187,A"

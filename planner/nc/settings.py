@@ -20,7 +20,6 @@ from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
 AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
 EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
-
 # Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
 # what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
@@ -69,7 +68,6 @@ PARKS = Assumption(
     "a full stop; what it moves is not planned, and the head is assumed to come back",
     changes=True,
 )
-
 # By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
 EXTRUDER_MODES = frozenset((82, 83))
 _PARKING = frozenset((125, 600, 701, 702))
@@ -93,12 +91,10 @@ _OF_PRINTERS = _OF_AXES | EXTRUDER_MODES | frozenset((
 # fmt: on
 TEXTS = frozenset((117, 118))  # a message to the end of the line
 MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
-
 # G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates
 # off, polar interpolation off, stored stroke and spindle speed checks, mirror image off, look-ahead of Haas
 # and its smoothness, rotation off.
 _G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 690, 1030, 1130, 1870))
-
 # Codes of the groups that are settings beside some words.
 _SOMETIMES = frozenset((50, 51, 80, 100, 920))
 ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {730}}

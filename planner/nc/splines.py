@@ -21,8 +21,8 @@ from planner.nc.state import State
 ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces
 # A first control point this near is where the machine stands [mm]: the least digit of metric programs.
 SAME_PLACE = 1e-3
-
 Pieces = tuple[FloatArray, FloatArray]  # (K, 4, 3) control points [mm] and (K, 4) weights
+_CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # that do not leave a curve
 
 
 @dataclass(slots=True)
@@ -53,9 +53,6 @@ class OpenSpline:
             f"the spline of line {self.line} has {len(self.points)} control points and {len(self.knots)} knots; order P{self.order} "
             f"needs {len(self.points) + self.order} knots, the last {self.order} in lines of their own"
         )
-
-
-_CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # that do not leave a curve
 
 
 def _fault(block: Block, message: str) -> WordFault:

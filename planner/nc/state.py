@@ -22,7 +22,6 @@ from planner.nc.program import PathControl
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
 REFUSED_MOTION = -2  # a motion code that is not supported is in force (only `info` reads on)
-
 # Work systems of G10 P1 to P9, by ten times their G codes.
 SYSTEMS = (540, 550, 560, 570, 580, 590, 591, 592, 593)
 _HOMES = {"g28": 280, "g30": 300}  # codes of positions by their names in a machine file
@@ -30,8 +29,6 @@ _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)} 
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
 FeedMode = Literal["per minute", "inverse time", "per turn"]
-
-
 LETTERS = "ABCUVW"
 ROTARY = 3  # the first so many of them
 

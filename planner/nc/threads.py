@@ -36,6 +36,13 @@ from planner.nc.state import State
 PASSES_MAX = 10_000  # of a thread: more are a mistake in J or H
 ANGLE_MAX = 80.0  # of the compound slide [degrees], as LinuxCNC's manual has it
 _ENTRY, _END = 1, 2  # bits of L
+_NEEDED = {
+    "P": "the pitch",
+    "I": "from the drive line to the thread's peak, below 0 for an outer thread",
+    "J": "the depth of the first pass",
+    "K": "the full depth of the thread",
+}
+_AND_BACK = 331  # G33.1
 
 
 @dataclass(frozen=True)
@@ -138,17 +145,6 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
     if (thread.depth / thread.first) ** thread.degression + thread.springs > PASSES_MAX:
         raise WordFault(word, f"G76 makes more than {PASSES_MAX} passes; correct J, R or H")
     return thread
-
-
-_NEEDED = {
-    "P": "the pitch",
-    "I": "from the drive line to the thread's peak, below 0 for an outer thread",
-    "J": "the depth of the first pass",
-    "K": "the full depth of the thread",
-}
-
-
-_AND_BACK = 331  # G33.1
 
 
 def thread(state: State, table: BlockTable, block: Block, findings: Findings) -> None:

@@ -28,11 +28,9 @@ SIGNIFICANT = 4  # digits of a feed
 FEED_MIN = 0.01
 # A feed within this share of the programmed one is the programmed one [-]: the rounding of lengths and times.
 SAME_FEED = 1e-6
-
 G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
 _NUMBER = re.compile(NUMBER)
-
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 

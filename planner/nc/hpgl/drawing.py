@@ -23,11 +23,17 @@ from dataclasses import dataclass
 from planner.nc.hpgl.instructions import FORMS
 
 Point = tuple[float, float]
-
 SAME_FACTOR = 1e-9  # of two axes [-]: the rounding of the file's numbers
 # The fifth number of SC: what the scales of the two axes are.
 _ANISOTROPIC, _ISOTROPIC, _POINT_FACTOR = 0.0, 1.0, 2.0
 _MIDDLE = (50.0, 50.0)  # percent
+_NO_POINTS = (
+    "user units without IP: where they lie depends on the paper in the plotter; write IP with both scaling points before it, or "
+    "export in plotter units"
+)
+# Three points are on a line where the area of their parallelogram is below this share of |a| |b| [-]: a
+# radius of 1e9 times the chord.
+ON_A_LINE = 1e-9
 
 
 class ScalingError(ValueError):
@@ -93,12 +99,6 @@ class Scaling:
         return Scaling(self.p1, self.p2, (x, y), factor, tuple(numbers))
 
 
-_NO_POINTS = (
-    "user units without IP: where they lie depends on the paper in the plotter; write IP with both scaling points before it, or "
-    "export in plotter units"
-)
-
-
 def _factors(window: Point, size: Point, numbers: Sequence[float], kind: float) -> tuple[Point, Point]:
     """Plotter units per user unit, and what is left over of the window before the drawing [plotter units]."""
     fx, fy = window[0] / size[0], window[1] / size[1]
@@ -109,11 +109,6 @@ def _factors(window: Point, size: Point, numbers: Sequence[float], kind: float) 
     before = numbers[5:7] if len(numbers) == 7 else _MIDDLE
     x, y = ((window[k] - factor[k] * size[k]) * before[k] / 100.0 for k in range(2))
     return factor, (x, y)
-
-
-# Three points are on a line where the area of their parallelogram is below this share of |a| |b| [-]: a
-# radius of 1e9 times the chord.
-ON_A_LINE = 1e-9
 
 
 def circle_through(start: Point, through: Point, end: Point) -> tuple[Point, float] | None:

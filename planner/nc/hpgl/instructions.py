@@ -17,6 +17,38 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+PAGE_ENDS = ("PG", "AF", "AH", "FR")
+# Of what is ignored: what would change the path or its time, some with numbers only, without which it is the
+# default.
+CHANGING, WITH_NUMBERS = frozenset(("RP", "EC", "NR")), frozenset(("LT", "IW", "AS"))
+_OUTLINES = "convert it to lines and arcs in the drawing program ('export as outlines', 'as curves')"
+_PLAIN = "export the drawing as plain HPGL with PU and PD"
+_REMOVE = "remove it, and export the drawing as it shall lie on the machine"
+_TEXT = f"text in a plotter's own letters is not read; {_OUTLINES}"
+_FILL = f"fillings are not read; {_OUTLINES}"
+_POLYGON = f"the polygon buffer is not read; {_PLAIN}"
+_CURVE = f"this curve is not read; {_PLAIN}"
+# Instructions that are followed by text, and what it looks like up to its end.
+_TO_ETX, _TO_TERMINATOR = re.compile(rb"[^\x03]*\x03?"), re.compile(rb"[^;]*;?")
+TEXT = {
+    **dict.fromkeys(("LB", "WD", "BL", "PB", "MG"), _TO_ETX),
+    **dict.fromkeys(("SM", "DT", "PE", "DL", "UC"), _TO_TERMINATOR),
+    "CO": re.compile(rb'\s*(?:"[^"]*"|[^;]*);?'),
+}
+# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a
+# mistake.
+NUMBER_MAX = 1e9
+_BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
+CONTROL = rb"(?:\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*)"
+_CONTROL = re.compile(CONTROL)
+_INSTRUCTION = re.compile(rb"([A-Za-z]{2})([-+.,\d\s]*)")
+_NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)")
+_SEPARATOR = re.compile(rb"\s*,?\s*")
+_NO_NUMBER = re.compile(rb"\A\s*,|,\s*,")
+# Bytes that no instruction holds.
+_NO_INSTRUCTION = bytes(c for c in range(256) if not chr(c).isascii() or not chr(c).isalnum())
+Report = Callable[[int, int, str], None]  # from, to, message
+
 
 @dataclass(frozen=True)
 class Form:
@@ -62,7 +94,6 @@ FORMS = {
         Form("FR", "", (0,)),
     )
 }
-PAGE_ENDS = ("PG", "AF", "AH", "FR")
 
 
 def _each(names: str, text: str) -> dict[str, str]:
@@ -84,19 +115,6 @@ IGNORED = {
     **_each("OA OC OD OE OF OG OH OI OK OL OO OP OS OT OW IM IV", "questions to a device"),
     **_each("CO WD BL MG", "comments and messages"),
 }
-
-# Of these: what would change the path or its time, some with numbers only, without which they are the
-# default.
-CHANGING, WITH_NUMBERS = frozenset(("RP", "EC", "NR")), frozenset(("LT", "IW", "AS"))
-
-_OUTLINES = "convert it to lines and arcs in the drawing program ('export as outlines', 'as curves')"
-_PLAIN = "export the drawing as plain HPGL with PU and PD"
-_REMOVE = "remove it, and export the drawing as it shall lie on the machine"
-_TEXT = f"text in a plotter's own letters is not read; {_OUTLINES}"
-_FILL = f"fillings are not read; {_OUTLINES}"
-_POLYGON = f"the polygon buffer is not read; {_PLAIN}"
-_CURVE = f"this curve is not read; {_PLAIN}"
-
 REFUSED = {
     **_each("LB PB UC DL", _TEXT),
     **_each("RA RR WG FP", _FILL),
@@ -108,33 +126,7 @@ REFUSED = {
     "RO": f"turning the drawing is not read; {_REMOVE}",
     "IR": f"scaling points in percent of the paper are not read: a program knows no paper; {_REMOVE}",
 }
-
-# Instructions that are followed by text, and what it looks like up to its end.
-_TO_ETX, _TO_TERMINATOR = re.compile(rb"[^\x03]*\x03?"), re.compile(rb"[^;]*;?")
-TEXT = {
-    **dict.fromkeys(("LB", "WD", "BL", "PB", "MG"), _TO_ETX),
-    **dict.fromkeys(("SM", "DT", "PE", "DL", "UC"), _TO_TERMINATOR),
-    "CO": re.compile(rb'\s*(?:"[^"]*"|[^;]*);?'),
-}
-
 ALLOWED = " ".join(form.name for form in FORMS.values())
-
-
-# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a
-# mistake.
-NUMBER_MAX = 1e9
-
-_BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
-CONTROL = rb"(?:\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*)"
-_CONTROL = re.compile(CONTROL)
-_INSTRUCTION = re.compile(rb"([A-Za-z]{2})([-+.,\d\s]*)")
-_NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)")
-_SEPARATOR = re.compile(rb"\s*,?\s*")
-_NO_NUMBER = re.compile(rb"\A\s*,|,\s*,")
-# Bytes that no instruction holds.
-_NO_INSTRUCTION = bytes(c for c in range(256) if not chr(c).isascii() or not chr(c).isalnum())
-
-Report = Callable[[int, int, str], None]  # from, to, message
 
 
 @dataclass(slots=True)

@@ -27,6 +27,9 @@ from planner.nc.program import Kind
 from planner.nc.state import State
 
 _KINDS = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)
+KINDS = ("RND", "CHR", "CHF")
+_STRAIGHT_ON = 1e-6  # turn below which there is no corner [rad]
+_TOO_LARGE = "the rounding or chamfer takes more of a move than there is; correct it"
 
 
 class OffsetMoves:
@@ -152,10 +155,6 @@ class OffsetMoves:
                 place = end
 
 
-KINDS = ("RND", "CHR", "CHF")
-_STRAIGHT_ON = 1e-6  # turn below which there is no corner [rad]
-
-
 @dataclass
 class CornerMove:
     """A corner whose second move has not come."""
@@ -205,9 +204,6 @@ class CornerMove:
         code = 1 if arc is None else 3 if arc.sweep > 0 else 2
         between = Move(rest, first.at, code, one.end, two.begin, plane, arc)
         return [one, between], two
-
-
-_TOO_LARGE = "the rounding or chamfer takes more of a move than there is; correct it"
 
 
 def _leaving(move: Move, normal: int) -> complex:

@@ -31,8 +31,6 @@ _SIEMENS = re.compile(
     rb"GOTO[FB]\b)",
     re.MULTILINE | re.IGNORECASE,
 )
-
-
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
 # of an NC program.)
@@ -41,8 +39,6 @@ _BEHIND_CONTROL = rb"\A(?:\s|\xef\xbb\xbf)*+(?>" + CONTROL + rb"[\s;]*)*+"
 _HPGL = re.compile(_BEHIND_CONTROL + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"|\Z)", re.IGNORECASE)
 _NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
-
-
 _CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
 _MODELS = (
     # name, what only such a file starts with, what to do
@@ -77,6 +73,32 @@ _MODELS = (
 )
 # A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
 _STL_HEAD, _STL_TRIANGLE = 84, 50
+LATHE_NOTE = (
+    "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
+    "([dialect] lathe = false in the machine file if it is none)"
+)
+# Codes that call and return, save and restore modes.
+_CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
+_COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
+_O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
+_LINUXCNC = re.compile(
+    rf"{_O_WORD}(?:SUB|ENDSUB|CALL|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|RETURN|BREAK|CONTINUE)|#<"
+)
+_FANUC = re.compile(
+    r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
+    r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
+)
+# Signs of lathes, and of others (`_has_signs`).
+_TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
+_SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0
+_RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
+_OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
+_CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
+_EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
+_SHOWN = 30  # characters of the text in the note
+_FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
+_LANGUAGE = re.compile(rb"[#\[<=]")
+_DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 
 def refuse_models(data: bytes, source: str) -> None:
@@ -104,36 +126,6 @@ def language_of(data: bytes) -> str | None:
     if _CONVERSATIONAL.search(head):
         return HEIDENHAIN
     return SIEMENS if _SIEMENS.search(head) else None
-
-
-LATHE_NOTE = (
-    "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
-    "([dialect] lathe = false in the machine file if it is none)"
-)
-# Codes that call and return, save and restore modes.
-_CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
-_COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
-_O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
-_LINUXCNC = re.compile(
-    rf"{_O_WORD}(?:SUB|ENDSUB|CALL|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|RETURN|BREAK|CONTINUE)|#<"
-)
-_FANUC = re.compile(
-    r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
-    r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
-)
-# Signs of lathes, and of others (`_has_signs`).
-_TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
-_SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0
-_RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
-_OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
-_CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
-_EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
-
-
-_SHOWN = 30  # characters of the text in the note
-_FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
-_LANGUAGE = re.compile(rb"[#\[<=]")
-_DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 
 def without_leader(data: bytes) -> tuple[bytes, str]:

@@ -46,8 +46,6 @@ from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
 ENTRIES_MAX = 10_000  # files and folders that are looked at for a called file
 FILE_MAX = 100_000_000  # bytes of a called file
 _CALLED = re.compile(r"[\w.+-]+")
-
-
 # Gets every chunk of expanded rows before it is executed.
 Tee = Callable[[Words], None]
 

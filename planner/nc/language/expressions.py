@@ -12,35 +12,6 @@ from planner.nc.language import tree
 _SIGNS = {"EQ": "==", "NE": "!=", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
 COMPARISONS = frozenset(_SIGNS)
 LOGICAL = frozenset(("AND", "OR", "XOR", "NOT"))
-
-
-def modulo(a: float, b: float) -> float:
-    """a MOD b, never negative. Raises ZeroDivisionError."""
-    if b == 0.0:
-        raise ZeroDivisionError
-    rest = math.fmod(a, b)
-    return rest + abs(b) if rest < 0.0 else rest
-
-
-def rounded(x: float) -> float:
-    """ROUND: halves go away from zero."""
-    return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
-
-
-FUNCTIONS: dict[str, Callable[..., object]] = {
-    **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
-    **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, modulo, rounded)},
-    "power": math.pow,
-    "sin": lambda x: math.sin(math.radians(x)),
-    "cos": lambda x: math.cos(math.radians(x)),
-    "tan": lambda x: math.tan(math.radians(x)),
-    "asin": lambda x: math.degrees(math.asin(x)),
-    "acos": lambda x: math.degrees(math.acos(x)),
-    "atan": lambda x: math.degrees(math.atan(x)),
-    "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
-    "binary": lambda x: float(int(f"{int(x):x}")),  # 0x25 read as the decimal digits 25
-    "decimal": lambda x: float(int(str(int(x)), 16)),  # 25 as 0x25
-}
 # By name and number of operands. A dialect that means another thing by a name puts its own text in the place
 # of this one.
 ARITHMETIC: dict[tuple[str, int], str] = {
@@ -73,6 +44,35 @@ ARITHMETIC: dict[tuple[str, int], str] = {
     ("BIN", 1): "binary({0})",
     ("BCD", 1): "decimal({0})",
     **{(name.upper(), 1): f"{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
+}
+
+
+def modulo(a: float, b: float) -> float:
+    """a MOD b, never negative. Raises ZeroDivisionError."""
+    if b == 0.0:
+        raise ZeroDivisionError
+    rest = math.fmod(a, b)
+    return rest + abs(b) if rest < 0.0 else rest
+
+
+def rounded(x: float) -> float:
+    """ROUND: halves go away from zero."""
+    return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
+
+
+FUNCTIONS: dict[str, Callable[..., object]] = {
+    **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
+    **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, modulo, rounded)},
+    "power": math.pow,
+    "sin": lambda x: math.sin(math.radians(x)),
+    "cos": lambda x: math.cos(math.radians(x)),
+    "tan": lambda x: math.tan(math.radians(x)),
+    "asin": lambda x: math.degrees(math.asin(x)),
+    "acos": lambda x: math.degrees(math.acos(x)),
+    "atan": lambda x: math.degrees(math.atan(x)),
+    "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
+    "binary": lambda x: float(int(f"{int(x):x}")),  # 0x25 read as the decimal digits 25
+    "decimal": lambda x: float(int(str(int(x)), 16)),  # 25 as 0x25
 }
 
 

@@ -32,6 +32,7 @@ from planner.nc.program import Kind
 AXES = "XYZ"
 SIEMENS = ("TRANS", "ROT", "SCALE", "MIRROR")  # by `kind`; + ADDED for A...
 ADDED = 10  # more than the indices in SIEMENS
+_FLAT = 1e-9  # relative, below which three points are on a line
 
 
 def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
@@ -260,8 +261,6 @@ def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     """A coordinate that the plane of the pole in force does not allow. Raises ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
 
-
-_FLAT = 1e-9  # relative, below which three points are on a line
 
 MAKERS: dict[str, Maker] = {
     "compensate": compensate,

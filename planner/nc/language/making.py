@@ -27,17 +27,21 @@ ASSUMED = {
     "tool offset": "offsets of tools (D) are not added: z is that of the tool's tip",
     "tool centre feed": "F holds for the tool's centre (CFTCP); CFC and CFIN, the control's default, have it on the contour of arcs",
 }
+Row = list[tuple[str, float]]
+Maker = Callable[["Making", Mapping[str, float]], Iterable[Row]]
+ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
+_ROUNDING = 1e-9  # of a number of steps
+_COARSE = {
+    3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 7: 1.0, 8: 1.25, 9: 1.25, 10: 1.5, 11: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5,
+    22: 2.5, 24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0,
+}  # fmt: skip  # leads of metric coarse threads by their size [mm], ISO 261
+BREAK = 0.2  # mm by which the tool goes back to break a chip, and above the depth drilled where feed begins, unless the program says
 
 
 def assumed_row(place: SourcePlace, name: str) -> MadeRows:
     """The statement that says a sentence of ASSUMED, and is refused by strict reading."""
     assert name in ASSUMED
     return made(place, "assume", **{name: ZERO})
-
-
-Row = list[tuple[str, float]]
-Maker = Callable[["Making", Mapping[str, float]], Iterable[Row]]
-ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
 
 
 @dataclass(frozen=True)
@@ -122,16 +126,6 @@ def equal_steps(whole: float, most: float) -> int:
     if count > ROWS_MAX:
         raise ValueError(f"{most:g} is too small an infeed for {whole:g}: more than {ROWS_MAX:,} passes")
     return max(1, -int(-(count - _ROUNDING) // 1))
-
-
-_ROUNDING = 1e-9  # of a number of steps
-
-
-_COARSE = {
-    3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 7: 1.0, 8: 1.25, 9: 1.25, 10: 1.5, 11: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5,
-    22: 2.5, 24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0,
-}  # fmt: skip  # leads of metric coarse threads by their size [mm], ISO 261
-BREAK = 0.2  # mm by which the tool goes back to break a chip, and above the depth drilled where feed begins, unless the program says
 
 
 @dataclass(frozen=True)

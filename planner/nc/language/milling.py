@@ -22,9 +22,10 @@ from planner.nc.language.making import Row, equal_steps
 from planner.nc.turning import Leg
 
 _SHORT = 1e-9  # relative length of a leg that is left out
-
-
 Path = tuple[complex, list[Leg]]  # a start and the legs from there
+CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
+RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
+_NARROW = 1e-9  # relative room beside the tool below which there is none
 
 
 @dataclass(frozen=True)
@@ -146,10 +147,6 @@ def loops(shape: PocketShape, outermost: float, step: float, turning: int) -> li
     return found
 
 
-CORNERS_CLEAR = 1.0 + math.sqrt(0.5)  # tool radii between two paths at most (module text)
-RAPID, STRAIGHT, HELIX = 0, 1, 2  # ways to plunge
-
-
 @dataclass(frozen=True)
 class PocketPlan:
     """How a pocket is cut; lengths in the program's unit, feeds per minute."""
@@ -225,9 +222,6 @@ def _wall(shape: PocketShape, plan: PocketPlan) -> Path:
     centre = start + 1j * plan.turning * tangent * size
     come, go = centre - size * tangent, centre + size * tangent
     return come, [Leg(start, plan.turning, centre), *legs, Leg(go, plan.turning, centre)]
-
-
-_NARROW = 1e-9  # relative room beside the tool below which there is none
 
 
 class _Cutting:

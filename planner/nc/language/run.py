@@ -43,7 +43,6 @@ ROWS_AT_ONCE = SIZES.program_rows
 IDLE_AT_ONCE = SIZES.idle_rows
 FRAMES_MAX = 1_000_000  # different chains of calls
 _MESSAGES_MAX = 1_000  # different messages that are kept
-
 Load = Callable[[str], bool]
 
 

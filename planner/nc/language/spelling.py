@@ -24,8 +24,6 @@ _LETTERS = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 _BLANK = re.compile(r"[ \t\r\x1a]")
 LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
-
-
 _IN_LINES = "; write the expression in several lines"
 
 

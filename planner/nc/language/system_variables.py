@@ -20,7 +20,6 @@ from planner.nc.state import SYSTEMS, System, system_name
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
-
 # G codes in force, that parameters answer with.
 _PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
 _PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
@@ -28,6 +27,9 @@ _ROTATION = 9  # behind the axes of a work coordinate system
 # G code of a feed mode.
 _FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
 _AXES = 9  # x y z a b c u v w; the last six are zero here
+# Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can
+# name: x, y, z.
+FIRST_POSITION = 2001
 
 
 def _numbers(*ranges: tuple[int, int]) -> frozenset[int]:
@@ -195,11 +197,6 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     if 5420 <= number < 5420 + _AXES:
         return system.here(number - 5420)
     return 0.0
-
-
-# Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can
-# name: x, y, z.
-FIRST_POSITION = 2001
 
 
 class PositionVariables(SystemVariables):

@@ -19,6 +19,7 @@ AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
 TURNS, RADIUS = ord("P"), ord("R")
 STANDS = 1e-9  # a move that is shorter stays where it is [mm]
 _STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
+_EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
 @dataclass
@@ -140,9 +141,6 @@ def turned(degrees: float, axis: int) -> FloatArray:
     matrix = np.eye(3)
     matrix[np.ix_([a, b], [a, b])] = np.array([plane[0][:2], plane[1][:2]]).T
     return matrix
-
-
-_EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
 class Coordinates:

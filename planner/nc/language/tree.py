@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
+NEGATIVE = "-"
+
 
 class SourcePlace(NamedTuple):
     """A statement's file (0: the main program), line from 1, and byte offset of its first letter."""
@@ -85,7 +87,6 @@ Expression = Number | Numbered | Named | Operation | Exists
 Parameter = Numbered | Named
 Assignments = tuple[tuple[Parameter, Expression], ...]
 ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
-NEGATIVE = "-"
 
 
 def op(name: str, *operands: Value) -> Operation:

@@ -36,10 +36,15 @@ LANGUAGE = Language(
     read="({0} or 0.0)",
     raw=frozenset(("EQ", "NE")),
 )
-
-
 _NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE
+_NUMBERS = {  # parameters of the letters of G65
+    **dict(zip("ABCIJK", range(1, 7), strict=True)),
+    **{"D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19, "T": 20},
+    **dict(zip("UVWXYZ", range(21, 27), strict=True)),
+}
+_TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
+_LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
 class FanucControl(tree.Statements):
@@ -74,15 +79,6 @@ def _loop_number(reader: LineReader) -> str:
     if value is None or value != int(value):
         raise reader.refused("DO and END are followed by a whole number", at)
     return f"{value:.0f}"
-
-
-_NUMBERS = {  # parameters of the letters of G65
-    **dict(zip("ABCIJK", range(1, 7), strict=True)),
-    **{"D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19, "T": 20},
-    **dict(zip("UVWXYZ", range(21, 27), strict=True)),
-}
-_TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
-_LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
 def subprogram(words: tree.Words, line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:

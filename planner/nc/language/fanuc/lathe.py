@@ -36,6 +36,10 @@ from planner.nc.language.tree import (
 _CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+).*?P(\d+)")
 _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
 _AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
+# Words of cycles that are in least increments where they have no point; of others D is.
+_INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
+# The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
+_INCREMENT = Number(1e-4) + (Numbered(Number(4006.0)) - Number(20.0)) * Number(1e-3 - 1e-4)
 
 
 class LatheParser(LatheWords):
@@ -188,10 +192,6 @@ class LatheParser(LatheWords):
         return word.value * _INCREMENT
 
 
-# Words of cycles that are in least increments where they have no point; of others D is.
-_INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
-# The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
-_INCREMENT = Number(1e-4) + (Numbered(Number(4006.0)) - Number(20.0)) * Number(1e-3 - 1e-4)
 _ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], dict[str, Expression]]] = {
     "G71": lambda parser, given, line: parser._removal(given, line, "U"),
     "G72": lambda parser, given, line: parser._removal(given, line, "W"),

@@ -27,7 +27,6 @@ from planner.nc.state import State
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
 _WRONG = {(Kind.DWELL, Kind.STOP): "a dwell or a stop", (Kind.SPLINE,): "a spline"}
-
 Given = Mapping[str, float]
 
 

@@ -39,17 +39,6 @@ X_HERE, Z_HERE = (
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Codes that are not read, and why.
 _REFUSED = {**dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are")}
-
-
-class LatheVariables(FanucVariables):
-    """Fanuc's numbers on a lathe: the second axis is z, and x is a diameter."""
-
-    def here(self, axis: int) -> float:
-        """The position in the program's coordinates and unit."""
-        found = super().here((0, 2, 1)[axis] if axis < 3 else axis)
-        return 2.0 * found if axis == 0 and self.interpreter.state.diameters else found
-
-
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")
 # Codes behind which a cut is not repeated: other motions and cycles.
@@ -60,6 +49,15 @@ _MOTIONS = {
 # Codes whose coordinates are their own.
 _OWN_COORDINATES = {"G4", "G04", "G10", "G28", "G30", "G50", "G53"}
 _PLACE = "XZUW"
+
+
+class LatheVariables(FanucVariables):
+    """Fanuc's numbers on a lathe: the second axis is z, and x is a diameter."""
+
+    def here(self, axis: int) -> float:
+        """The position in the program's coordinates and unit."""
+        found = super().here((0, 2, 1)[axis] if axis < 3 else axis)
+        return 2.0 * found if axis == 0 and self.interpreter.state.diameters else found
 
 
 class LatheWords(FanucParser):

@@ -60,9 +60,9 @@ _CORNERS = {
     3: 1 + 1j,
     4: -1 + 1j,
 }  # where the tool stands (Q367), in half sides
-
-
 Given = Mapping[str, float]
+PATTERNS = (220, 221)
+_TURN = 360.0  # [degrees]
 
 
 def _hole(given: Given, feed: float = 0.0) -> HolePlan:
@@ -334,10 +334,6 @@ def _on_lines(given: Given, n: int) -> complex:
         column = round(given["Q242"]) - 1 - column
     place, angle = complex(column * given["Q237"], line * given["Q238"]), math.radians(given["Q224"])
     return complex(given["Q225"], given["Q226"]) + place * cmath.rect(1.0, angle)
-
-
-PATTERNS = (220, 221)
-_TURN = 360.0  # [degrees]
 
 
 def _places(making: Making, given: Given) -> Iterator[Row]:

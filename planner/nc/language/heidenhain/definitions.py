@@ -27,21 +27,6 @@ _TOOL_CALL = (
     r"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?"
     rf"((?:\s*(?:DL|DR2|DR){_VALUE})*)\s*$"
 )
-
-
-def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
-    """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
-    found: dict[str, tree.Expression] = {}
-    block.column = start
-    while block.text[block.column : end].strip():
-        at, name = block.column, block.take(names)
-        assert name is not None
-        if name[1].upper() in found:
-            raise block.fault(f"a second {name[1].upper()} in this block", at)
-        found[name[1].upper()] = block.value()
-    return found
-
-
 READ = (*cycles.CYCLES, *cycles.PATTERNS)
 _OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
 # Q parameters that are read where they are 0 only.
@@ -49,13 +34,6 @@ _REFUSED = {
     365: "Q365 1, moves between the places on the circle, is not read; write 0",
     439: "Q439, another reference of the feed, is not read; write 0",
 }
-
-
-def _not_read(cycle: int) -> str:
-    read = sorted({*READ, 9, 32, *moves.TITLES})
-    return f"cycle {cycle} is not read; read are {', '.join(map(str, read))}"
-
-
 REMEDY = "let the CAM system write the moves out as L, C and CC"
 AT_END = (2, 30)  # M codes that end the program
 # They move nothing and last nothing: constant speed at corners in lag operation (90), lag and servo gain (105
@@ -83,6 +61,24 @@ REFUSED = {
     140: "it retracts the tool",
     143: "it changes the datum",
 }
+
+
+def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
+    """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
+    found: dict[str, tree.Expression] = {}
+    block.column = start
+    while block.text[block.column : end].strip():
+        at, name = block.column, block.take(names)
+        assert name is not None
+        if name[1].upper() in found:
+            raise block.fault(f"a second {name[1].upper()} in this block", at)
+        found[name[1].upper()] = block.value()
+    return found
+
+
+def _not_read(cycle: int) -> str:
+    read = sorted({*READ, 9, 32, *moves.TITLES})
+    return f"cycle {cycle} is not read; read are {', '.join(map(str, read))}"
 
 
 def is_of_the_builder(code: int) -> bool:

@@ -26,6 +26,15 @@ Ends = dict[str, tree.Expression]  # absolute coordinates by axis
 _AXES = "XYZ"
 _WORKING = 2  # normal of the working plane: the tool axis is Z
 _PLANE_CODES = {0: 19.0, 1: 18.0}
+_NO_DIRECTION = (
+    (text.DIRECTION[0], tree.ZERO),
+    (text.DIRECTION[1], tree.ZERO),
+)  # behind arcs whose end has no direction here
+OUT_OF_PLANE = "out of the pole's plane, or in it beside polar coordinates, belongs to no such move"
+_FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"
+_EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
+COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
+TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
 
 
 class Moves:
@@ -225,19 +234,6 @@ def _arc_code(block: text.Block, given: text.Items) -> tree.Expression:
 
 def _assigned(ends: Ends) -> Assigned:
     return [(text.POSITION[axis], end) for axis, end in ends.items() if axis in text.POSITION]
-
-
-_NO_DIRECTION = (
-    (text.DIRECTION[0], tree.ZERO),
-    (text.DIRECTION[1], tree.ZERO),
-)  # behind arcs whose end has no direction here
-OUT_OF_PLANE = "out of the pole's plane, or in it beside polar coordinates, belongs to no such move"
-_FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"
-
-
-_EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
-COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
-TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
 
 
 def approach_rows(block: text.Block, feed: tree.Expression | None) -> tuple[text.Rows, text.Items]:

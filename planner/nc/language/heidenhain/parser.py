@@ -24,6 +24,13 @@ _FUNCTION = re.compile(
     re.IGNORECASE,
 )
 _MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
+_WHY = {
+    "LN": "moves with a normal of the surface or a direction of the tool need its compensation in space; angles A, B, C are read",
+    **dict.fromkeys(
+        ("FL", "FLT", "FC", "FCT", "FPOL", "FSELECT"), "free contours (FK) are completed by the control"
+    ),
+    **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
+}
 
 
 class HeidenhainParser(Definitions):
@@ -220,13 +227,6 @@ class HeidenhainParser(Definitions):
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
 
 
-_WHY = {
-    "LN": "moves with a normal of the surface or a direction of the tool need its compensation in space; angles A, B, C are read",
-    **dict.fromkeys(
-        ("FL", "FLT", "FC", "FCT", "FPOL", "FSELECT"), "free contours (FK) are completed by the control"
-    ),
-    **dict.fromkeys(("APPR", "DEP"), "it is followed by LT, LN, CT or LCT"),
-}
 _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,

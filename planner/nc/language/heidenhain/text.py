@@ -34,6 +34,15 @@ LANGUAGE = tree.Language(
     vacant=0.0,
     system_numbers=PositionVariables.numbers,
 )
+Rows = list[tree.Statement]
+_CONTINUED = re.compile(r"\s*Q\d+\s*=", re.IGNORECASE)
+_NUMBERED = re.compile(r"\s*(\d+)\s+(?=\S)")
+_ITEM = (
+    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
+    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
+    r"(?P<ahead>LA)(?=\s*\d))"
+)
+_ROTARY = ("A", "B", "C")
 
 
 def own(name: str) -> tree.Named:
@@ -104,11 +113,6 @@ class Block:
 @cache
 def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern, re.IGNORECASE)
-
-
-Rows = list[tree.Statement]
-_CONTINUED = re.compile(r"\s*Q\d+\s*=", re.IGNORECASE)
-_NUMBERED = re.compile(r"\s*(\d+)\s+(?=\S)")
 
 
 def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
@@ -187,12 +191,6 @@ class Formula(TokenReader):
         return tree.op(text, self.value()) if text in LANGUAGE.functions else None
 
 
-_ITEM = (
-    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
-    r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
-    r"(?P<ahead>LA)(?=\s*\d))"
-)
-_ROTARY = ("A", "B", "C")
 X, Y, Z = own("x"), own("y"), own("z")
 POSITION = {"X": X, "Y": Y, "Z": Z}
 POLE = own("cx"), own("cy"), own("cz")

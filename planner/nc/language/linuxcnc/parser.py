@@ -32,24 +32,25 @@ LANGUAGE = Language(
     system_numbers=LinuxcncVariables.numbers,
     system_names=LinuxcncVariables.names,
 )
-
-
 _NESTED_MAX = 100  # loops and branches in each other
 _ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
 KEYWORDS = frozenset(
     ("sub", "call", "return", "if", "elseif", "else", "while", "do", "repeat", "break", "continue", *_ENDS)
 )
+# What M70 to M73 do with the modes.
+_MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
+_PROGRAM = ""
+_FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")
+_NEXT_PROGRAM = re.compile(
+    rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
+)
+_PARAMETER = re.compile(r"#(?:<([^<>]*)>|(\d+))")
 
 
 def _needed(condition: tree.Expression | None, keyword: str, line: SourceLine) -> tree.Expression:
     if condition is None:
         raise line.fault(f"{keyword} needs an [expression] after it")
     return condition
-
-
-# What M70 to M73 do with the modes.
-_MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
-_PROGRAM = ""
 
 
 class LinuxcncParser(tree.Statements):
@@ -249,19 +250,10 @@ class LinuxcncParser(tree.Statements):
             raise reader.refused(f"nothing may follow {after} on its line")
 
 
-_FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")
-_NEXT_PROGRAM = re.compile(
-    rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
-)
-
-
 def _constant_name(value: tree.Expression) -> str | tree.Expression:
     if isinstance(value, tree.Number):
         return f"{value.value:.0f}" if value.value == round(value.value) else f"{value.value:g}"
     return value
-
-
-_PARAMETER = re.compile(r"#(?:<([^<>]*)>|(\d+))")
 
 
 def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:

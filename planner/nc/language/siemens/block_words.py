@@ -22,8 +22,6 @@ from planner.nc.language.source import Source
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": "arc through", "CT": "tangent arc"}
-
-
 _ANGLES = "choose a post-processor that writes the angles of the rotary axes (A=, B=, C=)"
 
 

@@ -58,11 +58,7 @@ REFUSED = (
     "ROTS", "AROTS", "CROTS", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
 )  # fmt: skip
 REMEDY = "let the CAM system write the moves out"
-
-
 TYPES = frozenset(("REAL", "INT", "BOOL"))
-
-
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
 # Commands and cycles of the control, which are no files.
 _OF_THE_CONTROL = re.compile(

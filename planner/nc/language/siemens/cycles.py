@@ -81,8 +81,6 @@ _SHORT = 1e-9  # an infeed that is none
 _OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
 _LEFT = 4.0  # SDIR, SDAC: M4
 _HALT: tuple[Row, Row] = ([("M", 5.0)], [("M", 0.0)])  # the spindle stops, then the program
-
-
 PATTERNS = {
     "HOLES1": ("SPCA", "SPCO", "STA1", "FDIS", "DBH", "NUM"),
     "HOLES2": ("CPA", "CPO", "RAD", "STA1", "INDA", "NUM"),

@@ -36,6 +36,7 @@ _TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values,
 # Names of numbers.
 _CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
+_NESTED_MAX = 100  # loops and branches in each other
 
 
 def position(axis: str) -> tree.Numbered:
@@ -138,9 +139,6 @@ class LineTokens(TokenReader):
                 raise self.fault(f"{token.text}: there are R0 to R{PARAMETERS - 1}", token.at)
             return tree.Numbered(tree.Number(float(number + 1)))
         return variable(token.text) if token.text in self.names else None
-
-
-_NESTED_MAX = 100  # loops and branches in each other
 
 
 class SiemensControl(tree.Statements):

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
@@ -38,7 +39,7 @@ from planner.nc.language.system_variables import (
     PositionVariables,
     SystemVariables,
 )
-from planner.nc.language.tree import Language, Parser, ProgramFault
+from planner.nc.language.tree import Language, ProgramFault
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
 from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
@@ -90,7 +91,7 @@ def expand(
 class _Front:
     language: Language
     variables: type[SystemVariables]
-    parser: Callable[[Source], Parser]
+    parser: Callable[[Source], Any]  # with `parse`, that gives procedures, and `faults`
     files: Callable[[str], frozenset[str]]  # names, in small letters, of the file that holds a subprogram
     set_up: Callable[[ProgramRun], object] = lambda run: None  # gives a run the makers of its rows
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-NEGATIVE = "-"
 
 
 class SourcePlace(NamedTuple):
@@ -43,7 +42,7 @@ class Value:
         return op("/", self, other)
 
     def __neg__(self) -> Expression:
-        return Number(-self.value) if isinstance(self, Number) else op(NEGATIVE, self)
+        return Number(-self.value) if isinstance(self, Number) else op("-", self)
 
 
 @dataclass(unsafe_hash=True, slots=True)
@@ -269,12 +268,13 @@ class OpenStatement:
 
 class Statements:
     """The statements so far: `body` is where the next one goes, `base` where it goes outside of all that is
-    open; `open` has those without an end, the outermost first."""
+    open; `open` has those without an end, the outermost first; `faults` are those of all lines."""
 
     def __init__(self) -> None:
         self.main: list[Statement] = []
         self.base = self.body = self.main
         self.open: list[OpenStatement] = []
+        self.faults: list[ProgramFault] = []
 
     def begin(self, opened: OpenStatement) -> OpenStatement:
         """What follows stands in this statement."""
@@ -340,15 +340,6 @@ class Language:
         default_factory=dict
     )  # names of operators in the tree, where they are others
     long_values: bool = False  # an assignment takes an expression without brackets
-
-
-class Parser(Protocol):
-    """Reads one file of a language. Whoever writes one gives it a `planner.nc.language.source.Source`."""
-
-    faults: list[ProgramFault]
-
-    def parse(self) -> list[Procedure]:
-        """All procedures of the file, the main program under the empty name; `faults` has the rest."""
 
 
 class ProgramFault(Exception):

@@ -30,7 +30,6 @@ class FanucParser(FanucControl):
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
-        self.faults: list[tree.ProgramFault] = []
         self.procedures: list[tree.Procedure] = []
         self.modal: tree.Call | None = None  # G66
         self.local: list[tuple[int, tree.SourcePlace, tree.Procedure]] = []  # M97

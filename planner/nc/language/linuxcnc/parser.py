@@ -59,7 +59,6 @@ class LinuxcncParser(tree.Statements):
     def __init__(self, source: Source):
         super().__init__()
         self.source = source
-        self.faults: list[tree.ProgramFault] = []
         self.procedures: dict[str, tree.Procedure] = {}  # subprograms by their labels
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow

@@ -32,7 +32,6 @@ class SiemensParser(BlockWords):
         self.source, self.at_tip = source, source.at_tip
         self.compensates = bool(_COMPENSATES.search(source.words.data))
         self.centre_feed = b"CFTCP" in source.words.data
-        self.faults: list[ProgramFault] = []
 
     def parse(self) -> list[Procedure]:
         """The main program, under the empty name."""

@@ -55,20 +55,19 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     reading = program.reading
     read = source if reading.strict else without_leader(source)[0]
     words = split_words(read, block_delete=reading.block_delete)
-    row = _rows(words, program.line[moving])
-    unit = _unit_before(words)
-    f_word = _f_words(words)
-    programmed = _f_in_force(words, f_word, unit)[row]
-    mode = _feed_mode(words)
-    per_minute = mode.in_force[row] == G94
+    in_source, line = _SourceRows(words), program.line[moving]
+    row = np.searchsorted(words.line, line)
+    if len(line) and (row[-1] >= len(words.line) or (words.line[row] != line).any()):
+        raise ValueError("retimed: the program has blocks on lines where the source has no word")
+    programmed, per_minute = in_source.feed[row], in_source.mode[row] == G94
     often = np.full(len(moving), np.nan) if inverse is None else np.asarray(inverse, dtype=np.float64)[moving]
-    often[~per_minute | (mode.word[row] >= 0)] = np.nan
+    often[~per_minute | (in_source.mode_word[row] >= 0)] = np.nan
     # [mm per minute]; not that of a move under G93 and G95, and in a thread
-    f_word_feed = programmed * unit[row]
+    f_word_feed = programmed * in_source.unit[row]
     off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
     own = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
     moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
-    wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / unit[row]
+    wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / in_source.unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
     # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them
@@ -79,17 +78,39 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     fastest[np.isinf(fastest)] = np.nan
     new = _New(rows, fastest, programmed[first], often[first])
     pieces, done = [], 0
-    for start, end, text in _edits(words, f_word, unit, mode, new):
+    for start, end, text in _edits(words, in_source, new):
         pieces += [source[done:start], text]
         done = end
     return b"".join([*pieces, source[done:]])
 
 
-class _FeedModes(NamedTuple):
-    """(R,) G93, G94 or G95 in force on each row, and the index of its own word for it, or -1."""
+class _SourceRows:
+    """What the source says on its R rows.
 
-    in_force: Array
-    word: Array
+    unit      : (R,) length unit in force before the row [mm]: what its F word is read in
+    f_word    : (R,) index of its F word, or -1
+    feed      : (R,) F in force, in the row's own units; NaN before the first
+    mode      : (R,) G93, G94 or G95 in force
+    mode_word : (R,) index of its word for the feed mode, or -1
+    """
+
+    def __init__(self, words: Words):
+        rows = np.arange(len(words.line))
+        of_word = np.repeat(rows, np.diff(words.first))
+        code = np.where(words.letter == _G, np.rint(words.value * 10.0), -1.0)
+        switch = np.flatnonzero(np.isin(code, (200.0, 210.0)))
+        unit = np.append(1.0, np.where(code[switch] == 200.0, MM_PER_INCH, 1.0))
+        self.unit = unit[np.searchsorted(of_word[switch], rows)]
+        self.f_word, self.mode_word = np.full((2, len(rows)), -1)
+        given = np.flatnonzero(words.letter == _F)
+        self.f_word[of_word[given]] = given
+        last = np.maximum.accumulate(np.where(self.f_word >= 0, rows, -1))
+        feed = words.value[self.f_word[last]] * (self.unit[last] / self.unit)
+        self.feed = np.where(last >= 0, feed, np.nan)
+        switch = np.flatnonzero(np.isin(code, (10.0 * G93, 10.0 * G94, 10.0 * G95)))
+        self.mode_word[of_word[switch]] = switch
+        mode = np.append(G94, np.rint(code[switch] / 10.0)).astype(np.int64)
+        self.mode = mode[np.searchsorted(of_word[switch], rows, side="right")]
 
 
 class _New(NamedTuple):
@@ -102,29 +123,19 @@ class _New(NamedTuple):
     often: FloatArray  # (n,) runs per minute, under G93; NaN for a feed
 
 
-def _feed_mode(words: Words) -> _FeedModes:
-    code = np.rint(words.value * 10.0)
-    switch = np.flatnonzero((words.letter == _G) & np.isin(code, (10.0 * G93, 10.0 * G94, 10.0 * G95)))
-    of_row = _row_of_word(words)[switch]
-    mode = np.append(G94, np.rint(code[switch] / 10.0)).astype(np.int64)
-    word = np.full(len(words.line), -1, dtype=np.int64)
-    word[of_row] = switch
-    return _FeedModes(mode[np.searchsorted(of_row, np.arange(len(words.line)), side="right")], word)
-
-
-def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new: _New) -> list[Edit]:
+def _edits(words: Words, in_source: _SourceRows, new: _New) -> list[Edit]:
     """The F words, and those of the feed mode, to write on rows of feed moves, in the order of the source."""
     edits: list[Edit] = []
     texts: dict[float, str] = {}
     as_given: dict[float, str] = {}
-    move = np.full(len(f_word), -1)
+    move = np.full(len(in_source.f_word), -1)
     move[new.row] = np.arange(len(new.row))
     in_force, ours = 0.0, False  # [mm per minute]; under a G93 that was written here
-    for r in np.flatnonzero((f_word >= 0) | (move >= 0) | (mode.word >= 0)).tolist():
-        k, word, number = int(move[r]), int(f_word[r]), ""
-        if mode.word[r] >= 0:
+    for r in np.flatnonzero((in_source.f_word >= 0) | (move >= 0) | (in_source.mode_word >= 0)).tolist():
+        k, word, number = int(move[r]), int(in_source.f_word[r]), ""
+        if in_source.mode_word[r] >= 0:
             ours = False
-            in_force = 0.0 if k >= 0 else in_force  # said anew
+            in_force = 0.0 if k >= 0 else in_force  # in_source anew
         if k >= 0 and not math.isnan(new.often[k]):
             edits += _edited(words, r, word, round_down(float(new.often[k])), "" if ours else "G93")
             in_force, ours = 0.0, True
@@ -137,7 +148,7 @@ def _edits(words: Words, f_word: Array, unit: FloatArray, mode: _FeedModes, new:
         elif k >= 0 and (word < 0 or ours):
             value = float(new.programmed[k])
             number = as_given.get(value) or as_given.setdefault(value, plain(value))
-        given = float(number or words.value[word]) * unit[r]
+        given = float(number or words.value[word]) * in_source.unit[r]
         if k >= 0 and ours:
             edits += _edited(words, r, word, number, "G94")
             ours = False
@@ -153,40 +164,6 @@ def round_down(value: float) -> str:
     digits = math.floor(value * 10.0**-place * (1.0 + 1e-12))  # 0.3 is 0.3, not 0.2999
     text = f"{digits * 10**place}" if place >= 0 else f"{digits / 10**-place:.{-place}f}".rstrip("0")
     return text.rstrip(".") if "." in text else text
-
-
-def _rows(words: Words, line: Array) -> Array:
-    row = np.searchsorted(words.line, line)
-    if len(line) and (row[-1] >= len(words.line) or (words.line[row] != line).any()):
-        raise ValueError("retimed: the program has blocks on lines where the source has no word")
-    return row
-
-
-def _row_of_word(words: Words) -> Array:
-    return np.repeat(np.arange(len(words.line)), np.diff(words.first))
-
-
-def _unit_before(words: Words) -> FloatArray:
-    """(R,) length unit in force before each row [mm]: what its F word is read in."""
-    code = np.rint(words.value * 10.0)
-    switch = np.flatnonzero((words.letter == _G) & ((code == 200.0) | (code == 210.0)))
-    unit = np.append(1.0, np.where(code[switch] == 200.0, MM_PER_INCH, 1.0))
-    return unit[np.searchsorted(_row_of_word(words)[switch], np.arange(len(words.line)))]
-
-
-def _f_words(words: Words) -> Array:
-    f_word = np.full(len(words.line), -1, dtype=np.int64)
-    found = np.flatnonzero(words.letter == _F)
-    f_word[_row_of_word(words)[found]] = found
-    return f_word
-
-
-def _f_in_force(words: Words, f_word: Array, unit: FloatArray) -> FloatArray:
-    """(R,) the source's F in force on each row, in the row's own units; NaN before the first."""
-    rows = np.arange(len(f_word))
-    last = np.maximum.accumulate(np.where(f_word >= 0, rows, -1))
-    given = words.value[f_word[last]] * (unit[last] / unit)
-    return np.where(last >= 0, given, np.nan)
 
 
 def _edited(words: Words, row: int, f_word: int, number: str, mode: str) -> list[Edit]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 
-
 class SourcePlace(NamedTuple):
     """A statement's file (0: the main program), line from 1, and byte offset of its first letter."""
 

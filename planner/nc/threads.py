@@ -32,6 +32,7 @@ from planner.nc.faults import Findings
 from planner.nc.moves import Block, WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.state import State
+from planner.nc.turning import Leg
 
 PASSES_MAX = 10_000  # of a thread: more are a mistake in J or H
 ANGLE_MAX = 80.0  # of the compound slide [degrees], as LinuxCNC's manual has it
@@ -65,15 +66,6 @@ class Thread:
     springs: int = 0
 
 
-@dataclass(frozen=True)
-class Cut:
-    """A move to (x, z): in step with the spindle, `pitch` per turn along its path, or fast (0)."""
-
-    x: float
-    z: float
-    pitch: float = 0.0
-
-
 def depths(thread: Thread) -> Iterator[float]:
     """Depths of the passes, spring passes included."""
     depth, number, peak = thread.first, 1, abs(thread.peak)
@@ -85,8 +77,8 @@ def depths(thread: Thread) -> Iterator[float]:
         yield thread.depth
 
 
-def passes(thread: Thread) -> Iterator[Cut]:
-    """The moves of the thread, all passes."""
+def passes(thread: Thread) -> Iterator[Leg]:
+    """The moves of the thread, all passes; points are z + i x."""
     inwards = math.copysign(1.0, thread.peak)
     ahead = 1.0 if thread.end > thread.start[1] else -1.0
     slope = math.tan(math.radians(thread.angle))
@@ -97,18 +89,18 @@ def passes(thread: Thread) -> Iterator[Cut]:
         clear = thread.start[0] - inwards * left
         peak, cut = clear + thread.peak, thread.start[0] + thread.peak + inwards * depth
         first, last = thread.start[1] + ahead * depth * slope, thread.end - ahead * left * slope
-        yield Cut(clear, first)
+        yield Leg(complex(first, clear), fast=True)
         if tapered & _ENTRY:
-            yield Cut(peak, first, aslant)
-            yield Cut(cut, first + ahead * thread.taper, aslant)
+            yield Leg(complex(first, peak), pitch=aslant)
+            yield Leg(complex(first + ahead * thread.taper, cut), pitch=aslant)
         else:
-            yield Cut(cut, first)
+            yield Leg(complex(first, cut), fast=True)
         if tapered & _END:
-            yield Cut(cut, last - ahead * thread.taper, thread.pitch)
-            yield Cut(peak, last, aslant)
+            yield Leg(complex(last - ahead * thread.taper, cut), pitch=thread.pitch)
+            yield Leg(complex(last, peak), pitch=aslant)
         else:
-            yield Cut(cut, last, thread.pitch)
-        yield Cut(clear, last)
+            yield Leg(complex(last, cut), pitch=thread.pitch)
+        yield Leg(complex(last, clear), fast=True)
 
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
@@ -174,7 +166,7 @@ def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings
     read = read_thread(state, block, end)
     feed = _feed(state, block, 1.0)
     for cut in passes(read):
-        place = state.machine(np.array([cut.x * state.unit, here[1], cut.z * state.unit]))
+        place = state.machine(np.array([cut.end.imag * state.unit, here[1], cut.end.real * state.unit]))
         if cut.pitch:
             _cut(state, table, block.line, place, cut.pitch * feed)
         else:

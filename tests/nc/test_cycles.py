@@ -80,9 +80,9 @@ def test_the_last_pass_of_a_thread_reaches_its_depth_and_end() -> None:
     )
     cuts = list(passes(thread))
     last = cuts[-6:]
-    assert min(cut.x for cut in cuts) == pytest.approx(17.0)
-    assert last[4].z == pytest.approx(-10.0)
-    assert last[0].z == pytest.approx(5.0 - 2.0 * np.tan(np.deg2rad(29.5)))
+    assert min(cut.end.imag for cut in cuts) == pytest.approx(17.0)
+    assert last[4].end.real == pytest.approx(-10.0)
+    assert last[0].end.real == pytest.approx(5.0 - 2.0 * np.tan(np.deg2rad(29.5)))
     # along a taper the pitch along z is the thread's
     assert last[2].pitch * 3.0 / np.hypot(3.0, 2.0) == pytest.approx(1.5)
 

@@ -20,7 +20,7 @@ from planner.nc.program import MadeWhenAsked, plain
 from planner.nc.reading import IGNORE, Reading
 from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, TOOL_POINT_M
 
-# How a letter is treated whatever stands beside it, in `Assumed.treatment`.
+# How a letter is treated whatever stands beside it, in `IgnoredWords.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
 LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 

@@ -54,7 +54,7 @@ class _Fixed(NamedTuple):
 
 
 class _Others(NamedTuple):
-    """The fields of `Assumed` that the loop uses; it sets where axes are parked."""
+    """The fields of `IgnoredWords` that the loop uses; it sets where axes are parked."""
 
     treatment: Array
     parked: FloatArray

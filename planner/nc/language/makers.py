@@ -251,7 +251,7 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
 
 
 def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """Sentences of said.ASSUMED by their names. Raises ValueError where nothing may be assumed."""
+    """Sentences of ASSUMED by their names. Raises ValueError where nothing may be assumed."""
     for name in given:
         making.assume(ASSUMED[name])
     return []

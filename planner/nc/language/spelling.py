@@ -100,7 +100,7 @@ class LineReader(ExpressionReader):
         return True
 
     def expect(self, character: str, after: str) -> None:
-        """Go past the character. Raises Unspelled if another one comes."""
+        """Go past the character. Raises ProgramFault if another one comes."""
         if not self.take(character):
             found = f"{self.peek()!r}" if not self.ended else "the end of the line"
             raise self.refused(f"{character} is missing after {after}; {found} comes instead")

@@ -22,7 +22,7 @@ from planner.base.errors import InputError
 from planner.base.kernels import njit
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.lexer import Words
-from planner.nc.program import MOVES, EventTable, Kind, Program
+from planner.nc.program import MOVES, EventTable, Kind, Program, renumbered
 
 _FLOW, _WHOLE_FLOW = 221.0, 100.0  # M221 S100
 _E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")
@@ -107,15 +107,7 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
         low, high = (np.searchsorted(at, events.block, side=side) for side in ("left", "right"))
         stops = np.clip(np.searchsorted(line, events.line), low, high)  # that come before the event
         events = dataclasses.replace(events, block=events.block + stops)
-    return dataclasses.replace(
-        program,
-        arc_block=later(program.arc_block),
-        synchronised=later(program.synchronised),
-        splines=dataclasses.replace(program.splines, block=later(program.splines.block)),
-        events=events,
-        origins=dataclasses.replace(program.origins, block=later(program.origins.block)),
-        **columns,
-    )
+    return renumbered(program, later, events=events, **columns)
 
 
 @njit(cache=True, error_model="numpy")

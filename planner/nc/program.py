@@ -7,10 +7,11 @@ there. Events are arrays too; an `Event` is made when it is looked at (a laser f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -282,6 +283,20 @@ class Program:
             text += f"{elsewhere} ({at.name}), called from line {at.line}"
             frame = at.caller
         return text
+
+
+def renumbered(program: Program, number: Callable[[Array], Array], **columns: Any) -> Program:
+    """The program with more blocks: what stands at blocks (n,) of before stands at `number` of them (n,);
+    `columns` are its new fields by their names."""
+    splines, origins = program.splines, program.origins
+    return dataclasses.replace(
+        program,
+        arc_block=number(program.arc_block),
+        synchronised=number(program.synchronised),
+        splines=dataclasses.replace(splines, block=number(splines.block)),
+        origins=dataclasses.replace(origins, block=number(origins.block)),
+        **columns,
+    )
 
 
 class MadeWhenAsked(Sequence[One]):

@@ -32,8 +32,8 @@ from planner.nc.program import (
     Kind,
     PathControl,
     Program,
-    SplineTable,
     ToolPoint,
+    renumbered,
 )
 from planner.nc.settings import TOOL_POINT_ON
 from planner.nc.state import LETTERS, ROTARY, State
@@ -186,14 +186,13 @@ def _with_axes(program: Program, axes: tuple[str, ...]) -> Program:
         wide[..., [letters.index(letter) for letter in program.axes]] = values
         return wide
 
-    splines = program.splines
     return dataclasses.replace(
         program,
         axes=letters,
         start=widened(program.start),
         end=widened(program.end),
         arc_center=widened(program.arc_center),
-        splines=SplineTable(block=splines.block, points=widened(splines.points), weights=splines.weights),
+        splines=dataclasses.replace(program.splines, points=widened(program.splines.points)),
     )
 
 
@@ -242,15 +241,12 @@ class _Pieces:
         inner[first[1:] - 1] = False
         events = whole.events
         assert isinstance(events, EventTable)
-        splines = whole.splines
-        return dataclasses.replace(
+        return renumbered(
             whole,
+            lambda blocks: first[blocks],
             end=np.concatenate(ends),
             **{name: getattr(whole, name)[block] for name in ("kind", "feed", "dwell", "line", "tolerance")},
             path_control=np.where(inner, PathControl.BLEND, whole.path_control[block]),
-            arc_block=first[whole.arc_block],
-            synchronised=first[whole.synchronised],
-            splines=SplineTable(block=first[splines.block], points=splines.points, weights=splines.weights),
             events=dataclasses.replace(events, block=first[events.block]),
             frame=whole.frame[block] if len(whole.frame) else whole.frame,
         )

@@ -94,6 +94,14 @@ def test_rapid_moves_off_are_straight_lines_of_the_joints() -> None:
     assert 0.0 < np.linalg.norm(bow, axis=1).max() <= 0.1 * MACHINE.tolerance
 
 
+def test_an_origin_holds_from_its_block_on_behind_chords() -> None:
+    """The rapid before G52 becomes many blocks: the shift belongs to the moves behind them."""
+    program = read(f"G21\nG0 A40 C30\nG0 X30 Y10\nM428\nG52 X2\n{CUT}")
+    shifted = np.flatnonzero(program.line >= 6)
+    for block, x in ((int(shifted[0]) - 1, 0.0), (int(shifted[0]), 2.0)):
+        assert program.origins.at(block)[0][0] == x
+
+
 def test_a_rapid_move_that_only_shifts_is_one_move() -> None:
     program = read(f"G21\nM428\n{CUT}M429\nG0 X30 Z10\n")
     assert (program.line == 6).sum() == 1

@@ -88,7 +88,7 @@ def unused(letter: str) -> str:
 
 
 class ArcFault(WordFault):
-    """The words of an arc contradict each other; `otherwise`: not with the other of G90.1, G91.1."""
+    """The words of an arc contradict each other; `otherwise`: the other of G90.1 and G91.1 would close it."""
 
     def __init__(self, word: int, message: str, *, otherwise: bool):
         super().__init__(word, message)

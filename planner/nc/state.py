@@ -39,7 +39,7 @@ def _zeros() -> FloatArray:
 
 @dataclass(slots=True)
 class ExtraAxes:
-    """Axes beside x, y and z (offsets.py has their rules), arrays (6,) in the order of `LETTERS`."""
+    """Axes beside x, y and z (rules: offsets.py): arrays (6,) in degrees and mm, ordered as `LETTERS`."""
 
     letters: str = ""  # those that the machine has and that are read
     wrapped: str = ""  # those of them that are wrapped

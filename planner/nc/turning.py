@@ -46,7 +46,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Contour:
-    """A profile: where the tool stands before it, if the first move is fast, the legs; the first leads to it."""
+    """A profile: where the tool stands before it, if its first move is fast, its legs from there on."""
 
     start: complex
     fast: bool

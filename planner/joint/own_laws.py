@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints.limits import FEED, POWER, Limits
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, POWER, Limits
 from planner.joint import laws as rows
 from planner.machine.user_limit import (
     QUANTITIES,
@@ -195,12 +195,13 @@ def laws_of(limits: Limits, moves: Array, words: bool, counts: FloatArray) -> tu
         counted = getattr(limit, "counts", None)
         own = np.isin(limits.axes, counted or limits.axes).astype(np.float64)[moves]
         most = getattr(limit, "largest", np.inf)
+        bounded = getattr(limit, "bounded", QUANTITIES)
         if np.isfinite(most) and most >= np.linalg.norm(own * limits.acceleration[moves]):
-            continue  # what moves here cannot reach it
+            bounded = tuple(name for name in bounded if name != ACCELERATION.name)  # out of reach here
         found += [
             Law(f"{quantity}.{limit.name}", PATH[k], own, k + 1, limit, k, most)
             for k, quantity in enumerate(QUANTITIES)
-            if quantity in getattr(limit, "bounded", QUANTITIES)
+            if quantity in bounded
         ]
     for k, letter in enumerate(limits.axes):
         if moves[k] and np.isfinite(limits.power[k]):

@@ -61,6 +61,7 @@ class Machine(Record):
     feed_default        : feed of moves before the first F word of a program [mm/s], or None: they are refused
     normal_acceleration : largest normal acceleration [mm/s2], A_max of paper 002 eq. (19), or None
     tangential_acceleration : largest acceleration along the path, of x, y and z together [mm/s2], or None
+    tangential_jerk     : how fast that may change at most [mm/s3], or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
     rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is
                           `ROTARY_RADIUS`. A machine file may say `tolerance_angle` [deg] instead, the angle
@@ -82,6 +83,7 @@ class Machine(Record):
     feed_default: Positive | None = None
     normal_acceleration: Positive | None = None
     tangential_acceleration: Positive | None = None
+    tangential_jerk: Positive | None = None
     blend_rapids: bool = False
     rotary_radius: Positive | None = None
     fir: Fir | None = None

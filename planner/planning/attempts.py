@@ -131,7 +131,8 @@ def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
     """Method kinematic, and full stops at the ends of all blocks but of lines that go straight on, where that
     does not pass."""
     best = tried.best
-    if not np.isfinite(Limits.of(job.machine, job.toolpath.axes).tangential):  # which its corners do not keep
+    limits = Limits.of(job.machine, job.toolpath.axes)
+    if np.isinf([limits.tangential, limits.tangential_jerk]).all():  # which its corners do not keep
         rival = KinematicMethod().plan_job(job.faster_than(counted_time(best)))
         best = better(best, rival, "method kinematic takes less time", job)
     if job.line_stop_time < min(counted_time(best), job.most):

@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.feedrate.constraints.extruder import with_extruder_limit
-from planner.feedrate.constraints.limits import JERK, Limits
+from planner.feedrate.constraints.limits import JERK, TANGENTIAL, TANGENTIAL_JERK, Limits
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
@@ -56,7 +56,7 @@ class Method(ABC):
               taken
     measures_filters : whether filters make its motions slower only where they are measured to leave the
                        tolerance
-    keeps_tangential : whether its motions keep the machine's limit of the tangential acceleration
+    keeps_tangential : whether its motions keep the machine's limits of the tangential acceleration and jerk
     """
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
@@ -96,12 +96,14 @@ class Method(ABC):
         An unsolved problem is the status of the plan.
         """
         job = job_of(program, machine, tolerance, Stages(progress, log))
-        if not self.keeps_tangential and np.isfinite(Limits.of(machine, job.toolpath.axes).tangential):
-            raise InputError(
-                f"the machine limits the tangential acceleration to {machine.tangential_acceleration:g} mm/s2, which {self!r} does not "
-                "keep; plan with method optimal, second-order, bezier or stop, or leave tangential_acceleration out of the machine"
-            )
-        limited = np.isfinite(Limits.of(machine, job.toolpath.axes).power)
+        limits = Limits.of(machine, job.toolpath.axes)
+        for limit, value in ((TANGENTIAL, limits.tangential), (TANGENTIAL_JERK, limits.tangential_jerk)):
+            if np.isfinite(value) and not self.keeps_tangential:
+                raise InputError(
+                    f"the machine limits the {limit.key.replace('_', ' ')} to {value:g} {limit.unit}, which {self!r} does not keep; "
+                    f"plan with method optimal, second-order, bezier or stop, or leave {limit.key} out of the machine"
+                )
+        limited = np.isfinite(limits.power)
         if limited.any() and not self.keeps_power:
             letter = job.toolpath.axes[int(limited.argmax())]
             raise InputError(

@@ -10,7 +10,7 @@ constraint, no solver. What it checks, and how sharp each check is:
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
     feed.py       the feed against the F word of that block, of every chord and every delivered speed
     worst.py      the worst of every quantity, and differences of positions
-    tangential.py   the tangential acceleration
+    tangential.py   the tangential acceleration and jerk
     power.py        the power of the drives
     user_limits.py  limits of the user that the machine came with, by their laws
     matching.py   contour, vertices, order, completeness: an in-order matching of motion and path

@@ -51,14 +51,14 @@ from planner.verifier.worst import (
 
 # [mm/s] below this the direction of the velocity is rounding: 1e-12 mm/s of it is 1e-6 of the direction
 FEED_AT_REST = 1e-6
-NORMAL_NAME, TANGENTIAL_NAME = "normal_acceleration", "acceleration.tangential"
+NORMAL_NAME, TANGENTIAL_NAMES = "normal_acceleration", ("acceleration.tangential", "jerk.tangential")
 UNITS = ("/s", "/s2", "/s3")
 
 # Rows of `Worst`: six groups of one row per axis, then some of their own, then the power of each axis, and three per user limit.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
 GROUPS = 6
-FEED, NORMAL, CHORD, TANGENTIAL = range(4)
-ROWS_ALONE = 4
+FEED, NORMAL, CHORD, TANGENTIAL = range(4)  # the last of two rows: acceleration, jerk
+ROWS_ALONE = 5
 
 
 def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
@@ -73,7 +73,9 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
         normal=normal_limit(machine),
-        tangential=machine.tangential_acceleration or math.inf,
+        tangential=np.array(
+            [machine.tangential_acceleration or math.inf, machine.tangential_jerk or math.inf]
+        ),
         power=np.array([machine.axes[letter].power or math.inf for letter in axes]),
         power_unit=units_of(machine, axes),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
@@ -109,7 +111,8 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
         for letter, length in zip(limits.axes, unit, strict=True)
     ]
     rows += [("", "")] * (GROUPS * len(limits.axes) - len(rows))
-    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm"), (TANGENTIAL_NAME, "mm/s2")]
+    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm")]
+    rows += zip(TANGENTIAL_NAMES, ("mm/s2", "mm/s3"), strict=True)
     rows += [
         (f"power.{letter}" if np.isfinite(most) else "", "W/kg" if length == "mm" else "W/(kg m2)")
         for letter, length, most in zip(limits.axes, unit, limits.power, strict=True)

@@ -1,42 +1,50 @@
-"""The tangential acceleration |a.t| <= A_t, t = v/|v| of x, y and z, sample by sample.
+"""The tangential acceleration |a.t| <= A_t and the tangential jerk |j.t + |a - (a.t) t|^2/|v|| <= J_t, with
+t = v/|v| of x, y and z, sample by sample.
 
-Twice: on the delivered columns, and by the lengths run between three samples. The mean speeds of two periods,
-L/h, differ by at most A_t (h1 + h2)/2. A length L is at least its chord c. With a normal acceleration of at
-most N and a speed of at least v = c/h - |a| h the direction turns by no more than N h/(2 v) from that of the
-middle, so that L - c <= N^2 h^3/(24 v), which is taken off.
+Twice: on the delivered columns, and by the lengths run between samples. With the mean speed u = L/h of every
+period, twice the change from one to the next over the time of both is a mean of the tangential acceleration,
+and three times the change of two of those over the time of all three is one of the tangential jerk. A length
+L is at least its chord c. With a normal acceleration of at most N and a speed of at least v = c/h - |a| h the
+direction turns by no more than N h/(2 v) from that of the middle, so that L - c <= N^2 h^3/(24 v), which is
+taken off.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.verifier.limits import ACCELERATION, FEED_AT_REST, GROUPS, TANGENTIAL
-from planner.verifier.worst import COLUMN, DIFFERENCE, Limits, SampleBlock, Worst, position_error
+from planner.verifier.limits import ACCELERATION, FEED_AT_REST, GROUPS, JERK, TANGENTIAL
+from planner.verifier.worst import BACK, COLUMN, DIFFERENCE, Limits, SampleBlock, Worst, position_error
 
 
 def look_at_tangential(block: SampleBlock, limits: Limits, worst: Worst) -> None:
-    """Take in what a block of samples shows of the tangential acceleration, if it is limited."""
-    if not math.isfinite(limits.tangential):
+    """Take in what a block of samples shows of the tangential acceleration and jerk, if one is limited."""
+    if not np.isfinite(limits.tangential).any():
         return
-    row = GROUPS * len(limits.axes) + TANGENTIAL
+    row, (largest, fastest) = GROUPS * len(limits.axes) + TANGENTIAL, limits.tangential
     if limits.judged[:2].all():
-        v, a = block.velocity[:, limits.linear], block.acceleration[:, limits.linear]
+        v, a, j = (one[:, limits.linear] for one in (block.velocity, block.acceleration, block.jerk))
         speed = np.linalg.norm(v, axis=1)
-        pushed = np.abs(np.einsum("na,na->n", v, a)) / np.maximum(speed, FEED_AT_REST)
-        worst.take(row, pushed[:, None], limits.tangential, COLUMN, block, span=ACCELERATION)
-    worst.take(row, _gained(block, limits)[:, None], limits.tangential, DIFFERENCE, block)
+        t = v / np.maximum(speed, FEED_AT_REST)[:, None]
+        along = np.einsum("na,na->n", a, t)
+        worst.take(row, np.abs(along)[:, None], largest, COLUMN, block, span=ACCELERATION)
+        if limits.judged[2]:
+            turning = np.square(a - along[:, None] * t).sum(axis=1) / np.maximum(speed, FEED_AT_REST)
+            change = np.where(speed > FEED_AT_REST, np.einsum("na,na->n", j, t) + turning, 0.0)
+            worst.take(row + 1, np.abs(change)[:, None], fastest, COLUMN, block, span=JERK)
+    for order, seen in enumerate(_gained(block, limits)):
+        worst.take(row + order, seen[:, None], limits.tangential[order], DIFFERENCE, block)
 
 
 def _gained(block: SampleBlock, limits: Limits) -> FloatArray:
-    """(n,) change of the mean speed from one period to the next, as far as it is certain, over the time
-    [mm/s2]."""
-    found = np.zeros(len(block.t))
-    if len(block.t) < 3:
+    """(2, n) means of the tangential acceleration over two periods [mm/s2] and of the tangential jerk over
+    three [mm/s3], as far as they are certain."""
+    t, linear = block.t, limits.linear
+    found = np.zeros((2, len(t)))
+    if len(t) < 2:
         return found
-    linear, h = limits.linear, np.diff(block.t)
+    h = np.diff(t)
     chord = np.linalg.norm(np.diff(block.position[:, linear], axis=0), axis=1)
     off = np.linalg.norm(position_error(block, limits)[:, linear], axis=1)
     error = off[1:] + off[:-1]
@@ -44,7 +52,9 @@ def _gained(block: SampleBlock, limits: Limits) -> FloatArray:
     slowest = (chord - error) / h - most * h
     bow = np.full(len(h), np.inf)
     np.divide(min(limits.normal, most) ** 2 * h**3, 24.0 * slowest, out=bow, where=slowest > 0.0)
-    unsure = (error + bow) / h
-    certain = np.abs(np.diff(chord / h)) - unsure[1:] - unsure[:-1]
-    found[2:] = np.maximum(certain, 0.0) * 2.0 / (h[1:] + h[:-1])
+    mean, unsure = chord / h, (error + bow) / h
+    for order in range(2, min(len(t), BACK + 1)):
+        over = order / (t[order:] - t[:-order])
+        mean, unsure = over * np.diff(mean), over * (unsure[1:] + unsure[:-1])
+        found[order - 2, order:] = np.maximum(np.abs(mean) - unsure, 0.0)
     return found

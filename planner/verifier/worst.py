@@ -139,9 +139,8 @@ class Limits:
     judged: Array  # (3,) True for the columns velocity, acceleration, jerk that were delivered
     rounding: FloatArray  # (A,) largest error of a position by its digits [mm]
     time_rounding: float  # the same of a time [s]
-    # normal and tangential: of the normal and of the tangential acceleration [mm/s2], or inf
-    normal: float
-    tangential: float
+    normal: float  # acceleration [mm/s2], or inf
+    tangential: FloatArray  # (2,) acceleration [mm/s2] and jerk [mm/s3], or inf
     power: FloatArray  # (A,) of the drives [W/kg], [W/(kg m2)], or inf
     power_unit: FloatArray  # (A,) of them in 1 mm2/s3
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited [mm/s2]

@@ -1,4 +1,4 @@
-"""Laws and closed forms of a machine's limit of the tangential acceleration, by all methods that keep it."""
+"""Laws and closed forms of a machine's limits of the tangential acceleration and jerk, by all methods that keep them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import planner
 from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH
-from planner.feedrate.constraints.limits import TANGENTIAL, Limits
+from planner.feedrate.constraints.limits import TANGENTIAL, TANGENTIAL_JERK, Limits
 from planner.machine import Machine
 from planner.planning.job.plan import Plan
 
@@ -39,8 +39,9 @@ def machine_of(push: float | None = PUSH, scale: float = 1.0, **more) -> Machine
     return Machine(**(given | {"tangential_acceleration": None if push is None else push * scale} | more))
 
 
-def planned(text: str, machine: Machine, method: str = "optimal") -> Plan:
-    plan = planner.plan(planner.read_program(text=text, machine=machine), machine, method=method).require()
+def planned(text: str, machine: Machine, method: str = "optimal", **settings) -> Plan:
+    program = planner.read_program(text=text, machine=machine)
+    plan = planner.plan(program, machine, method=method, **settings).require()
     assert plan.verdict.passed, plan.verdict.faults
     return plan
 
@@ -58,6 +59,24 @@ def test_a_straight_line_takes_its_closed_form(method: str) -> None:
     least = length / feed + feed / PUSH + (0.0 if method == "second-order" else PUSH / jerk)
     assert plan.cycle_time == pytest.approx(least, rel=2e-4 if method == "second-order" else 1e-4)
     assert of_limit(plan) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("method", ["stop", "bezier", "optimal"])
+def test_its_change_is_kept_and_used_and_never_makes_a_motion_faster(method: str) -> None:
+    """On a line L/v + v/a + a/j from rest to rest, with both limits; what is never reached costs nothing."""
+    settings = {"effort": "quick"} if method == "optimal" else {}
+    line = planned("G21 F4800\nG1 X60\n", machine_of(tangential_jerk=2e4), method, **settings)
+    assert line.cycle_time == pytest.approx(60.0 / 80.0 + 80.0 / PUSH + PUSH / 2e4, rel=1e-4)
+    times = []
+    for fastest in (None, 1e9, 2e4, 6e3):
+        plan = planned(TURNS, machine_of(None, tangential_jerk=fastest), method, **settings)
+        times.append(plan.cycle_time)
+        if fastest is not None:
+            ratio = plan.verdict.limits[TANGENTIAL_JERK.name].ratio
+            assert ratio < 0.1 if fastest > 1e8 else 0.99 < ratio <= 1.0 + 1e-9
+    assert times[1] == pytest.approx(times[0], rel=1e-4)
+    assert (np.diff(times[1:]) > 0.0).all(), times
+    assert plan.prices is None or plan.prices.saved[TANGENTIAL_JERK.name] > 0.0
 
 
 @pytest.mark.parametrize("method", KEPT_BY)
@@ -107,6 +126,10 @@ def test_methods_that_do_not_keep_it_say_so(method: str) -> None:
         InputError, match=r"tangential acceleration to 700 mm/s2, which .* does not keep; plan with"
     ):
         planned(TURNS, machine_of(), method)
+    with pytest.raises(
+        InputError, match=r"tangential jerk to 20000 mm/s3, which .* does not keep; plan with"
+    ):
+        planned(TURNS, machine_of(None, tangential_jerk=2e4), method)
     planned(TURNS, machine_of(1e5), "stop")
 
 

@@ -19,7 +19,15 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.axis_acceleration import JUMP
 from planner.feedrate.constraints.limit import RowPoint
-from planner.feedrate.constraints.limits import JERK, LIMITS, POWER, ROWS, TANGENTIAL, Limits
+from planner.feedrate.constraints.limits import (
+    JERK,
+    LIMITS,
+    POWER,
+    ROWS,
+    TANGENTIAL,
+    TANGENTIAL_JERK,
+    Limits,
+)
 from planner.feedrate.constraints.on_grid import OnGrid
 from planner.feedrate.constraints.own_axes import own_inside
 from planner.feedrate.sampling.samples import sample_path
@@ -201,6 +209,27 @@ def test_the_judge_finds_the_tangential_acceleration_used_up():
     limits = Limits.of(machine, toolpath.axes)
     used = [ratio.max() for order, ratio in ratios(limits, sample(motion, machine.dt)) if order == 2]
     assert used == [pytest.approx(1.0, abs=CLOSE)]
+
+
+@pytest.mark.parametrize("columns", [("velocity", "acceleration", "jerk"), ()], ids=["columns", "positions"])
+def test_the_judge_finds_the_tangential_jerk_used_up_and_exceeded(columns):
+    """Round the circle the way is run with a jerk of its own, whatever the jerks of the axes are; positions show the same, less
+    what the curve may hide."""
+    fastest = 4e4
+    length, curve = helix((RADIUS, 0.0, 0.0), (0.0, 0.0), 2.0 * np.pi * TURNS)
+    for by in (1.0, 1.2):
+        machine = machine_with(tangential_jerk=fastest, normal_acceleration=PROGRAMMED**2 / RADIUS)
+        motion = sample(
+            along(length, curve, rest_to_rest(length, PROGRAMMED, 900.0, by * fastest)), machine.dt
+        )
+        verdict = verify(motion, circle().toolpath(machine), machine, given=Given(columns=columns))
+        check = verdict.limits[TANGENTIAL_JERK.name]
+        assert (check.ratio, check.unit) == (
+            pytest.approx(by, abs=CLOSE if columns else 0.1),
+            TANGENTIAL_JERK.unit,
+        )
+        assert columns or check.ratio <= by
+        assert [fault.name for fault in verdict.faults] == [TANGENTIAL_JERK.name] * (by > 1.0)
 
 
 def test_the_judge_finds_the_power_of_a_drive_used_up():

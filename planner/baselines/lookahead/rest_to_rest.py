@@ -37,7 +37,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     must hold for the vector: with kappa v^2 <= a/sqrt2 and an acceleration of a/sqrt2 along the path the norm
     stays below a, and with kappa^2 v^3 <= j/(2 sqrt2), 3 kappa v a_s <= j/sqrt2 and j/(2 sqrt2) along the
     path the norm of the jerk stays below j (jerk = (j_s - kappa^2 v^3) T + 3 kappa v a_s N). The tangential
-    acceleration is bounded by the share of the path that is in x, y and z, on curves as if all of it were.
+    acceleration and jerk are bounded by the share of the path that is in x, y and z, on curves as if all of it were.
     Normal acceleration, chord and filter error bound kappa v^2 as well. On a curve kappa changes, and a bound
     of |r'''| takes the place of kappa^2. Where the bound of v a_s holds, v is the one with which the segment
     takes least time from rest to rest: none of these limits makes it longer when it gets larger.
@@ -48,6 +48,7 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     v, a, j = ((limit / np.maximum(direction, AT_REST)).min(axis=1) for limit in limits.of_axes)
     linear = np.linalg.norm(direction[:, np.isin(axes, LINEAR_AXES)], axis=1)
     a = np.minimum(a, limits.tangential / np.maximum(linear, AT_REST))
+    j = np.minimum(j, limits.tangential_jerk / np.maximum(linear, AT_REST))
     curved = ~toolpath.straight
     kappa = toolpath.curvature[curved]
     twist, on_curve = kappa**2, toolpath.curve[curved] >= 0
@@ -60,7 +61,8 @@ def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, Floa
     v[curved] = np.min(
         [v_all, np.sqrt(across / kappa), np.cbrt(half * j_all / (2 * twist)), toolpath.feed[curved]], axis=0
     )
-    a[curved], j[curved] = np.minimum(half * a_all, limits.tangential), half * j_all / 2
+    a[curved] = np.minimum(half * a_all, limits.tangential)
+    j[curved] = np.minimum(half * j_all / 2, limits.tangential_jerk)
     product = np.full(len(v), np.inf)  # bound of v a_s [mm2/s3]
     product[curved] = half * j_all / (3 * kappa)
     bound = np.flatnonzero(v * a > product)

@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
-from planner.feedrate.constraints.limits import LIMITS
+from planner.feedrate.constraints.limits import JERK, LIMITS
 from planner.machine import ROTARY_AXES, Machine, machine_from_dict
 from planner.nc.program import Program
 
@@ -52,7 +52,7 @@ _OF_MACHINE = {
     TOLERANCE: _LENGTH,
     "dt": _TIME,
     "feed_max": _SPEED,
-    **{limit.key: _ACCELERATION for limit in LIMITS if limit.key},
+    **{limit.key: _JERK if limit.order == JERK.order else _ACCELERATION for limit in LIMITS if limit.key},
     "fir.phase_lag_max": _ANGLE,
     FEED: _NONE,
 }

@@ -26,14 +26,15 @@ from planner.feedrate.constraints.normal_limit import NormalAcceleration
 from planner.feedrate.constraints.phase_lag import PhaseLag
 from planner.feedrate.constraints.power import DrivePower
 from planner.feedrate.constraints.programmed_feed import ProgrammedFeed
-from planner.feedrate.constraints.tangential import TangentialAcceleration, binding
+from planner.feedrate.constraints.tangential import TangentialAcceleration, TangentialJerk, binding
 from planner.machine import Machine
 from planner.machine.user_limit import OwnLimit
 
 FEED, VELOCITY = ProgrammedFeed(), AxisVelocity()
 ACCELERATION, JERK = AxisAcceleration(), AxisJerk()
 CHORD_ERROR, FILTER_ERROR = ChordError(), FilterError()
-NORMAL, TANGENTIAL = NormalAcceleration(), TangentialAcceleration()
+NORMAL = NormalAcceleration()
+TANGENTIAL, TANGENTIAL_JERK = TangentialAcceleration(), TangentialJerk()
 POWER = DrivePower()
 LIMITS: tuple[Limit, ...] = (
     FEED,
@@ -45,6 +46,7 @@ LIMITS: tuple[Limit, ...] = (
     ACCELERATION,
     JERK,
     TANGENTIAL,
+    TANGENTIAL_JERK,
     POWER,
 )
 ROWS: tuple[RowLimit, ...] = (ACCELERATION, JERK)  # as rows of the problem, in the order of their indices
@@ -58,6 +60,7 @@ class Limits:
     axes                         : their letters
     velocity, acceleration, jerk : (A,) of the axes, in mm or rad
     normal, tangential           : normal and tangential acceleration [mm/s2]; inf where nothing limits them
+    tangential_jerk              : how fast the latter changes [mm/s3]; inf where nothing limits it
     power                        : (A,) of the drives [mm2/s3]; inf where nothing limits it
     along                        : those with rows like an axis: built-in ones that can bind, and the user's
     """
@@ -68,6 +71,7 @@ class Limits:
     jerk: FloatArray
     normal: float
     tangential: float
+    tangential_jerk: float
     power: FloatArray
     along: tuple[OwnLimit, ...]
 
@@ -76,13 +80,15 @@ class Limits:
         """All of them. Raises InputError if the machine lacks one of the axes."""
         built_in = [row for limit in LIMITS if (row := limit.along(machine, axes)) is not None]
         acceleration = ACCELERATION.of(machine, axes)
+        tangential, tangential_jerk = binding(machine, axes, acceleration)
         return cls(
             axes=axes,
             velocity=VELOCITY.of(machine, axes),
             acceleration=acceleration,
             jerk=JERK.of(machine, axes),
             normal=largest_normal(machine),
-            tangential=binding(machine, axes, acceleration),
+            tangential=tangential,
+            tangential_jerk=tangential_jerk,
             power=POWER.of(machine, axes),
             along=(*built_in, *machine.own),
         )

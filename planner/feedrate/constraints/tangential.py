@@ -1,13 +1,18 @@
-"""The limit of the tangential acceleration: |d feed/dt| <= A_t, the acceleration along the path of x, y and z
-together.
+"""The limits of the tangential acceleration and of the tangential jerk: |d feed/dt| <= A_t, the acceleration
+along the path of x, y and z together, and |d2 feed/dt2| <= J_t, how fast that changes.
 
-With l the length run in x, y and z, l' = dl/ds = |(r'_x, r'_y, r'_z)|, it is a row like that of an axis,
+With l the length run in x, y and z, l' = dl/ds = |(r'_x, r'_y, r'_z)|, they are rows like those of an axis,
 
-    | l' u + l'' x | <= A_t,         l' = 1 and l'' = 0 where no other axes move,
+    | l' u + l'' x | <= A_t,     | l' j + 3 l'' feed u + l''' feed^3 | <= J_t,
 
-and of a motion in time |a.t| <= A_t with t = v/|v| of x, y and z. Rotary axes and u, v, w do not count:
-turning alone is not limited by it. No motion has more than the norm of what x, y and z accelerate with: a
-limit above that is none, and nothing is done for it.
+where l' = 1 and the others are 0 if no other axes move, and of a motion in time with t = v/|v| of x, y and z
+
+    | a.t | <= A_t,              | j.t + |a - (a.t) t|^2/|v| | <= J_t.
+
+Rotary axes and u, v, w do not count: turning alone is not limited by them. No motion has more acceleration
+than the norm of what x, y and z accelerate with: a limit above that is none, and nothing is done for it. The
+jerk along a path that turns may be more than that of the axes together. (Beudaert, Lavernhe and Tournier,
+IJMTM 57, 2012, limit it so.)
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
+from planner.feedrate.constraints.axis_jerk import AxisJerk
 from planner.feedrate.constraints.limit import Limit
 from planner.machine import LINEAR_AXES, TANGENTIAL, Machine
 from planner.machine.user_limit import PathLimit, Place
@@ -25,35 +31,48 @@ from planner.machine.user_limit import PathLimit, Place
 REACHABLE = 1.0 - 1e-12  # of the norm of the axes' accelerations: rounding [-]
 
 
-def binding(machine: Machine, axes: tuple[str, ...], acceleration: FloatArray) -> float:
-    """A_t [mm/s2]; inf where none is named, and where it is above what the axes give.
+def binding(machine: Machine, axes: tuple[str, ...], acceleration: FloatArray) -> tuple[float, float]:
+    """A_t [mm/s2] and J_t [mm/s3]; inf where none is named, and A_t where it is above what the axes give.
 
     acceleration : (A,) of the axes [mm/s2]
     """
-    largest = machine.tangential_acceleration
+    largest = machine.tangential_acceleration or np.inf
     reached = float(np.linalg.norm(acceleration[np.isin(axes, LINEAR_AXES)]))
-    return np.inf if largest is None or largest >= reached * REACHABLE else largest
+    return np.inf if largest >= reached * REACHABLE else largest, machine.tangential_jerk or np.inf
 
 
 class _Row(PathLimit):
-    """The acceleration along the path of x, y and z, at most `largest` [mm/s2]."""
+    """Acceleration and jerk along the path of x, y and z, at most `largest` [mm/s2] and `fastest` [mm/s3]."""
 
-    name, counts, bounded = TANGENTIAL, LINEAR_AXES, ("acceleration",)
+    name, counts = TANGENTIAL, LINEAR_AXES
 
-    def __init__(self, largest: float):
-        self.largest = largest
+    def __init__(self, largest: float, fastest: float):
+        self.largest, self.fastest = largest, fastest
+        both = (AxisAcceleration.name, largest), (AxisJerk.name, fastest)
+        self.bounded = tuple(name for name, bound in both if np.isfinite(bound))
 
     def acceleration(self, at: Place) -> Any:
         """The same everywhere [mm/s2]."""
         return self.largest
 
+    def jerk(self, at: Place) -> Any:
+        """The same everywhere [mm/s3]."""
+        return self.fastest
+
 
 class TangentialAcceleration(Limit):
-    """|l' u + l'' x| <= A_t, on machines that name A_t."""
+    """|l' u + l'' x| <= A_t, on machines that name A_t; `along` has the row of the jerk too."""
 
     name, unit, order = AxisAcceleration.called(TANGENTIAL), "mm/s2", 2
     key = "tangential_acceleration"
 
     def along(self, machine: Machine, axes: tuple[str, ...]) -> PathLimit | None:
-        largest = binding(machine, axes, machine.limits("acceleration", axes))
-        return _Row(largest) if np.isfinite(largest) else None
+        bounds = binding(machine, axes, machine.limits("acceleration", axes))
+        return _Row(*bounds) if np.isfinite(bounds).any() else None
+
+
+class TangentialJerk(Limit):
+    """|l' j + 3 l'' feed u + l''' feed^3| <= J_t, on machines that name J_t."""
+
+    name, unit, order = AxisJerk.called(TANGENTIAL), "mm/s3", 3
+    key = "tangential_jerk"

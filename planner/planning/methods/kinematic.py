@@ -33,7 +33,7 @@ from planner.baselines.lookahead.look_ahead import look_ahead
 from planner.baselines.lookahead.ramps import JointKind
 from planner.baselines.lookahead.rest_to_rest import block_limits
 from planner.corners import kinematic as corner
-from planner.feedrate.constraints.limits import TANGENTIAL
+from planner.feedrate.constraints.limits import TANGENTIAL, TANGENTIAL_JERK
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.chords import arc_sagitta, chorded, parted_by_feed
@@ -71,8 +71,8 @@ class KinematicMethod(Method):
     def plan_job(self, job: Job) -> Plan:
         exact = job.program.path_control[job.toolpath.block] != PathControl.BLEND
         with job.stage("solve"):
-            # legs alone could keep a tangential acceleration, corners would not begin as they end
-            machine = job.machine.model_copy(update={TANGENTIAL.key: None})
+            # legs alone could keep tangential limits, corners would not begin as they end
+            machine = job.machine.model_copy(update={TANGENTIAL.key: None, TANGENTIAL_JERK.key: None})
             chain = self._chain(job.toolpath, machine, exact)
             motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
         made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from benchmarks.jobs import problems
 from planner.base.errors import InputError
 from planner.geometry.build import COORDINATE_MAX, toolpath_from_program, turning_angle
-from planner.geometry.legs import leg_point, leg_tangent, legs_of
+from planner.geometry.legs import leg_dtype, leg_point, leg_tangent, legs_of
+from planner.geometry.spline import span_dtype
 from planner.geometry.toolpath import REVERSAL_ANGLE, Joint, Toolpath
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
@@ -299,3 +300,11 @@ def test_a_tolerance_of_no_machine_is_refused(tolerance):
     """Found by fuzzing: distances over a tolerance of 1e-320 mm overflow."""
     with pytest.raises(InputError, match=r"must be between 1e-05 and 1e\+09"):
         build("G1 X1\nY1", tolerance=tolerance)
+
+
+@pytest.mark.parametrize("record", [leg_dtype, span_dtype])
+def test_kernels_see_two_kinds_of_records_for_any_number_of_axes(record) -> None:
+    """Each kind is half a minute of compiling."""
+    assert {record(axes) for axes in (1, 2)} == {record(3)}
+    assert {record(axes) for axes in range(4, 9)} == {record(9)}
+    assert record(10).itemsize > record(9).itemsize

@@ -83,8 +83,8 @@ def _of_limits(keeps, r, h, v, a, j):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def normal_shares(keeps, leg, h, state, jerk):
-    """(N,) the largest share in every step of the limit of the normal acceleration, which rows watch in
-    places; leg (N,), h (N,), state (N+1, 3, A), jerk (N, A)."""
+    """(N,) the largest share in every step of the limit of the normal acceleration; leg (N,),
+    h (N,), state (N+1, 3, A), jerk (N, A)."""
     shares = np.zeros(len(leg))
     for i in range(len(leg)):
         for n in range(PLACES):

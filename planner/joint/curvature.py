@@ -11,9 +11,8 @@ from planner.base.kernels import njit
 from planner.joint.rows import (
     FEED_NODE,
     FEED_ROWS,
-    LAW_ROWS,
-    NORMAL_MID,
     NORMAL_NODE,
+    NORMAL_ROWS,
     SWITCH,
     TUBE_NODE,
     VECTOR_OF_NODE,
@@ -78,7 +77,7 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
             continue
         m = of[r]
         if m == -2:
-            row = lin.laws[i, r - more - LAW_ROWS]
+            row = lin.own[i, r - more - NORMAL_ROWS]
             for s in range(4 * axes + 1):
                 for t in range(s + 1):
                     W[s, t] += ratio[r] * row[s] * row[t]
@@ -115,8 +114,6 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
                         G[m, k, t] -= flat * lin.tangent[i, c, k] * lin.tangent[i, c, t] / square
         elif kind == NORMAL_NODE:
             flat = z[r] / limits.normal_node[i] ** 2
-        elif kind == NORMAL_MID:
-            flat = z[r] / limits.normal[i] ** 2
         for k in range(axes):
             G[m, k, k] += flat
     for m in range(VECTORS):

@@ -8,7 +8,8 @@ from a motion that need keep neither: gaps and what is missing of g + s = 0 shri
 the last sum is as it was guessed, and d the distance of the node from its leg (numbers.py). Kinematics and
 rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
-change of h costs `prox` in every iteration, so that steps stay where the linear model holds.
+change of h costs `prox` in every iteration, so that steps stay where the linear model holds. So does a change
+of the velocity where the normal acceleration is limited (normal_rows.py).
 
 Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
 optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox
@@ -24,6 +25,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.joint.curvature import Barrier
+from planner.joint.normal_rows import BETWEEN
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.rows import TUBE_NODE, VECTORS, Linear, put_rows, slopes
 
@@ -140,8 +142,8 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         np.zeros((N, 3, axes)),
     )
     node = np.zeros((N, 3, axes))
-    laws = np.zeros((N, limits.laws.first[-1], S + C))
-    lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), laws)
+    own = np.zeros((N, BETWEEN + limits.laws.first[-1], S + C))
+    lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), own)
     factor = Factor(np.zeros((N, C, S)), np.zeros((N, C, C)), np.zeros((N + 1, S, S)))
     slacks = Slacks(np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many))
     s, z, missing, ds, dz = slacks

@@ -20,8 +20,9 @@ JERK = QUANTITIES.index("jerk")
 
 
 def lost(over: FloatArray) -> bool:
-    """Whether more tries do not help, by the shares `over` (N, 2 + M): of the normal acceleration, and of laws that are far off."""
-    return bool((over[:, :2] > 1.0).any() or (over[:, 2:] > 1.0 + SLID).any())
+    """Whether more tries do not help, by the shares `over` (N, 1 + M): of the tolerance along curves, and of laws that
+    are far off."""
+    return bool((over[:, 0] > 1.0).any() or (over[:, 1:] > 1.0 + SLID).any())
 
 
 def tightened(over: FloatArray) -> FloatArray:

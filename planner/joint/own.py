@@ -23,7 +23,7 @@ from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, normal_shares, switches_kept, worst_shares
+from planner.joint.checks import Keeps, switches_kept, worst_shares
 from planner.joint.guess import Guess
 from planner.joint.interior_point import Tuning, solve_window
 from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
@@ -56,9 +56,8 @@ USUAL, NEARLY = 25.0, 0.9
 QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
-# Normal acceleration and the state's limits are watched in two places of a step only, and of the tolerance
-# along a curve the rows know the tangents at nodes. Where one is exceeded it is lowered by what it was above,
-# and a little more [-], at most so many times.
+# Laws of the position are about a place, and of the tolerance along a curve the rows know the tangents at nodes.
+# Where one is exceeded it is lowered by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
@@ -264,7 +263,7 @@ class _Search:
         run = self.run
         for prox, missed in tries:
             pull = PULL
-            tight, begun = np.ones((hi - lo, 2 + len(run.laws))), Window(self.guess, lo, hi)
+            tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
             needed = near(run.laws, begun)
             for number in range(TOLD if len(run.laws) else TIGHTENED):
                 if self._stopped:
@@ -285,19 +284,18 @@ class _Search:
                 if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                     break
                 pull = PULL_AGAIN if run.laws.moved else PULL
-                of_laws = over[:, 2:]
+                of_laws = over[:, 1:]
                 # rows that are far off are asked for about other places first
                 near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
-                tight[:, :2] *= np.where(over[:, :2] > 1.0, over[:, :2] * TIGHTER, 1.0)
-                tight[:, 2:] *= np.where(near_enough, tightened(of_laws), 1.0)
+                tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
+                tight[:, 1:] *= np.where(near_enough, tightened(of_laws), 1.0)
                 needed |= (of_laws > NEAR).any(axis=0)
         return False
 
     def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window) -> FloatArray | None:
         """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are
-        faster they take their place. Else the shares (hi - lo, 2 + M) that they use of what rows watch in places, or
-        about other places, only: the normal acceleration, the tolerance along curves, the laws; then `begun` becomes
-        what was found."""
+        faster they take their place. Else the shares (hi - lo, 1 + M) that they use of what rows watch in places, or
+        about other places, only: the tolerance along curves, the laws; then `begun` becomes what was found."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -317,9 +315,9 @@ class _Search:
             # no step of such a leg alone is the cause
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
-            return np.column_stack([normal_shares(self._keeps, leg, h, found, jerk), of_leg[leg], of_laws])
+            return np.column_stack([of_leg[leg], of_laws])
         if not switches_kept(run, leg, found):
-            return np.zeros((hi - lo, 2 + len(run.laws)))
+            return np.zeros((hi - lo, 1 + len(run.laws)))
         if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = along
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk

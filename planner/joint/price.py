@@ -54,7 +54,7 @@ def step_prices(run: TubeRun, window: StepWindow, z: FloatArray) -> FloatArray:
             box[:, 1],
             box[:, 2] + box[:, 3],
             more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1),
-            more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_MID],
+            more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_ROWS : rows.LAW_ROWS].sum(axis=1),
             more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, none, node),
             np.where(at_vertex, node, none),
             more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH]].sum(

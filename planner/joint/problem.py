@@ -13,7 +13,8 @@ from planner.joint.guess import CutMotion
 from planner.joint.law_window import Units, Window, law_rows, near
 from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
-from planner.joint.nlp import LONGER, LONGER_WATCHED
+from planner.joint.nlp import LONGER
+from planner.joint.normal_rows import turns_far
 from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
 from planner.joint.rows import StepLimits
 from planner.joint.run import TubeRun
@@ -58,8 +59,7 @@ def window_of(
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
     missed : by how much rows may be missed at the end [-]
-    tight  : (hi - lo, 2 + M) by what the limits of the normal acceleration, the room of control points and the
-             laws are divided [-], >= 1; None for 1
+    tight  : (hi - lo, 1 + M) by what the room of control points and the laws are divided [-], >= 1; None for 1
     smooth : weight of the jerk against the time at least [-] (numbers.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
     """
@@ -83,9 +83,9 @@ def window_of(
         weight=run.curves.weight,
     )
     inside = 1.0 - NARROWED * missed
-    tight = np.ones((len(leg), 2 + len(run.laws))) if tight is None else tight
+    tight = np.ones((len(leg), 1 + len(run.laws))) if tight is None else tight
     which = np.flatnonzero(near(run.laws, cut)) if which is None else which
-    laws = law_rows(run.laws, cut, which, inside / tight[:, 2 + which], units)
+    laws = law_rows(run.laws, cut, which, inside / tight[:, 1 + which], units)
     state, h = cut.state[cut.lo : cut.hi + 1], cut.h[part]
     x = np.concatenate(
         [(state[:, 0] - units.origin) / length, state[:, 1] / speed, state[:, 2] / acc], axis=1
@@ -129,21 +129,30 @@ def _limits(
     fastest, strongest = np.linalg.norm(run.velocity), np.linalg.norm(run.acceleration)
     feed = np.minimum(run.feed[leg], fastest)
     inside = 1.0 - NARROWED * narrow[0]
-    normal = np.minimum(run.across_max[leg], strongest) / narrow[1][:, 0]
-    room, room_node = room / narrow[1][:, 1], room_node / narrow[1][:, 1]
+    normal = np.minimum(run.across_max[leg], strongest)
+    room, room_node = room / narrow[1][:, 0], room_node / narrow[1][:, 0]
     axes = np.stack(
         [run.jerk_scale / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed]
     )
     h = cut.h[lo:hi] / second
-    longer = LONGER_WATCHED if np.isfinite(run.across_max[leg]).any() else LONGER
     curved = run.curvature[leg] > 0
     on = _present(run, leg, at_vertex)
     for step, node in (
         (0, lo),
         (-1, hi),
-    ):  # where a run begins or ends, the middle ordinate of the velocity is 0 for every motion
+    ):  # where a run begins or ends, the middle ordinates of the velocity and of a x v are 0 for every motion
         if node in (0, len(cut)):
-            on[step, 8 * len(run.axis) + rows.ORDER_MID] = False
+            more = on[step, 8 * len(run.axis) :]
+            more[rows.ORDER_MID] = more[rows.NORMAL_ROWS : rows.LAW_ROWS] = False
+    turns = turns_far(cut.state[lo : hi + 1, 1]) & np.isfinite(run.across_max[leg])
+    beside = np.minimum(np.append(normal[0], normal[:-1]), np.append(normal[1:], normal[-1]))
+    normal[turns] = np.minimum(normal, beside)[turns]  # of both its nodes
+    turns[[0, -1]] &= np.linalg.norm(cut.state[[lo, hi], 2], axis=1) <= normal[[0, -1]]  # those nodes stay
+    more = on[:, 8 * len(run.axis) :]
+    more[turns, rows.NORMAL_ROWS : rows.LAW_ROWS] = True
+    more[0, rows.NORMAL_ROWS] &= ~turns[0]
+    more[-1, rows.NORMAL_ROWS + 1] &= ~turns[-1]
+    more[turns | np.append(False, turns[:-1]), rows.NORMAL_NODE] = False
     return StepLimits(
         leg=leg,
         at_vertex=at_vertex,
@@ -155,11 +164,12 @@ def _limits(
         feed_node=np.minimum(feed, np.append(feed[0], feed[:-1])) * inside / speed,
         normal=normal * inside / acc,
         normal_node=np.minimum(normal, np.append(normal[0], normal[:-1])) * inside / acc,
+        turns=turns,
         laws=laws[0],
         step_max=STEP_SHARE * np.where(curved, np.minimum(run.step_max[leg], run.offset[-1]), 1.0) / length,
         pace=pace(cut.state[lo : hi + 1, 1]) / speed,
         h=h,
-        h_max=h * longer,
+        h_max=h * LONGER,
         h_min=h / LONGER,
         switch=np.where(at_vertex, run.switch[leg], 0.0),
         smooth=jerk_weights(run, leg, cut.state[lo : hi + 1, 1], smooth),
@@ -181,7 +191,8 @@ def _present(run: TubeRun, leg: Array, at_vertex: Array) -> Array:
     more[:, rows.FEED_NODE : rows.TUBE_NODE] = fed
     more[at_vertex, rows.ORDER_NODE] = False
     limited = np.isfinite(run.across_max[leg])
-    more[~limited, rows.NORMAL_NODE] = more[~limited, rows.NORMAL_MID] = False
+    more[~limited, rows.NORMAL_NODE] = False
+    more[~limited, rows.NORMAL_ROWS : rows.LAW_ROWS] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
     more[:, rows.SWITCH] = at_vertex & (run.switch[leg] != 0.0)
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False

@@ -25,7 +25,8 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.joint.curvature import model_of_rows
 from planner.joint.law_curvature import add_law_curvature
-from planner.joint.rows import LAW_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
+from planner.joint.normal_rows import BETWEEN, add_normal_curvature, stay_of
+from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
 
 END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
@@ -84,9 +85,20 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
         model_of_rows(W, G, legs, limits, lin, i, barrier, of)
-        if lin.laws.shape[1]:
-            add_law_curvature(W, limits, i, x[i], u[i], barrier.z[i, 8 * axes + LAW_ROWS :])
+        of_own = barrier.z[i, 8 * axes + NORMAL_ROWS :]
+        add_normal_curvature(
+            W, limits.normal[i], limits.pace[i], limits.turns[i], x[i], u[i], of_own[:BETWEEN]
+        )
+        add_law_curvature(W, limits, i, x[i], u[i], of_own[BETWEEN:])
         W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
+        if limits.on[i, 8 * axes + NORMAL_ROWS]:
+            priced = 0.0
+            for m in range(3):
+                row = 8 * axes + (NORMAL_NODE, NORMAL_ROWS, NORMAL_ROWS + 1)[m]
+                priced += barrier.z[i, row] + (barrier.z[i - 1, row] if i else 0.0)
+            stay = stay_of(limits.normal[i], x[i], u[i], priced)
+            for k in range(axes):
+                W[axes + k, axes + k] += stay
         for k in range(axes):
             W[S + k, S + k] += 2.0 * limits.smooth[i] * limits.h[i] / limits.box[0, k] ** 2
         step_of_h(x[i], u[i], axes, by_h)
@@ -180,7 +192,7 @@ def forces(limits, lin, q, pull, u, w):
                 continue
             m = of[r]
             if m == -2:
-                row = lin.laws[i, r - more - LAW_ROWS]
+                row = lin.own[i, r - more - NORMAL_ROWS]
                 for k in range(4 * axes):
                     w[i, k] += q[i, r] * row[k]
                 own += q[i, r] * row[4 * axes]

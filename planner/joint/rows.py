@@ -15,7 +15,7 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
     v + a h/4, v + a h/2 + j h2/12,            feed
     v + 3 a h/4 + j h2/4
     p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic
-    a(h/2) - u v(h/2), a - u v                 normal acceleration, u = v.a/v.v kept: the smallest |a - u v| is what it is about
+    a - u v                                    normal acceleration, u = v.a/v.v kept: the smallest |a - u v| is what it is about
     h (v + a h/2)                              largest length of a step on an arc
     p, v             at a vertex               the feed of each leg as far as the motion is nearest to the vertex
     p + h v + h2 a/2 + h3 j/6                  the next node's position, for the tolerance on arcs
@@ -48,10 +48,11 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
+from planner.joint.normal_rows import BETWEEN, put_normal_rows
 
 # Vectors y, in this order.
-P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, ACROSS_MID, LONG, NEXT = range(14)
-VECTORS = 14
+P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, LONG, NEXT = range(13)
+VECTORS = 13
 VECTOR_OF_NODE = (
     P,
     NEXT,
@@ -60,9 +61,10 @@ VECTOR_OF_NODE = (
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
 # lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
-ORDER_NODE, ORDER_MID, NORMAL_NODE, NORMAL_MID, ARC, SWITCH = range(9, 15)
-MORE_ROWS = 15
-LAW_ROWS = MORE_ROWS  # the first of those of the laws
+ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH = range(9, 14)
+# Rows with derivatives of their own: of the normal acceleration between nodes, and the laws.
+NORMAL_ROWS, LAW_ROWS = 14, 14 + BETWEEN
+MORE_ROWS = LAW_ROWS
 VECTOR_OF_BOX = (J, A, MID, V)
 
 
@@ -79,6 +81,7 @@ class StepLimits(NamedTuple):
     feed_node: FloatArray  # (N,)
     normal: FloatArray  # (N,)
     normal_node: FloatArray  # (N,)
+    turns: Array  # (N,) whether the step turns far (normal_rows.py)
     laws: LawRows
     step_max: FloatArray  # (N,)
     pace: FloatArray  # (N,) a speed like that of the step
@@ -102,7 +105,7 @@ class Linear(NamedTuple):
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
-    laws: FloatArray  # (N, .., 4 A + 1) derivatives of the rows of the laws
+    own: FloatArray  # (N, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
 
 
 @njit(cache=True, error_model="numpy")
@@ -116,15 +119,12 @@ def vectors_of_step(x, u, axes, y, alpha, e):
     """y (14, A), alpha (14, 4) and e (14, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h = u[axes]
     alpha[:] = 0.0
-    vv, va, ww, wb = 0.0, 0.0, 0.0, 0.0
+    vv, va = 0.0, 0.0
     for k in range(axes):
-        v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        w, b = v + h * (0.5 * a + 0.125 * h * j), a + 0.5 * h * j
-        vv, va, ww, wb = vv + v * v, va + v * a, ww + w * w, wb + w * b
-    u0, u1 = va / max(vv, 1e-30), wb / max(ww, 1e-30)
+        vv, va = vv + x[axes + k] ** 2, va + x[axes + k] * x[2 * axes + k]
+    u0 = va / max(vv, 1e-30)
     for k in range(axes):
         p, v, a, j = x[k], x[axes + k], x[2 * axes + k], u[k]
-        w, b = v + h * (0.5 * a + 0.125 * h * j), a + 0.5 * h * j
         y[P, k], y[V, k], y[A, k], y[J, k] = p, v, a, j
         y[MID, k], e[MID, k] = v + 0.5 * h * a, 0.5 * a
         y[FEED_1, k], e[FEED_1, k] = v + 0.25 * h * a, 0.25 * a
@@ -132,9 +132,8 @@ def vectors_of_step(x, u, axes, y, alpha, e):
         y[FEED_3, k], e[FEED_3, k] = v + h * (0.75 * a + 0.25 * h * j), 0.75 * a + 0.5 * h * j
         y[C1, k], e[C1, k] = p + h * v / 3.0, v / 3.0
         y[C2, k], e[C2, k] = p + h * (2.0 * v / 3.0 + h * a / 6.0), 2.0 * v / 3.0 + h * a / 3.0
-        y[ACROSS, k], y[ACROSS_MID, k] = a - u0 * v, b - u1 * w
+        y[ACROSS, k] = a - u0 * v
         e[P, k], e[V, k], e[A, k], e[J, k], e[ACROSS, k] = 0.0, 0.0, 0.0, 0.0, 0.0
-        e[ACROSS_MID, k] = 0.5 * j - u1 * (0.5 * a + 0.25 * h * j)
         y[LONG, k], e[LONG, k] = h * (v + 0.5 * h * a), v + h * a
         y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j / 6.0))
         e[NEXT, k] = v + h * (a + 0.5 * h * j)
@@ -146,8 +145,6 @@ def vectors_of_step(x, u, axes, y, alpha, e):
     alpha[C1, 0], alpha[C1, 1] = 1.0, h / 3.0
     alpha[C2, 0], alpha[C2, 1], alpha[C2, 2] = 1.0, 2.0 * h / 3.0, h * h / 6.0
     alpha[ACROSS, 1], alpha[ACROSS, 2] = -u0, 1.0
-    alpha[ACROSS_MID, 1], alpha[ACROSS_MID, 2] = -u1, 1.0 - 0.5 * u1 * h
-    alpha[ACROSS_MID, 3] = 0.5 * h - 0.125 * u1 * h * h
     alpha[LONG, 1], alpha[LONG, 2] = h, 0.5 * h * h
     alpha[NEXT, 0], alpha[NEXT, 1], alpha[NEXT, 2], alpha[NEXT, 3] = 1.0, h, 0.5 * h * h, h**3 / 6.0
 
@@ -258,8 +255,12 @@ def put_rows(legs, limits, x, u, lin):
             arc += n[more + ARC, k] * y[LONG, k]
         g[more + ORDER_NODE], g[more + ORDER_MID], g[more + ARC] = order_node, order_mid, arc - 1.0
         _ball(y, ACROSS, limits.normal_node[i], more + NORMAL_NODE, g, n)
-        _ball(y, ACROSS_MID, limits.normal[i], more + NORMAL_MID, g, n)
-        put_law_rows(limits, i, x[i], u[i], g[more + LAW_ROWS :], lin.laws[i])
+        if limits.on[i, more + NORMAL_ROWS]:
+            between = g[more + NORMAL_ROWS : more + LAW_ROWS]
+            put_normal_rows(
+                limits.normal[i], limits.pace[i], limits.turns[i], x[i], u[i], between, lin.own[i]
+            )
+        put_law_rows(limits, i, x[i], u[i], g[more + LAW_ROWS :], lin.own[i, BETWEEN:])
         for c in range(3):
             place = lin.place[i, c]
             if (c == 0 and limits.at_vertex[i]) or place <= 0.0 or place >= legs.length[limits.leg[i]]:
@@ -268,15 +269,15 @@ def put_rows(legs, limits, x, u, lin):
 
 @njit(cache=True, error_model="numpy")
 def vector_of(row, axes):
-    """The vector y that a row depends on; -1 for those of h alone, -2 for those of the laws."""
+    """The vector y that a row depends on; -1 for those of h alone, -2 for those with derivatives of their own."""
     if row < 8 * axes:
         return VECTOR_OF_BOX[row // (2 * axes)]
     more = row - 8 * axes
     if more <= H_MIN:
         return -1
-    if more >= LAW_ROWS:
+    if more >= NORMAL_ROWS:
         return -2
-    return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, ACROSS_MID, LONG, P)[more - FEED_NODE]
+    return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, LONG, P)[more - FEED_NODE]
 
 
 @njit(cache=True, error_model="numpy")
@@ -310,7 +311,7 @@ def slopes(limits, lin, dx, du, out):
             if not limits.on[i, r]:
                 continue
             if of[r] == -2:
-                row, total = lin.laws[i, r - more - LAW_ROWS], 0.0
+                row, total = lin.own[i, r - more - NORMAL_ROWS], 0.0
                 for k in range(3 * axes):
                     total += row[k] * dx[i, k]
                 for k in range(axes + 1):

@@ -45,7 +45,7 @@ def linear_of(window, x, u):
         tangent=np.zeros((steps, 3, axes)),
         place=window.place.copy(),
         radius=np.zeros((steps, 3)),
-        laws=np.zeros((steps, kinds - rows.count(axes), 4 * axes + 1)),
+        own=np.zeros((steps, rows.BETWEEN + kinds - rows.count(axes), 4 * axes + 1)),
     )
     rows.put_rows(window.legs, window.limits, x, u, lin)
     return lin
@@ -226,8 +226,8 @@ def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
         assert getattr(one.steps, name).tobytes() == getattr(three.steps, name).tobytes()
 
 
-def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monkeypatch):
-    """Watched in the middle and at the nodes alone it is too large between them; what is taken then keeps it everywhere."""
+def test_the_normal_acceleration_holds_between_nodes():
+    """Its rows are enough for whole steps: what solves a window keeps it everywhere, and uses all of it."""
     program, machine = random_lines.job(40)
     toolpath = toolpath_from_program(program, machine)
     (run,) = tube_runs_of(toolpath, machine)
@@ -236,14 +236,13 @@ def test_normal_acceleration_between_its_places_is_lowered_and_solved_again(monk
     times = np.maximum.accumulate(passing_times(seen, toolpath))
     times[-1] = seen.t[-1]
     guess = guess_from(run, seen, times[run.first])
-    again = TubeOwn().solve(run, guess)
-    monkeypatch.setattr(own, "TIGHTENED", 1)
-    once = TubeOwn().solve(run, guess)
-    assert (once.solved, again.solved) == (0, 1)
-    found = again.steps
+    solution = TubeOwn().solve(run, guess)
+    assert solution.solved == 1
+    found = solution.steps
     state = np.stack([found.position, found.velocity, found.acceleration], axis=1)
     state = np.concatenate([state, [[run.vertex[-1], np.zeros(len(run.axis)), np.zeros(len(run.axis))]]])
-    assert normal_shares(own.keeps_of(run), guess.leg, found.h, state, found.jerk).max() <= 1.0
+    shares = normal_shares(own.keeps_of(run), guess.leg, found.h, state, found.jerk)
+    assert 0.99 < shares.max() <= 1.0
 
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):

@@ -135,8 +135,10 @@ def _busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
         share = np.minimum((np.abs(motion.jerk[:, run.axis]) / run.jerk).max(axis=1), 1.0)
         return np.append(0.0, np.cumsum(np.diff(motion.t) * (share[:-1] + share[1:]) / 2))
     # a jump between two samples at nearly the same time would have steps of no length
-    seen = np.unique(np.floor(motion.t / (SEEN * unit)), return_index=True)[1]
-    seen = np.append(seen[seen < len(motion.t) - 1], len(motion.t) - 1)
+    apart = SEEN * unit
+    seen = np.unique(np.floor(motion.t / apart), return_index=True)[1]
+    seen = seen[np.diff(motion.t[seen], prepend=-np.inf) >= apart / 2]
+    seen = np.append(seen[motion.t[seen] <= motion.t[-1] - apart / 2], len(motion.t) - 1)
     acceleration = motion.acceleration[seen][:, run.axis]
     acceleration[[0, -1]] = 0.0
     jumps = (np.abs(np.diff(acceleration, axis=0)) / run.jerk_scale).max(axis=1)

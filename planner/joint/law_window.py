@@ -33,6 +33,7 @@ INSIDE = 1e-3
 # Change of a bound from one end of a step to the other that is a jump, share of the larger; between two places
 # it is found by so many halvings of the step [-].
 JUMP, HALVINGS = 0.3, 30
+THERE = 0.01  # of a step: a jump so near to a node is at it [-]
 FAR = 1e6  # of a mean step's speed, acceleration and so on: instead of no bound [-]
 SMALLEST = np.finfo(np.float64).tiny
 
@@ -258,7 +259,11 @@ def _pin(laws: RunLaws, window: Window, which: Array, units: Units) -> tuple[Flo
 
 
 def _node_for(window: Window, step: int, since: float, pin: FloatArray) -> int:
-    """The node next to a time in a step that may be laid there; -1 for none."""
+    """The node next to a time in a step that may be laid there; -1 for none, as where there is one that stays."""
+
+    def off(node: int) -> float:
+        return abs((node - step) - since / float(window.h[step]))
+
     free = [
         node
         for node in (step, step + 1)
@@ -266,7 +271,10 @@ def _node_for(window: Window, step: int, since: float, pin: FloatArray) -> int:
         and window.leg[node] == window.leg[node - 1]
         and not pin[node - window.lo].any()
     ]
-    return min(free, key=lambda node: abs((node - step) * window.h[step] - since), default=-1)
+    nearest = min((step, step + 1), key=off)
+    if nearest not in free and off(nearest) < THERE:
+        return -1
+    return min(free, key=off, default=-1)
 
 
 def _jumps(one: FloatArray, other: FloatArray) -> Array:

@@ -68,7 +68,7 @@ def test_axes_that_stand_still_change_nothing(method: str) -> None:
     assert times[1:] == pytest.approx(times[:1] * 2, rel=1e-9)
 
 
-# All nine in two corners: method optimal takes a second and more for each.
+# All nine in two corners: a search takes a second and more for each.
 SHORT = "G21 F4000\nG1 X20 A40 U7\nX40 Y10 A60 B10 V3 W4\nY30 Z2 C30\n"
 
 
@@ -76,7 +76,7 @@ SHORT = "G21 F4000\nG1 X20 A40 U7\nX40 Y10 A60 B10 V3 W4\nY30 Z2 C30\n"
 @pytest.mark.parametrize("method", METHODS)
 def test_a_mirrored_job_in_nine_axes_takes_the_same_time(method: str) -> None:
     machine = machine_of("xyzabcuvw")
-    text = SHORT if method == "optimal" else NINE
+    text = SHORT if method in SEARCHED else NINE
     mirrored = text.translate(str.maketrans({"A": "A-", "Y": "Y-", "U": "U-"}))
     one, other = planned(text, machine, method), planned(mirrored, machine, method)
     # rounds of reshaping, which a job with linear and rotary axes takes by `optimal`, end where rounding leads them

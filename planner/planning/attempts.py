@@ -3,8 +3,8 @@
 
 The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round
 has reshaped, with a motion that need not be fit for delivery. Where it does not end, or where a small path
-doubles back within the tolerance, the splines are reshaped, and it begins there once more; where it cannot
-run, or leaves something, the motion on that path is delivered.
+doubles back or bends within the tolerance, the splines are reshaped, and it begins there once more; where it
+cannot run, or leaves something, the motion on that path is delivered.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
     """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended
-    from the first ones, and where the path doubles back."""
+    from the first ones, and where the path doubles back or bends inside its tolerance."""
     if tried.joint and settings.effort.search.smooth:  # what is faster is not what is asked for
         return False
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
-    return small and (tried.best is None or (tried.steps <= CHEAP and _doubles_back(job)))
+    return small and (tried.best is None or (tried.steps <= CHEAP and _turns_within(job)))
 
 
 def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
@@ -173,7 +173,7 @@ RETRIES = (
     Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
     Retry(
         ("search, reshaped splines", "reshape"),
-        "the search has not ended, or a small path doubles back: from reshaped splines; where it cannot run these alone",
+        "the search has not ended, or a small path turns within its tolerance: from reshaped splines; where it cannot run these alone",
         "1, rounds 40",
         "5e-4, 8e-3",
     ),
@@ -220,12 +220,13 @@ def _at_feed(job: Job) -> float:
     return float(np.sum(job.toolpath.length / job.toolpath.feed))
 
 
-def _doubles_back(job: Job) -> bool:
+def _turns_within(job: Job) -> bool:
     """Whether the path turns back on both ends of a block so short that one place is within the tolerance of
-    both: splines that are reshaped find a way without the detour, the search does not find it from the first
-    ones."""
+    both, or a curve bends with a radius below it: splines that are reshaped find a way without the detour,
+    the search does not find it from the first ones."""
     path = job.toolpath
     turn = np.sum(path.tangent_end[:-1] * path.tangent_start[1:], axis=1)
     back = (turn < 0.0) & (path.joint[1:-1] != Joint.STOP)
     short = (path.length < path.tolerance[:-1] + path.tolerance[1:])[1:-1]
-    return bool((short & back[:-1] & back[1:]).any())
+    bends = path.curvature * path.tolerance[:-1] > 1.0
+    return bool(bends.any() or (short & back[:-1] & back[1:]).any())

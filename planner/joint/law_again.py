@@ -14,8 +14,9 @@ from planner.machine.user_limit import QUANTITIES
 TOLD, SLID = 6, 0.01
 PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itself [-]
 # Power of a share by which a law is lowered, by this at least [-] (what slides on is above it by some 1e-6
-# every time), and on so many steps beside.
-TIGHTER_BESIDE, LOWERED, BESIDE = 1.5, 1e-5, 3
+# every time), and on so many steps beside; everywhere by that from a try on, as it slides from step to step.
+TIGHTER_BESIDE, LOWERED, BESIDE, EVERYWHERE = 1.5, 1e-5, 3, 2
+LOWERED_MOST = 0.2  # as what is far above its limit comes of a place where the motion hardly moves [-]
 JERK = QUANTITIES.index("jerk")
 
 
@@ -25,15 +26,15 @@ def lost(over: FloatArray) -> bool:
     return bool((over[:, 0] > 1.0).any() or (over[:, 1:] > 1.0 + SLID).any())
 
 
-def tightened(over: FloatArray) -> FloatArray:
+def tightened(over: FloatArray, number: int) -> FloatArray:
     """(N, M) by what laws are divided where their shares `over` (N, M) are above 1: by half as much again, and
-    beside there too, where it goes next."""
-    above = np.where(over > 1.0, np.maximum(over, 1.0 + LOWERED), 1.0)
+    beside there too, where it goes next, and at last everywhere by a little; number: of the try, from 0."""
+    above = np.where(over > 1.0, np.clip(over, 1.0 + LOWERED, 1.0 + LOWERED_MOST), 1.0)
     more = above**TIGHTER_BESIDE
     for back in range(1, BESIDE + 1):
         more[back:] = np.maximum(more[back:], above[:-back])
         more[:-back] = np.maximum(more[:-back], above[back:])
-    return more
+    return np.maximum(more, 1.0 + LOWERED * (above > 1.0).any(axis=0)) if number >= EVERYWHERE else more
 
 
 def law_shares(run: TubeRun, cut: CutMotion, node: Array) -> FloatArray:

@@ -14,6 +14,7 @@ from planner.joint.laws import (
     PRODUCT,
     PUSH,
     REST,
+    ROWS_OF,
     SPEED,
     chained,
     ordinates,
@@ -106,16 +107,17 @@ def _curve_jolt(W, laws, i, m, x, u, rest, z):
     """That of |r|^2 with r = (a - (a.t) t)/|v|^(1/2), where it is in the upper rows, as if r were linear."""
     axes = len(u) - 1
     y, by, slope = np.empty((3, axes)), np.zeros((4, axes)), np.empty(4 * axes + 1)
-    for place in range(2):
+    for place in range(ROWS_OF[JOLT] // 2):
         if z[2 * place] == 0.0:
             continue
-        t = u[axes] if place else 0.0
-        seen_at(x, u, t, y)
+        part = place / (ROWS_OF[JOLT] // 2 - 1)
+        seen_at(x, u, part * u[axes], y)
         vv, av = rest * rest, 0.0
         for k in range(axes):
             y[1, k], y[2, k] = laws.counts[m, k] * y[1, k], laws.counts[m, k] * y[2, k]
             vv, av = vv + y[1, k] * y[1, k], av + y[2, k] * y[1, k]
-        weight = 2.0 * z[2 * place] / (laws.end[i, m] if place else laws.begin[i, m]) / np.sqrt(vv)
+        bound = laws.begin[i, m] + part * (laws.end[i, m] - laws.begin[i, m])
+        weight = 2.0 * z[2 * place] / bound / np.sqrt(vv)
         for row in range(axes):
             v = y[1, row]
             across = y[2, row] - av / vv * v
@@ -125,7 +127,7 @@ def _curve_jolt(W, laws, i, m, x, u, rest, z):
             by[1, row] -= laws.counts[m, row] * av / vv
             by[2, row] += laws.counts[m, row]
             slope[:] = 0.0
-            chained(u, 1.0 * place, y, by, slope)
+            chained(u, part, y, by, slope)
             for a in range(4 * axes + 1):
                 for b in range(a + 1):
                     W[a, b] += weight * slope[a] * slope[b]

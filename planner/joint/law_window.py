@@ -206,7 +206,7 @@ def _present(laws: LawRows, window: Window, free: Array) -> Array:
             if begins:
                 own[0, :2] = False
             if ends:
-                own[-1, 2:] = False
+                own[-1, -2:] = False
         elif kind != rows.JOINT_JOLT:
             own[0, :2] = False
         own[free[:, m]] = False

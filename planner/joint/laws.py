@@ -24,7 +24,7 @@ exact at the nodes, and less by the cosine of half the turn between them. A row 
 with v.e kept in d: the share of the limit, less 1. From rest and to rest they are 0 for every motion, and are
 no rows. POWER has those of a.v alone. The last ordinate is the first one of the next step.
 
-JOLT and JOINT_JOLT have rows at both ends of a step; JOINT_SPEED the ordinate in the middle instead of the
+JOLT has rows at both ends of a step and at its thirds, JOINT_JOLT at both ends; JOINT_SPEED the ordinate in the middle instead of the
 second end, JOINT_PUSH the middle. About a place P that the node had before, with d = p - P, g = q',
 H = q'' there and the third derivative T along the motion,
 
@@ -47,7 +47,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 
 SPEED, PUSH, JOLT, POWER, JOINT_SPEED, JOINT_PUSH, JOINT_JOLT, PIN = range(8)
-ROWS_OF = (5, 6, 4, 6, 4, 4, 4, 1)  # upper before lower, where there are both
+ROWS_OF = (5, 6, 8, 6, 4, 4, 4, 1)  # upper before lower, where there are both
 REST = 1e-3  # of a step's pace: below that the direction of a velocity counts less and less [-]
 TILTED_LEAST = 0.1  # what 1 + tilt.d is at least [-]
 # Bezier ordinates of w.w, and of b.w or e.w: row, ordinates of both factors, share.
@@ -258,8 +258,11 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
     """The rows of laws that are watched at places of a step, as `_put_speed`; `of_f` is its `by`."""
     axes, kind = len(u) - 1, laws.kind[m]
     y, by, w, b = np.empty((3, axes)), np.zeros((4, axes)), np.empty((3, axes)), np.empty((2, axes))
-    for place in range(2):
-        part = 0.5 * place if kind in (JOINT_PUSH, JOINT_SPEED) else 1.0 * place
+    for place in range(ROWS_OF[kind] // 2):
+        share = place / (
+            ROWS_OF[kind] // 2 - 1
+        )  # of the way from the bound at the beginning to that at the end
+        part = 0.5 * share if kind in (JOINT_PUSH, JOINT_SPEED) else share
         seen_at(x, u, part * u[axes], y)
         row = out[2 * place]
         if kind == JOLT:
@@ -276,14 +279,18 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
             first = i if kind == JOINT_PUSH else i + place
             value = _of_joint(laws, first, i + place, m, kind - JOINT_SPEED + 1, y, u, by)
         chained(u, part, y, by, row)
-        bound, at = laws.end[i, m] if place else laws.begin[i, m], place
+        bound, high = (
+            laws.begin[i, m] + share * (laws.end[i, m] - laws.begin[i, m]),
+            f[0] + share * (f[1] - f[0]),
+        )
         if place == 0 and kind in (JOINT_SPEED, JOINT_PUSH):
             bound = laws.node[i, m]
         for k in range(4 * axes + 1):
+            of_high = of_f[0, k] + share * (of_f[1, k] - of_f[0, k])
             row[k] /= bound
-            out[2 * place + 1, k] = -row[k] - of_f[at, k]
-            row[k] -= of_f[at, k]
-        g[2 * place], g[2 * place + 1] = value / bound - f[at], -value / bound - f[at]
+            out[2 * place + 1, k] = -row[k] - of_high
+            row[k] -= of_high
+        g[2 * place], g[2 * place + 1] = value / bound - high, -value / bound - high
 
 
 @njit(cache=True, error_model="numpy")

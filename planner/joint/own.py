@@ -288,7 +288,7 @@ class _Search:
                 # rows that are far off are asked for about other places first
                 near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
                 tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
-                tight[:, 1:] *= np.where(near_enough, tightened(of_laws), 1.0)
+                tight[:, 1:] *= np.where(near_enough, tightened(of_laws, number), 1.0)
                 needed |= (of_laws > NEAR).any(axis=0)
         return False
 

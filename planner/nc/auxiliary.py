@@ -70,7 +70,7 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
 
 def take_default(state: State, default: float | None, block: Block, findings: Findings) -> None:
     """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
-    if not default or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
+    if not default or state.strict or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
     state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit

@@ -182,7 +182,11 @@ class Mover:
         if block.g.get("tool length") in (431, 432) and "motion" not in block.g:
             return  # the axis words are those of G43.1 or G43.2
         if block.g.get("one-shot") == 530:
-            moves.check_machine_coordinates(state, block)
+            if state.motion not in (0, 1) or not (code is not None or block.has(state.letters)):
+                raise block.fault("G53 goes with G0 or G1 only; write G53 G0 or G53 G1", "one-shot")
+            if not state.absolute:
+                text = "G53 goes with absolute coordinates only; write G90 before it"
+                raise block.fault(text, "one-shot")
             offsets.assume_origin(state, "G53", block, self.findings)
         if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
             self.ignored.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
@@ -196,15 +200,11 @@ class Mover:
                 f"G{codes.number(state.motion)} needs an axis word: where it leads to", "motion"
             )
 
-    def _take_default_feed(self, block: Block) -> None:
-        if not self.ignored.strict:
-            auxiliary.take_default(self.state, self.feed_default, block, self.findings)
-
     def _move(self, block: Block) -> None:
         state = self.state
         if state.motion < 0:
             raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
-        self._take_default_feed(block)
+        auxiliary.take_default(state, self.feed_default, block, self.findings)
         if state.motion not in codes.CYCLES:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
@@ -308,7 +308,7 @@ class Mover:
         found = self.splines.read(state, block, self.table.blocks)
         if found is None:
             return
-        self._take_default_feed(block)
+        auxiliary.take_default(state, self.feed_default, block, self.findings)
         auxiliary.check_feed(state, block)
         (points, weights), line = found
         state.position[:] = points[-1, -1]

@@ -221,14 +221,6 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     return f"{_CLOSES_IF} {way} before it"
 
 
-def check_machine_coordinates(state: State, block: Block) -> None:
-    """G53 goes with G0 and G1, and with absolute coordinates. Raises WordFault."""
-    if state.motion not in (0, 1) or not ("motion" in block.g or block.has(state.letters)):
-        raise block.fault("G53 goes with G0 or G1 only; write G53 G0 or G53 G1", "one-shot")
-    if not state.absolute:
-        raise block.fault("G53 goes with absolute coordinates only; write G90 before it", "one-shot")
-
-
 def used_in_force(state: State) -> set[str]:
     """Letters that the motion code in force uses beside the axes."""
     code = 10 * state.motion if state.motion <= 3 else state.motion

@@ -166,21 +166,16 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
         raise block.fault("G43.2 needs a tool as an H word, or lengths as X, Y and Z", "tool length")
 
 
-def system_of(block: Block) -> int:
-    """The code of the work system that a block names. Raises WordFault for a G54.1 without a valid P."""
-    code = block.g["work offset"]
-    if code != 541:
-        return code
-    number = integer(block, "P", 1) if "P" in block.value else 0
-    if not 1 <= number <= FURTHER_MAX:
-        at = "P" if "P" in block.at else "work offset"
-        raise block.fault(f"G54.1 needs its work system as P1 to P{FURTHER_MAX}", at)
-    return FURTHER_SYSTEMS + number
-
-
 def take_system(state: State, block: Block, findings: Findings) -> None:
-    """G54 to G59.3 and G54.1: the work system from here on."""
-    state.system = system_of(block)
+    """G54 to G59.3 and G54.1: the work system from here on. Raises WordFault for G54.1 without a valid P."""
+    code = block.g["work offset"]
+    if code == 541:
+        number = integer(block, "P", 1) if "P" in block.value else 0
+        if not 1 <= number <= FURTHER_MAX:
+            at = "P" if "P" in block.at else "work offset"
+            raise block.fault(f"G54.1 needs its work system as P1 to P{FURTHER_MAX}", at)
+        code = FURTHER_SYSTEMS + number
+    state.system = code
     if state.system not in state.systems and state.system != 540:
         text = f"{system_name(state.system)} has no offset in the machine file: 0"
         findings.assume(text, block.line, block.at["work offset"])

@@ -22,7 +22,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault, OffsetMove, meeting
-from planner.nc.language.travel_rows import AXES, STANDS, G, Move, TravelRow, arc_words, stops_apart
+from planner.nc.language.travel_rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words
 from planner.nc.program import Kind
 from planner.nc.state import State
 
@@ -139,7 +139,8 @@ class OffsetMoves:
                 yield item
                 continue
             move, first, last = item
-            before, stops = stops_apart(move.rest)
+            stops = [word for word in move.rest.words if word[0] == M and word[1] in STOPS]
+            before = [word for word in move.rest.words if word not in stops]
             for block in range(first, last):
                 end = self._table.block.end[block].copy()
                 rises = end[self.normal] != place[self.normal]

@@ -173,7 +173,12 @@ class Expressions:
                 text = f"R({self.value(index)})"
             return (text if raw else language.read.format(text)), False
         if isinstance(expression, tree.Exists):
-            return self._exists(expression.parameter), True
+            parameter = expression.parameter
+            if isinstance(parameter, tree.Numbered):
+                return f"run.exists({self.value(parameter.index)})", True
+            if parameter.shared and parameter.name in language.system_names:
+                return "True", True
+            return f"({parameter.name!r} in {'G' if parameter.shared else 'L'})", True
         raw = expression.name in language.raw
         operands = []
         for operand in expression.operands:
@@ -181,10 +186,3 @@ class Expressions:
             operands.append(f"(1.0 if {text} else 0.0)" if logical else text)
         template = language.operations[expression.name, len(operands)]
         return template.format(*operands), expression.name in language.conditions
-
-    def _exists(self, parameter: tree.Parameter) -> str:
-        if isinstance(parameter, tree.Numbered):
-            return f"run.exists({self.value(parameter.index)})"
-        if not parameter.shared:
-            return f"({parameter.name!r} in L)"
-        return "True" if parameter.name in self.language.system_names else f"({parameter.name!r} in G)"

@@ -182,7 +182,12 @@ class RowsThrough(travel_rows.Coordinates):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):
             self._beside = False
-        rest = travel_rows.other_words(row, arc=arc is not None)
+        own = {travel_rows.G, *travel_rows.AXES, *travel_rows.CENTRES, travel_rows.RADIUS}
+        own |= {travel_rows.TURNS} if arc is not None else set()
+        # all but the motion code, coordinates and centre
+        rest = [
+            word for word in row.words if word[0] not in own or (word[0] == travel_rows.G and word[1] > 3.0)
+        ]
         at = row.words[0][2]
         code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
         move = travel_rows.Move(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.base.arrays import Array, FloatArray
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.language.detect import bare, computes, may_compute, row_text
@@ -115,10 +116,9 @@ class Source:
             runs.append(self._run(begin, last, may_end=False))
         return runs
 
-    def has_end(self, rows: PlainRows) -> bool:
-        """True if the rows hold M2 or M30."""
-        letter, value = self.words.of_rows(rows.first - self.first_row, rows.last - self.first_row)
-        return bool(((letter == ord("M")) & np.isin(value, (2, 30))).any())
+    def words_of(self, rows: PlainRows) -> tuple[Array, FloatArray]:
+        """Letters (n,) and values (n,) of rows."""
+        return self.words.of_rows(rows.first - self.first_row, rows.last - self.first_row)
 
     def _run(self, first: int, last: int, *, may_end: bool) -> PlainRows:
         at = self.begin + int(self.words.at[self.words.first[first]])

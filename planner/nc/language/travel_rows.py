@@ -18,7 +18,7 @@ G, M = ord("G"), ord("M")
 AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
 TURNS, RADIUS = ord("P"), ord("R")
 STANDS = 1e-9  # a move that is shorter stays where it is [mm]
-_STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
+STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
 _EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
@@ -89,12 +89,6 @@ def arc_words(arc: Arc, begin: FloatArray, normal: int, at: int) -> list[tuple[i
     return [*words, (TURNS, float(more), at)] if more > 1 else words
 
 
-def stops_apart(row: TravelRow) -> tuple[list[tuple[int, float, int]], list[tuple[int, float, int]]]:
-    """The words that act before the moves of a row, and the stops behind them."""
-    stops = [word for word in row.words if word[0] == M and word[1] in _STOPS]
-    return [word for word in row.words if word not in stops], stops
-
-
 def travel_rows_of(words: Words) -> Iterator[TravelRow]:
     """The rows of words that the interpreter would take."""
     columns = words.letter, words.value, words.at, words.first
@@ -102,12 +96,6 @@ def travel_rows_of(words: Words) -> Iterator[TravelRow]:
     for row, (line, frame) in enumerate(zip(words.line.tolist(), words.frame.tolist(), strict=True)):
         span = slice(first[row], first[row + 1])
         yield TravelRow(list(zip(letter[span], value[span], at[span], strict=True)), line, frame)
-
-
-def other_words(row: TravelRow, *, arc: bool) -> list[tuple[int, float, int]]:
-    """The words of a row beside its motion code, coordinates and centre."""
-    own = (*AXES, *CENTRES, RADIUS, *((TURNS,) if arc else ()))
-    return [word for word in row.words if not (word[0] == G and word[1] <= 3.0) and word[0] not in own]
 
 
 @dataclass

@@ -131,7 +131,8 @@ class FanucParser(FanucControl):
     def _program(self, number: str, line: SourceLine) -> None:
         self._end_of_program()
         only = self.procedures[-1]
-        empty = all(isinstance(s, tree.PlainRows) and _is_percent(self.source, s) for s in only.body)
+        runs = [self.source.words_of(s)[0] for s in only.body if isinstance(s, tree.PlainRows)]
+        empty = len(runs) == len(only.body) and all((letters == ord("%")).all() for letters in runs)
         if len(self.procedures) == 1 and empty:
             if self.source.file:
                 self.procedures[0] = tree.Procedure(number, line.place, only.body)
@@ -229,8 +230,3 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
         if ("M99" in text or "M97" in text) and "P" in text:
             return None
     return frozenset(used)
-
-
-def _is_percent(source: Source, rows: tree.PlainRows) -> bool:
-    letter, _ = source.words.of_rows(rows.first - source.first_row, rows.last - source.first_row)
-    return bool((letter == ord("%")).all())

@@ -64,7 +64,9 @@ class HeidenhainParser(Definitions):
                 done.add(label)
                 if label in self.known:
                     first = self.known[label]
-                    body = self._body(first, self._end_of(first), True)
+                    rest = range(first + 1, len(self.blocks))
+                    ends = (k for k in rest if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE))
+                    body = self._body(first, next(ends, len(self.blocks)), True)
                     name = procedure_name(label, source.file)
                     procedures.append(tree.Procedure(name, self.blocks[first].place, body))
         set_up: list[tuple[tree.Parameter, tree.Expression]] = [
@@ -90,13 +92,6 @@ class HeidenhainParser(Definitions):
                 continue
             if label:
                 self.known.setdefault(label, k)
-
-    def _end_of(self, first: int) -> int:
-        """The block after the LBL 0 that ends a subprogram."""
-        for k in range(first + 1, len(self.blocks)):
-            if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE):
-                return k
-        return len(self.blocks)
 
     def _body(self, first: int, last: int, called: bool = False) -> text.Rows:
         """Statements of blocks `first` to `last` - 1; faults of `called` subprograms are known already."""

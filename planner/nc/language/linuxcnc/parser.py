@@ -149,7 +149,9 @@ class LinuxcncParser(tree.Statements):
         in_main = self.body is self.main
         if not (in_main and self.ended):
             self.body.append(rows)
-        self.ended |= in_main and rows.may_end and self.source.has_end(rows)
+        letter, value = self.source.words_of(rows)
+        ends = ((letter == ord("M")) & ((value == 2.0) | (value == 30.0))).any()
+        self.ended |= in_main and rows.may_end and bool(ends)
 
     def _line(self, line: SourceLine) -> None:
         reader = LineReader(line, LANGUAGE)

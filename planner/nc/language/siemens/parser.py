@@ -16,7 +16,7 @@ from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.block_words import BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
+from planner.nc.language.tree import ONE, ZERO, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _COMPENSATES = re.compile(rb"G4[12]\b")
@@ -71,7 +71,9 @@ class SiemensParser(BlockWords):
         if self.circular:
             self._check_motion(first, last)
         for run in self.source.plain(first, last):
-            self._follow_modes(run)
+            letter, value = self.source.words_of(run)
+            modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
+            self.absolute = bool(modes[-1] == 90) if len(modes) else self.absolute
             if self.cycle is None:
                 self.body.append(run)
                 continue
@@ -94,14 +96,6 @@ class SiemensParser(BlockWords):
                 found = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
                 self.faults.append(ProgramFault(self.source.line(row).place, found))
                 return
-
-    def _follow_modes(self, run: PlainRows) -> None:
-        """G90 and G91 of plain rows, the last one counts."""
-        source = self.source
-        letter, value = source.words.of_rows(run.first - source.first_row, run.last - source.first_row)
-        modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
-        if len(modes):
-            self.absolute = bool(modes[-1] == 90)
 
     def _line(self, line: SourceLine) -> None:
         # without the comment; a semicolon in a text is none

@@ -20,7 +20,7 @@ def room(axes: int) -> int:
 
 
 def read_only(array: Array) -> Array:
-    """The array (any shape), not to be written: a kernel is compiled once more for one that can be."""
+    """The array (n, ..), not to be written: a kernel is compiled once more for one that can be."""
     view = array.view()
     view.flags.writeable = False
     return view

@@ -41,7 +41,7 @@ LEAST = (
 
 
 def turns_far(velocity: FloatArray) -> Array:
-    """(N,) whether steps turn far, by the velocities (N+1, A) at the nodes; at rest the direction is the last one
+    """(N,) whether steps turn far, by the `velocity` (N+1, A) at the nodes; at rest the direction is the last one
     before."""
     moving = velocity.any(axis=1)
     last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), 0))

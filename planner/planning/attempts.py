@@ -72,6 +72,10 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings))
+    if (
+        found.slower and not settings.effort.search.smooth
+    ):  # half of the tolerance is chords', which may take more
+        return Tried(steps=found.steps)
     return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps)
 
 

@@ -51,6 +51,7 @@ from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
 LONG = SIZES.searched_shared
+SLOWER = 1e-2  # what a start on a coarse grid may promise too much [-]
 # What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
 # other [-].
 SEARCHES = (1.0, 1.2, 2.3)
@@ -74,11 +75,13 @@ class Others(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the
-    steps of the motion."""
+    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, the steps
+    of the motion, and whether it takes longer than the one that it began with, which keeps limits at grid
+    points."""
 
     plan: Plan | None
     steps: int
+    slower: bool = False
 
 
 def searchable(job: Job, *, jerk_limited: bool) -> bool:
@@ -162,7 +165,7 @@ def joint_plan(
         tables=tables,
         notes=(*made.notes, *path_notes(job.toolpath, planned), *notes),
     )
-    return Joint(plan, steps)
+    return Joint(plan, steps, slower=bool(made.begin[-1] > (1.0 + SLOWER) * start.motion.end))
 
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:

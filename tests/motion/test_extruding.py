@@ -49,7 +49,10 @@ def test_a_limit_of_ones_own_along_the_path_says_the_same() -> None:
 
     text = "G21\nM83\nG1 X20 E1 F3000\nG1 X40 Y20 E1.4142135623730951\nG1 X40 Y40 E1\n"
     own = planned(
-        text.replace("E1.4142135623730951", "").replace("E1", ""), load_machine("router"), limits=[Fed()]
+        text.replace("E1.4142135623730951", "").replace("E1", ""),
+        load_machine("router"),
+        limits=[Fed()],
+        geometry="spline",
     )
     fed = planned(text, printer(50.0, 10.0, 200.0), effort="quick")
     assert own.trajectory is not None

@@ -76,7 +76,7 @@ def test_ten_per_cent_more_saves_what_was_foretold(program, limits):
 
 @pytest.mark.slow
 def test_on_splines_what_is_found_lies_in_the_range(program):
-    result = compared("own", program, MACHINE.with_own([Soft()]), "auto", ("velocity.soft", "jerk.soft"))
+    result = compared("own", program, MACHINE.with_own([Soft()]), "spline", ("velocity.soft", "jerk.soft"))
     rows = {row["limit"]: row for row in result["rows"]}
     assert rows["velocity.soft"]["found_s"] > 0.01 * result["cycle_time_s"]
     for row in rows.values():

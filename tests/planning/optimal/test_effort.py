@@ -10,19 +10,9 @@ from planner import plan
 from planner.base.errors import InputError
 from planner.base.names import EFFORTS as NAMES
 from planner.machine import load_machine
-from planner.machine.user_limit import PathLimit
 from planner.planning.optimal.effort import EFFORTS
 
 MACHINE = load_machine("mill")
-
-
-class Slow(PathLimit):
-    """A limit of one's own on the speed along the path."""
-
-    name = "slow"
-
-    def velocity(self, at):
-        return 50.0
 
 
 def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
@@ -62,11 +52,10 @@ def test_where_jerk_is_what_limits_rounds_do_not_find_what_the_default_finds():
 @pytest.mark.parametrize(
     "why",
     [
-        {"machine": MACHINE.with_own((Slow(),))},
         {"geometry": "spline"},
         {"rounds": 1},
     ],
-    ids=["a limit of one's own", "splines asked for", "rounds asked for"],
+    ids=["splines asked for", "rounds asked for"],
 )
 def test_what_the_search_does_not_know_is_planned_by_rounds(why):
     made = plan(problems.zigzag(4), **({"machine": MACHINE} | why))

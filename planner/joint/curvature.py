@@ -66,7 +66,7 @@ def _add_row(W, axes, one, other, by):
 
 @njit(cache=True, error_model="numpy")
 def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
-    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i, whose vectors are `of` (R,); G (14, A, A)
+    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i, whose vectors are `of` (R,); G (13, A, A)
     is overwritten."""
     axes, z, ratio = lin.n.shape[2], barrier.z[i], barrier.ratio[i]
     more = 8 * axes

@@ -94,7 +94,7 @@ def ordinates(x, u, counts, w, b):
 
 
 @njit(cache=True, error_model="numpy")
-def _multiply(table, one, other, value, of_one, of_other):
+def multiply(table, one, other, value, of_one, of_other):
     """The ordinates of a product into value (R,), by those of its factors, one (.., A) and other (.., A), and
     their derivatives by these into of_one (R, .., A) and of_other (R, .., A)."""
     for term in range(len(table)):
@@ -106,7 +106,7 @@ def _multiply(table, one, other, value, of_one, of_other):
 
 
 @njit(cache=True, error_model="numpy")
-def _through(x, u, of_w, of_b, by, out):
+def through(x, u, of_w, of_b, by, out):
     """out (4 A + 1,) += `by` times the derivatives of what has those by w and b, of_w (3, A) and of_b (2, A)."""
     axes = len(u) - 1
     h = u[axes]
@@ -117,6 +117,23 @@ def _through(x, u, of_w, of_b, by, out):
         out[2 * axes + k] += h * (0.5 * n1 + n2) + by * of_b[0, k] + m1
         out[3 * axes + k] += h * (0.5 * h * n2 + m1)
         out[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
+
+
+@njit(cache=True, error_model="numpy")
+def put_along(w, rest, value, of_w):
+    """Add the ordinates of v.e but the last, by those of the velocity w (3, A), to value (3,), and their derivatives
+    by w to of_w (3, 3, A): the directions e turn with w0 and w2. Returns the speeds at the ends together."""
+    axes = w.shape[1]
+    e, of_e, size = np.empty((2, axes)), np.zeros((3, 2, axes)), np.empty(2)
+    for end in range(2):
+        size[end] = np.sqrt(rest * rest + (w[2 * end] ** 2).sum())
+        e[end] = w[2 * end] / size[end]
+    multiply(PRODUCT, e, w, value, of_e, of_w)
+    for r in range(3):
+        for end in range(2):
+            along = (of_e[r, end] * e[end]).sum()
+            of_w[r, 2 * end] += (of_e[r, end] - along * e[end]) / size[end]
+    return size[0] + size[1]
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,12 +149,12 @@ def _put_speed(laws, i, m, x, u, f, by, g, out):
     axes, begin, end = len(u) - 1, laws.begin[i, m], laws.end[i, m]
     w, b, of_w, none = np.empty((3, axes)), np.empty((2, axes)), np.zeros((5, 3, axes)), np.zeros((2, axes))
     ordinates(x, u, laws.counts[m], w, b)
-    _multiply(SQUARE, w, w, g, of_w, of_w)
+    multiply(SQUARE, w, w, g, of_w, of_w)
     v0, v1 = begin * f[0], end * f[1]
     for r in range(ROWS_OF[SPEED]):
         per = 0.5 / square_at(begin, end, r)
         g[r] = per * (g[r] - square_at(v0, v1, r))
-        _through(x, u, of_w[r], none, per, out[r])
+        through(x, u, of_w[r], none, per, out[r])
         of_first = per * begin * (2.0 * FIRST[r] * v0 + BOTH[r] * v1)
         of_last = per * end * (2.0 * FIRST[4 - r] * v1 + BOTH[r] * v0)
         for k in range(4 * axes + 1):
@@ -149,26 +166,23 @@ def _put_pushed(laws, i, m, x, u, rest, f, by, g, out):
     """The rows of PUSH and of POWER, as `_put_speed`."""
     axes = len(u) - 1
     value, slope = np.zeros((2, 3)), np.zeros((2, 3, 4 * axes + 1))
-    w, b, e = np.empty((3, axes)), np.empty((2, axes)), np.empty((2, axes))
-    of_w, of_b, size = np.zeros((3, 3, axes)), np.zeros((3, 2, axes)), np.empty(2)
+    w, b, of_w, of_b = (
+        np.empty((3, axes)),
+        np.empty((2, axes)),
+        np.zeros((3, 3, axes)),
+        np.zeros((3, 2, axes)),
+    )
     ordinates(x, u, laws.counts[m], w, b)
-    _multiply(PRODUCT, b, w, value[0], of_b, of_w)
+    multiply(PRODUCT, b, w, value[0], of_b, of_w)
     for r in range(3):
-        _through(x, u, of_w[r], of_b[r], 1.0, slope[0, r])
+        through(x, u, of_w[r], of_b[r], 1.0, slope[0, r])
     if laws.kind[m] == POWER:
         value[1] = 1.0
     else:
-        for end in range(2):
-            size[end] = np.sqrt(rest * rest + (w[2 * end] ** 2).sum())
-            e[end] = w[2 * end] / size[end]
         of_w[:], of_b[:] = 0.0, 0.0
-        _multiply(PRODUCT, e, w, value[1], of_b, of_w)
+        put_along(w, rest, value[1], of_w)
         for r in range(3):
-            for end in range(2):  # by the directions, which turn with w0 and w2
-                along = (of_b[r, end] * e[end]).sum()
-                of_w[r, 2 * end] += (of_b[r, end] - along * e[end]) / size[end]
-                of_b[r, end] = 0.0
-            _through(x, u, of_w[r], of_b[r], 1.0, slope[1, r])
+            through(x, u, of_w[r], of_b[r], 1.0, slope[1, r])
     for r in range(3):
         begin, end = laws.node[i, m] if r == 0 else laws.begin[i, m], laws.end[i, m]
         bound = begin * f[0] + (end * f[1] - begin * f[0]) * r / 3.0
@@ -273,7 +287,7 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
             y[1] = w[1]
             value = _of_joint(laws, i, i + 1, m, 1, y, u, by)
             w[:], b[:], w[1] = 0.0, 0.0, by[1]
-            _through(x, u, w, b, 1.0, row)
+            through(x, u, w, b, 1.0, row)
             y[1], by[1] = speed, 0.0
         else:
             first = i if kind == JOINT_PUSH else i + place

@@ -27,7 +27,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.joint.laws import REST
+from planner.joint.laws import PRODUCT, REST, multiply, ordinates, put_along, through
 
 BETWEEN = 2  # ordinates between the nodes
 # What a change of the velocity by itself costs in one iteration: this, and so many times the multipliers of the
@@ -53,48 +53,6 @@ def turns_far(velocity: FloatArray) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def _ordinates_of_step(x, u, b, w):
-    """b (2, A) and w (3, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
-    axes = len(u) - 1
-    h = u[axes]
-    for k in range(axes):
-        v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        b[0, k], b[1, k] = a, a + h * j
-        w[0, k], w[1, k], w[2, k] = v, v + 0.5 * h * a, v + h * (a + 0.5 * h * j)
-
-
-@njit(cache=True, error_model="numpy")
-def _weighted(r, b, w, of_b, of_w):
-    """What c_r is multiplied by: c = sum of b_m x of_w_m = sum of of_b_n x w_n, of_w (2, A), of_b (3, A)."""
-    third, two = 1.0 / 3.0, 2.0 / 3.0
-    for k in range(b.shape[1]):
-        if r == 0:
-            of_w[0, k], of_w[1, k] = two * w[1, k], third * w[0, k]
-            of_b[0, k], of_b[1, k], of_b[2, k] = third * b[1, k], two * b[0, k], 0.0
-        else:
-            of_w[0, k], of_w[1, k] = third * w[2, k], two * w[1, k]
-            of_b[0, k], of_b[1, k], of_b[2, k] = 0.0, two * b[1, k], third * b[0, k]
-
-
-@njit(cache=True, error_model="numpy")
-def _along(w, rest, e, size):
-    """d (2,) of a step; e (2, A) and size (2,) become the directions and the speeds at its ends."""
-    axes = w.shape[1]
-    for end in range(2):
-        size[end] = rest * rest
-        for k in range(axes):
-            size[end] += w[2 * end, k] ** 2
-        size[end] = np.sqrt(size[end])
-        for k in range(axes):
-            e[end, k] = w[2 * end, k] / size[end]
-    d0, d1 = 0.0, 0.0
-    for k in range(axes):
-        d0 += (w[0, k] * e[1, k] + 2.0 * w[1, k] * e[0, k]) / 3.0
-        d1 += (2.0 * w[1, k] * e[1, k] + w[2, k] * e[0, k]) / 3.0
-    return d0, d1
-
-
-@njit(cache=True, error_model="numpy")
 def _put_turning_rows(bound, x, u, g, out):
     """`put_normal_rows` of a step that turns far."""
     axes, per = len(u) - 1, 1.0 / (bound * bound)
@@ -117,55 +75,35 @@ def put_normal_rows(bound, pace, turns, x, u, g, out):
     if turns:
         _put_turning_rows(bound, x, u, g, out)
         return
-    axes, rest = len(u) - 1, REST * pace
-    b, w, c = np.empty((2, axes)), np.empty((3, axes)), np.empty((axes, axes))
-    of_b, of_w, e, size = np.empty((3, axes)), np.empty((2, axes)), np.empty((2, axes)), np.empty(2)
+    axes = len(u) - 1
+    b, w, c, d = np.empty((2, axes)), np.empty((3, axes)), np.empty((axes, axes)), np.zeros(3)
+    of_b, of_w, of_d = np.zeros((3, 2, axes)), np.zeros((3, 3, axes)), np.zeros((3, 3, axes))
     by_b, by_w = np.empty((2, axes)), np.empty((3, axes))
-    _ordinates_of_step(x, u, b, w)
-    ds = _along(w, rest, e, size)
+    ordinates(x, u, np.ones(axes), w, b)
+    multiply(PRODUCT, b, w, np.zeros(3), of_b, of_w)
+    least = LEAST * put_along(w, REST * pace, d, of_d)
+    out[:] = 0.0
     for r in range(BETWEEN):
-        d, square = ds[r], 0.0
-        _weighted(r, b, w, of_b, of_w)
+        along, square = d[r + 1], 0.0
+        times_b, times_w = of_b[r + 1], of_w[r + 1]  # c is the sum of b_m x times_b_m, and of times_w_n x w_n
         for k in range(axes):
             for m in range(axes):
-                c[k, m] = b[0, k] * of_w[0, m] - of_w[0, k] * b[0, m]
-                c[k, m] += b[1, k] * of_w[1, m] - of_w[1, k] * b[1, m]
+                c[k, m] = b[0, k] * times_b[0, m] - times_b[0, k] * b[0, m]
+                c[k, m] += b[1, k] * times_b[1, m] - times_b[1, k] * b[1, m]
                 square += 0.5 * c[k, m] ** 2
-        per = 1.0 / (bound * max(d, LEAST * (size[0] + size[1]))) ** 2
-        g[r] = 0.5 * per * (square - bound * bound * d * abs(d))
-        turned = (0.0, 0.0)  # w_1 and the far end along the direction of each end
+        per = 1.0 / (bound * max(along, least)) ** 2
+        push = per * bound * bound * abs(along)
+        g[r] = 0.5 * (per * square - push * along)
+        by_b[:] = 0.0
         for k in range(axes):
-            far = w[2, k] * e[0, k] if r else w[0, k] * e[1, k]
-            near = w[1, k] * (e[1, k] if r else e[0, k])
-            turned = (turned[0] + near, turned[1] + far)
-        # w_1 counts along the direction at one end, that of it along the other
-        at, other = (1, 0) if r else (0, 1)
-        push = per * bound * bound * abs(d) / 3.0
-        for k in range(axes):
-            for m in range(2):
-                by_b[m, k] = 0.0
-                for n in range(axes):
-                    by_b[m, k] += per * c[k, n] * of_w[m, n]
             for m in range(3):
-                by_w[m, k] = 0.0
-                for n in range(axes):
-                    by_w[m, k] -= per * c[k, n] * of_b[m, n]
-            by_w[1, k] -= push * 2.0 * e[at, k]
-            by_w[2 * at, k] -= push * (e[other, k] + 2.0 * (w[1, k] - turned[0] * e[at, k]) / size[at])
-            by_w[2 * other, k] -= push * (w[2 * at, k] - turned[1] * e[other, k]) / size[other]
-        out[r] = 0.0
-        for k in range(axes):
-            _chain(out[r], axes, k, by_b, by_w, x, u)
-
-
-@njit(cache=True, error_model="numpy")
-def _chain(out, axes, k, by_b, by_w, x, u):
-    """out (4 A + 1,) += what comes of the derivatives by_b (2, A) and by_w (3, A) by the ordinates of an axis."""
-    h, a, j = u[axes], x[2 * axes + k], u[k]
-    out[axes + k] = by_w[0, k] + by_w[1, k] + by_w[2, k]
-    out[2 * axes + k] = by_b[0, k] + by_b[1, k] + h * (0.5 * by_w[1, k] + by_w[2, k])
-    out[3 * axes + k] = h * (by_b[1, k] + 0.5 * h * by_w[2, k])
-    out[4 * axes] += by_b[1, k] * j + 0.5 * by_w[1, k] * a + by_w[2, k] * (a + h * j)
+                by_w[m, k] = -push * of_d[r + 1, m, k]
+            for n in range(axes):
+                for m in range(2):
+                    by_b[m, k] += per * c[k, n] * times_b[m, n]
+                for m in range(3):
+                    by_w[m, k] -= per * c[k, n] * times_w[m, n]
+        through(x, u, by_w, by_b, 1.0, out[r])
 
 
 @njit(cache=True, error_model="numpy")
@@ -184,27 +122,24 @@ def add_normal_curvature(W, bound, pace, turns, x, u, z):
                     for m in range(n + 1):
                         W[at[n], at[m]] += z[r] * per * by[n] * by[m]
         return
-    axes, rest = len(u) - 1, REST * pace
-    b, w, slope = np.empty((2, axes)), np.empty((3, axes)), np.empty(4 * axes + 1)
-    of_b, of_w, e, size = np.empty((3, axes)), np.empty((2, axes)), np.empty((2, axes)), np.empty(2)
+    axes = len(u) - 1
+    b, w, d, slope = np.empty((2, axes)), np.empty((3, axes)), np.zeros(3), np.empty(4 * axes + 1)
+    of_b, of_w, of_d = np.zeros((3, 2, axes)), np.zeros((3, 3, axes)), np.zeros((3, 3, axes))
     by_b, by_w, index = np.empty((2, axes)), np.empty((3, axes)), np.empty(7, np.int64)
-    _ordinates_of_step(x, u, b, w)
-    ds = _along(w, rest, e, size)
+    ordinates(x, u, np.ones(axes), w, b)
+    multiply(PRODUCT, b, w, np.zeros(3), of_b, of_w)
+    least = LEAST * put_along(w, REST * pace, d, of_d)
+    index[6] = 4 * axes
     for r in range(BETWEEN):
-        by = z[r] / (bound * max(ds[r], LEAST * (size[0] + size[1]))) ** 2
-        _weighted(r, b, w, of_b, of_w)
+        by = z[r] / (bound * max(d[r + 1], least)) ** 2
         for k in range(axes):
             for m in range(k):  # c[k, m]
-                slope[4 * axes] = 0.0
-                for n in range(2):
-                    by_b[n, k], by_b[n, m] = of_w[n, m], -of_w[n, k]
-                for n in range(3):
-                    by_w[n, k], by_w[n, m] = -of_b[n, m], of_b[n, k]
-                _chain(slope, axes, k, by_b, by_w, x, u)
-                _chain(slope, axes, m, by_b, by_w, x, u)
+                slope[:], by_b[:], by_w[:] = 0.0, 0.0, 0.0
+                by_b[:, k], by_b[:, m] = of_b[r + 1, :, m], -of_b[r + 1, :, k]
+                by_w[:, k], by_w[:, m] = -of_w[r + 1, :, m], of_w[r + 1, :, k]
+                through(x, u, by_w, by_b, 1.0, slope)
                 for s in range(3):
                     index[2 * s], index[2 * s + 1] = (s + 1) * axes + m, (s + 1) * axes + k
-                index[6] = 4 * axes
                 for s in range(7):
                     for t in range(s + 1):
                         W[index[s], index[t]] += by * slope[index[s]] * slope[index[t]]

@@ -100,8 +100,8 @@ class Linear(NamedTuple):
     g: FloatArray  # (N, R)
     n: FloatArray  # (N, R, A) dg/dy
     node: FloatArray  # (N, 3, A) dg/dy by the second vectors of rows that have one
-    alpha: FloatArray  # (N, 14, 4)
-    e: FloatArray  # (N, 14, A)
+    alpha: FloatArray  # (N, 13, 4)
+    e: FloatArray  # (N, 13, A)
     tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
     place: FloatArray  # (N, 3) of those along the leg
     radius: FloatArray  # (N, 3) of the rows of the feed
@@ -116,7 +116,7 @@ def count(axes):
 
 @njit(cache=True, error_model="numpy")
 def vectors_of_step(x, u, axes, y, alpha, e):
-    """y (14, A), alpha (14, 4) and e (14, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
+    """y (13, A), alpha (13, 4) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h = u[axes]
     alpha[:] = 0.0
     vv, va = 0.0, 0.0

@@ -135,15 +135,6 @@ class LimitsInForce:
             per = SECONDS_PER_MINUTE if quantity == "velocity" else 1.0
             self._set(quantity, {axis: given[""]}, per=per)
 
-    def _take_factor(self, given: Mapping[str, float], state: State, line: int) -> None:
-        if "b" in given:
-            self._kept = state.feed_factor
-        factor = self._kept if "r" in given else state.feed_factor
-        factor = given["s"] / 100.0 if "s" in given else factor
-        state.feed *= factor / state.feed_factor
-        state.feed_factor = factor
-        self.factors.append((line, factor))
-
     def _take_velocity_limit(self, given: Mapping[str, float], line: int, findings: Findings) -> None:
         if "accel" in given:
             self._along = self._along or line

@@ -26,9 +26,9 @@ from planner.verifier import OF_CHORDS, Kind, Verdict
 # So often a motion is mended and judged again, at other times each time: an excess may be larger between the
 # places looked at before.
 ROUNDS = 6
-# From this round on all of the motion is slower, twice as much as its worst place asks for, if that is no more
-# than `LITTLE`: 800 runs at their jerk, mended at 19 places, showed 10 others, then 6, 4, 2, 1, 1, 1 and 2.
-EVERYWHERE, LITTLE, TWICE = 4, 1e-3, 2.0
+# Rounds may find a few other places each time, between those that were looked at: from this round on all of the
+# motion is slower, by so many times what its worst place asks for, if that is no more than `LITTLE` [-].
+EVERYWHERE, TWICE, LITTLE = 4, 2.0, 1e-3
 MOST_SLOWER = 2.0  # [-]
 # What is slowed down is slowed down by this much more [-], and so many times that each time again.
 MORE, MORE_AGAIN = 1e-5, 4.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
+from planner.joint import guess as guesses
 from planner.joint import run as run_module
 from planner.joint.checks import bend_of
 from planner.joint.guess import Guess
@@ -131,3 +134,16 @@ def test_settings_and_guesses_are_checked():
         TubeNLP(tol=0)
     with pytest.raises(ValueError, match=r"Guess\.h"):
         Guess(leg=np.zeros(1), h=np.zeros(1), state=np.zeros((2, 3, 2)), place=np.zeros((1, 4)))
+
+
+def test_a_jump_between_two_samples_at_nearly_the_same_time_is_spread() -> None:
+    """Or the steps that it is worth, where no jerk is limited, would have no length."""
+    (run,) = tube_runs_of(toolpath_from_program(ARCS, MACHINE), MACHINE, jerk_limited=False)
+    apart = guesses.SEEN * guesses.unit_of(run)
+    t = apart * np.array([0.0, 1.5, 3.0 - 1e-6, 3.0 + 1e-6, 4.5, 6.0])
+    pushed = np.zeros((6, len(run.axis)))
+    pushed[3:] = run.acceleration
+    motion = SimpleNamespace(t=t, acceleration=pushed)
+    spent = guesses._busy(run, motion, guesses.unit_of(run))
+    assert spent[-1] > 0.0
+    assert np.diff(spent)[2] < 1e-5 * spent[-1]

@@ -75,6 +75,15 @@ def test_ten_per_cent_more_saves_what_was_foretold(program, limits):
 
 
 @pytest.mark.slow
+def test_what_more_speed_saves_the_joint_search_is_foretold(program):
+    """Within its range; the jerk of this limit, worth a thousandth of the time, was foretold at twice of it: not held."""
+    result = compared("own", program, MACHINE.with_own([Soft()]), "auto", ("velocity.soft",))
+    (row,) = result["rows"]
+    assert row["found_s"] > 0.05 * result["cycle_time_s"]
+    assert row["right"], row
+
+
+@pytest.mark.slow
 def test_on_splines_what_is_found_lies_in_the_range(program):
     result = compared("own", program, MACHINE.with_own([Soft()]), "spline", ("velocity.soft", "jerk.soft"))
     rows = {row["limit"]: row for row in result["rows"]}

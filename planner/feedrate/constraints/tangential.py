@@ -11,8 +11,7 @@ where l' = 1 and the others are 0 if no other axes move, and of a motion in time
 
 Rotary axes and u, v, w do not count: turning alone is not limited by them. No motion has more acceleration
 than the norm of what x, y and z accelerate with: a limit above that is none, and nothing is done for it. The
-jerk along a path that turns may be more than that of the axes together. (Beudaert, Lavernhe and Tournier,
-IJMTM 57, 2012, limit it so.)
+jerk along a path that turns may be more than that of the axes together.
 """
 
 from __future__ import annotations

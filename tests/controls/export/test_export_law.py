@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import planner
-from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, filament, path, readable, unknown_words
+from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, path, readable, unknown_words
 from benchmarks.controls.export_programs import AXIS, TOLERANCE, machine, random_print, random_program
 from benchmarks.controls.export_rows import judged, of_file
+from benchmarks.controls.filament_judge import filament
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS, OPTIONS

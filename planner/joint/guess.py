@@ -128,7 +128,7 @@ def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
     return least
 
 
-def _busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
+def busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
     """(T,) how long the jerk has been at its limit until the samples, or without one, where accelerations jump,
     how long it would have been at its scale [s]."""
     if np.isfinite(run.jerk).all():
@@ -148,7 +148,7 @@ def _busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
 def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
     unit = unit_of(run)
-    spent = _busy(run, motion, unit) * cut.per_unit / unit
+    spent = busy(run, motion, unit) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
     # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from
     # that of the run

@@ -144,6 +144,6 @@ def test_a_jump_between_two_samples_at_nearly_the_same_time_is_spread() -> None:
     pushed = np.zeros((6, len(run.axis)))
     pushed[3:] = run.acceleration
     motion = SimpleNamespace(t=t, acceleration=pushed)
-    spent = guesses._busy(run, motion, guesses.unit_of(run))
+    spent = guesses.busy(run, motion, guesses.unit_of(run))
     assert spent[-1] > 0.0
     assert np.diff(spent)[2] < 1e-5 * spent[-1]

@@ -36,7 +36,7 @@ from planner.nc.reader import read_program
 from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.tube import TubeMethod
-from planner.sensitivity.savings import more_of
+from planner.sensitivity.prices import more_of
 
 RATIOS = 0.98, 1.02, 1.1
 WORTH = 3e-4  # by how much a limit's 2 % have to change the time to be planned again [share of the time]
@@ -84,7 +84,7 @@ def changes(
         small = foretold(plan, machine, Setting(name=key, value=0.98 * value), tolerance)
         for ratio in RATIOS if small.least >= WORTH * cycle_time else ():
             told = foretold(plan, machine, Setting(name=key, value=ratio * value), tolerance)
-            changed = more_of(machine, name)(ratio - 1.0)
+            changed = more_of(machine, name, ratio - 1.0)
             yield name, ratio, told, partial(planned, program, changed)
     for ratio in RATIOS if -prices.feed * 0.02 >= WORTH * cycle_time else ():
         told = foretold(plan, machine, Setting(name="feed", value=ratio), tolerance)

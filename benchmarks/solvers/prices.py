@@ -28,11 +28,10 @@ from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.planning.job.plan import Plan
-from planner.sensitivity.path_prices import WORTH
-from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE
-from planner.sensitivity.savings import more_of
+from planner.sensitivity.prices import HINT, HINT_LEAST, MORE_LIMIT, MORE_TOLERANCE, more_of
 
 CORNERS = ("bezier", "auto")
+WORTH = 5e-4  # what is foretold to save less is not planned again [share of the time]
 NC = Path("../shared/nc")
 BRACKET = Path(planner.__file__).parent / "examples" / "bracket.ngc"
 RELIEF_BLOCKS, RELIEF_ROW, RELIEF_STEP = 400, 100, 0.3  # [-, blocks, mm]
@@ -82,7 +81,7 @@ def with_more(program: Program, machine: Machine, name: str) -> tuple[Program, M
     if name == "tolerance":
         return program, machine.model_copy(update={"tolerance": machine.tolerance + MORE_TOLERANCE})
     if name != "feed":
-        return program, more_of(machine, name)(MORE_LIMIT)
+        return program, more_of(machine, name, MORE_LIMIT)
     if machine.feed_max is not None:
         machine = machine.model_copy(update={"feed_max": machine.feed_max * (1.0 + MORE_LIMIT)})
     return dataclasses.replace(program, feed=program.feed * (1.0 + MORE_LIMIT)), machine

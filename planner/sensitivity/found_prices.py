@@ -29,9 +29,8 @@ from planner.joint.own_laws import Where, motion_at
 from planner.joint.parts import FoundRun
 from planner.joint.run import budgets_of
 from planner.machine import Machine
-from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, price_list
+from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, more_of, price_list
 from planner.sensitivity.records import PlacePrices, PriceList
-from planner.sensitivity.savings import more_of
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
 # By how much a plan made again is faster or slower for no other reason [share of the time]
@@ -136,7 +135,6 @@ def found_prices(
         toolpath,
         cycle_time,
         bounds={FEED.name: fsum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)},
-        solved={},
         unrest=UNREST,
         corners=dearest(toolpath, of_tolerance.alone),
         places=_by_place(toolpath, runs, of_tolerance.together),
@@ -155,7 +153,7 @@ def _of_limits(
             name = kind.called(axis)
             limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
             if kind is ACCELERATION:
-                slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name)(STEP))
+                slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name, STEP))
     for run in runs:
         for name, (least, cost) in run.of_laws().items():
             limit[name] = min(least, limit.get(name, np.inf))

@@ -16,8 +16,7 @@ Splines are shaped by a problem of their own, which has the tolerance among its 
 reshaping (planning/optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a
 multiplier, added up at the nearest joint of the program. Accelerations are priced with the path as it is.
 
-**Finite changes** are foretold as prices.py says; on rounded corners, where that is cheap, the problem is
-solved again with what saves `WORTH` of the time (savings.py), which is right to within a few per cent.
+**Finite changes** are foretold as prices.py says.
 
 **Long periods.** Where chords between samples use more than `CHORDS` of the tolerance, a faster motion may
 need some of it back (delivery/periods.py), which no multiplier knows: 10 % more feed saved 16 % less than the
@@ -41,15 +40,16 @@ from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution, Prices
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
-from planner.sensitivity.corner_prices import corner_prices, sums
+from planner.sensitivity.corner_prices import RoundedPath, sums
 from planner.sensitivity.places import bounds_but_speeds, bounds_with, by_place
-from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, STEP, TOLERANCE, dearest, price_list
+from planner.sensitivity.prices import MORE_LIMIT, STEP, WITHIN, dearest, more_of, price_list
 from planner.sensitivity.records import PriceList
-from planner.sensitivity.savings import Change, more_of, solved_again
 
-WORTH = 5e-4  # what by its slope saves less is not solved for [share of the time]; it stands in no table
 # By how much a plan on splines, made again, is faster or slower for no other reason [share of the time].
 UNREST = 1e-3
+# How much less than foretold more of a limit may save on rounded corners [-]: soon another limit holds there, and
+# the path does not adapt (benchmarks/solvers/prices.py).
+LESS = 0.5
 CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
 
 
@@ -78,49 +78,36 @@ def path_prices(
     prices = solution.prices
     assert prices is not None  # solvers that give multipliers give prices
     limit, slope = _by_share(problem, prices)
-    changes = {name: Change(machine=more_of(machine, name)) for name in limit}
-    changes[FEED.name] = Change(machine=lambda share: machine, feed=lambda share: 1.0 + share)
-    velocities = [name for name in map(VELOCITY.called, problem.axes) if name in limit]
-    bounds = {}
-    for name in (FEED.name, *(name for name in velocities if slope[name] < 0.0)):
-        slope[name] = _by_speed(samples, problem, now, changes[name], rest)
-        more = bounds_with(samples, changes[name], MORE_LIMIT, rest)
-        bounds[name] = -2.0 * float(now.feed_sq_max @ (1.0 - np.sqrt(problem.feed_sq_max / more)))
-    dear, tolerance, together, corners, solved = None, None, None, None, {}
+    velocities = [name for name in map(VELOCITY.called, problem.axes) if slope.get(name, 0.0) < 0.0]
+    more, saved = {}, {}
+    for name in (FEED.name, *velocities):
+        slope[name] = _by_speed(samples, problem, now, (machine, name), rest)
+        more[name] = bounds_with(samples, machine, name, MORE_LIMIT, rest)
+        saved[name] = -2.0 * float(now.feed_sq_max @ (1.0 - np.sqrt(problem.feed_sq_max / more[name])))
+    dear, together, rounded = None, None, None
     if by_site is not None:
         together = _by_joint(path, by_site.place, by_site.price)
-        tolerance = float(together.sum())
         alone = np.zeros(len(path.toolpath) + 1)
         alone[path.legs.first] = together
         dear = dearest(path.toolpath, alone)
     elif isinstance(path, SmoothPath) and not len(path.spline):
-        corners = corner_prices(path, samples, problem, solution, machine, now)
-        for axis in problem.axes[: problem.machine_axes]:
-            slope[ACCELERATION.called(axis)] += corners.by_acceleration(axis)
-        together = corners.by_tolerance()
-        tolerance = float(together.sum()) + corners.between()
-        dear = corners.dearest(together)
-        wider = Change(
-            machine=lambda share: machine, tolerance=lambda share: share / MORE_LIMIT * MORE_TOLERANCE
-        )
-        straight = {name: bounds.get(name, -price * MORE_LIMIT) for name, price in slope.items()}
-        straight[TOLERANCE] = -MORE_TOLERANCE * tolerance
-        worth = [name for name, saved in straight.items() if abs(saved) >= WORTH * cycle_time]
-        worth.sort(key=lambda name: -abs(straight[name]))
-        changes[TOLERANCE] = wider
-        solved = solved_again(samples, problem, {name: changes[name] for name in worth}, MORE_LIMIT)
+        rounded = RoundedPath(samples, path, problem, solution, machine, now)
+        for name in map(ACCELERATION.called, problem.axes[: problem.machine_axes]):
+            slope[name] = float(rounded.change(more_of(machine, name, STEP)).sum()) / STEP
+        together = rounded.by_tolerance()
+        dear = dearest(path.toolpath, rounded.alone(together))
     return price_list(
         limit,
         slope,
-        tolerance,
+        None if together is None else float(together.sum()),
         path.toolpath,
         cycle_time,
-        bounds=bounds,
-        solved=solved,
-        unrest=UNREST if corners is None else 0.0,
+        bounds=saved,
+        unrest=UNREST if rounded is None else 0.0,
+        less=WITHIN if rounded is None else LESS,
         unsure=_chord_use(samples, solution, machine) > CHORDS,
         corners=dear,
-        places=by_place(samples, problem, now, changes[FEED.name], together, rest),
+        places=by_place(samples, problem, now, more[FEED.name], together),
     )
 
 
@@ -149,11 +136,15 @@ def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatAr
 
 
 def _by_speed(
-    samples: PathSamples, problem: FeedrateProblem, now: Lagrangian, change: Change, rest: FloatArray | None
+    samples: PathSamples,
+    problem: FeedrateProblem,
+    now: Lagrangian,
+    of: tuple[Machine, str],
+    rest: FloatArray | None,
 ) -> float:
     """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the
     other one that stays."""
-    gained = np.log(bounds_with(samples, change, STEP, rest) / problem.feed_sq_max)
+    gained = np.log(bounds_with(samples, *of, STEP, rest) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 

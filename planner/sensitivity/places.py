@@ -26,9 +26,8 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.lagrangian import Lagrangian
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
-from planner.sensitivity.prices import MORE_LIMIT
+from planner.sensitivity.prices import MORE_LIMIT, more_of
 from planner.sensitivity.records import PlacePrices
-from planner.sensitivity.savings import Change
 
 SPEEDS = (FEED, VELOCITY)
 
@@ -37,21 +36,18 @@ def by_place(
     samples: PathSamples,
     problem: FeedrateProblem,
     now: Lagrangian,
-    faster: Change,
+    faster: FloatArray,
     by_joint: FloatArray | None,
-    rest: FloatArray | None = None,
 ) -> PlacePrices:
     """The prices of a solution by place.
 
     now      : the Lagrangian at the solution
-    faster   : more of the programmed feed
+    faster   : (P,) the bounds of feed^2 with `MORE_LIMIT` more of the programmed feed [mm2/s2]
     by_joint : (R+1,) dT/d(tolerance) at the joints of the path's legs [s/mm]; None where it is not known
-    rest     : what `bounds_but_speeds` gives
     """
     segments = len(samples.path.toolpath)
-    share = 1.0 - np.sqrt(problem.feed_sq_max / bounds_with(samples, faster, MORE_LIMIT, rest))
     all_limits = -(now.rows + 2.0 * now.feed_sq_max) * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-    of_feed = -2.0 * now.feed_sq_max * share
+    of_feed = -2.0 * now.feed_sq_max * (1.0 - np.sqrt(problem.feed_sq_max / faster))
     tolerance = None
     if by_joint is not None and isinstance(samples.path, SmoothPath):
         tolerance = np.zeros(segments + 1)
@@ -64,16 +60,19 @@ def by_place(
 
 
 def bounds_with(
-    samples: PathSamples, change: Change, share: float, rest: FloatArray | None = None
+    samples: PathSamples, machine: Machine, name: str, share: float, rest: FloatArray | None = None
 ) -> FloatArray:
-    """(P,) bounds of feed^2 with a share more feed or axis velocity [mm2/s2].
+    """(P,) bounds of feed^2 with a share more of the programmed feed or of an axis velocity, by its `name`
+    [mm2/s2].
 
     rest : the bounds by all other limits, from `bounds_but_speeds`, if they are known
     """
     toolpath = samples.path.toolpath
-    faster = dataclasses.replace(toolpath, feed=toolpath.feed * change.feed(share))
-    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=faster))
-    machine = change.machine(share)
+    if name == FEED.name:
+        toolpath = dataclasses.replace(toolpath, feed=toolpath.feed * (1.0 + share))
+    else:
+        machine = more_of(machine, name, share)
+    there = dataclasses.replace(samples, path=dataclasses.replace(samples.path, toolpath=toolpath))
     if rest is None:
         return feedrate_problem(there, machine).feed_sq_max
     return np.minimum(rest, bounds_of(there, machine, SPEEDS))

@@ -23,15 +23,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
+from planner.base.arrays import FloatArray
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, LIMITS, VELOCITY
 from planner.feedrate.constraints.limits import POWER as DRIVE_POWER
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.machine.user_limit import ScaledLimit
 from planner.sensitivity.records import SAVED_MIN, DearCorners, PlacePrices, PriceList
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and of the tolerance [mm]
-STEP = 1e-4  # relative steps of differences [-]: far above rounding, far below what bends a curve
+# Relative steps of differences [-]: far above rounding, far below what bends a curve, and so small that no leg
+# between rounded corners is opened or closed by it.
+STEP = 1e-6
 DEAREST = 10  # corners that are listed
 TOLERANCE = "tolerance"
 # T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with
@@ -82,11 +86,12 @@ class Priced(NamedTuple):
         n = POWER[self.kind]
         return -self.slope / n * (1.0 - self.ratio**-n)
 
-    def saving(self, bound: float) -> Saving:
-        """The least and the most of it, where it is at most `bound` [s]."""
+    def saving(self, bound: float, less: float) -> Saving:
+        """The least and the most of it, where it is at most `bound` [s]; `less` as in `price_list`."""
         saved = min(self.saved(), bound)
         partly = bound < (1.0 - ROUNDING) * self.saved()
-        least = 1.0 - (2.0 if partly else 1.0) * WITHIN
+        sure = not partly and self.kind in (FEED.name, TOLERANCE)
+        least = 1.0 - max(WITHIN if sure else less, 2.0 * WITHIN if partly else WITHIN)
         return Saving(*sorted((least * saved, (1.0 + WITHIN) * saved)))
 
 
@@ -98,8 +103,8 @@ def price_list(
     cycle_time: float,
     *,
     bounds: Mapping[str, float],
-    solved: Mapping[str, float],
     unrest: float,
+    less: float = WITHIN,
     unsure: bool = False,
     corners: DearCorners | None,
     places: PlacePrices,
@@ -110,8 +115,9 @@ def price_list(
     slope     : dT/d(ln limit) of these and of the feed [s]
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
     bounds    : what more of a limit saves at most, by name [s]
-    solved    : what it saves where that was solved for [s]
     unrest    : by how much a motion made again is faster or slower for no other reason [share of the time]
+    less      : by how much more of a limit may save less than it is foretold to [-]; of the feed, where it holds
+                all of the motion, by `WITHIN`
     unsure    : whether more of anything may save nothing
     """
     present = _present(toolpath)
@@ -120,8 +126,7 @@ def price_list(
         more[TOLERANCE] = Priced(TOLERANCE, tolerance * present, 1.0 + MORE_TOLERANCE / present)
     saved, ranges = {}, {}
     for name, priced in more.items():
-        known = solved.get(name)
-        saving = priced.saving(bounds.get(name, np.inf)) if known is None else Saving(known, known)
+        saving = priced.saving(bounds.get(name, np.inf), less)
         if unsure:
             saving = Saving(min(saving.least, 0.0), saving.most)
         saving = saving.widened(unrest * cycle_time)
@@ -149,19 +154,28 @@ def dearest(toolpath: Toolpath, price: FloatArray) -> DearCorners:
     """The joints where more tolerance saves most, by the `price` (M+1,) of each [s/mm]."""
     tolerance, n = toolpath.tolerance, POWER[TOLERANCE]
     saved = -price * tolerance / n * (1.0 - (1.0 + MORE_TOLERANCE / tolerance) ** -n)
-    return dearest_of(toolpath, np.arange(len(price)), price, saved)
-
-
-def dearest_of(toolpath: Toolpath, joint: Array, price: FloatArray, saved: FloatArray) -> DearCorners:
-    """The dearest of each `joint` (n,) of a toolpath with its `price` (n,) [s/mm] and what `MORE_TOLERANCE`
-    saved there (n,) [s]."""
     best = np.argsort(-saved, kind="stable")[:DEAREST]
     best = best[saved[best] >= SAVED_MIN]
-    at = joint[best]
     return DearCorners(
-        line=toolpath.line[at - 1],
-        position=toolpath.end[at - 1],
-        theta=toolpath.theta[at],
+        line=toolpath.line[best - 1],
+        position=toolpath.end[best - 1],
+        theta=toolpath.theta[best],
         price=price[best],
         saved=saved[best],
     )
+
+
+def more_of(machine: Machine, name: str, share: float) -> Machine:
+    """The machine with a share more of a limit: "velocity.x" of an axis, one with a key of its own in the
+    machine file, or "velocity.NAME" of a limit of one's own, whose bound of that quantity is then so much
+    larger everywhere."""
+    quantity, _, of = name.partition(".")
+    key = {limit.name: limit.key for limit in LIMITS if limit.key}.get(name)
+    if key is not None:
+        return machine.model_copy(update={key: getattr(machine, key) * (1.0 + share)})
+    if of in machine.axes:
+        limits = machine.axes[of]
+        larger = limits.model_copy(update={quantity: getattr(limits, quantity) * (1.0 + share)})
+        return machine.model_copy(update={"axes": machine.axes | {of: larger}})
+    own = [ScaledLimit(limit, quantity, 1.0 + share) if limit.name == of else limit for limit in machine.own]
+    return machine.with_own(own)

@@ -20,8 +20,7 @@ from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.tube import TubeMethod
 from planner.sensitivity.found_prices import found_prices
-from planner.sensitivity.prices import MORE_LIMIT
-from planner.sensitivity.savings import more_of
+from planner.sensitivity.prices import MORE_LIMIT, more_of
 
 MACHINE = problems.machine()
 PROGRAM = problems.polyline([[0, 0], [6, 0], [9, 4], [4, 7]], feed=90.0)
@@ -53,7 +52,7 @@ def foretold(setting: Setting) -> float:
 def test_a_plan_with_another_limit_takes_what_was_foretold(limit, ratio):
     quantity, _, axis = limit.partition(".")
     value = ratio * getattr(MACHINE.axes[axis], quantity)
-    again = made(machine=more_of(MACHINE, limit)(ratio - 1.0))
+    again = made(machine=more_of(MACHINE, limit, ratio - 1.0))
     change = time_of(again) - time_of(first())
     told = foretold(Setting(name=f"axes.{axis}.{quantity}", value=value))
     assert told == pytest.approx(change, rel=0.1, abs=NOISE * time_of(first()))
@@ -114,7 +113,7 @@ def test_where_accelerations_take_from_the_tolerance_that_is_priced_too():
     """Eq. (20) at a period of 4 ms: more acceleration along an axis leaves less to round with; planned again."""
     machine = MACHINE.model_copy(update={"dt": 0.004})
     before = made(machine=machine)
-    again = made(machine=more_of(machine, "acceleration.y")(0.05))
+    again = made(machine=more_of(machine, "acceleration.y", 0.05))
     told = before.prices.limits["acceleration.y"] * 0.05 * machine.axes["y"].acceleration
     # the reserve follows the motion that is found (joint/refine.py), which the price does not know
     assert told == pytest.approx(time_of(again) - time_of(before), rel=0.2, abs=NOISE * time_of(before))

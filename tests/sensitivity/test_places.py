@@ -18,7 +18,6 @@ from planner.planning.job.plan import Plan
 from planner.sensitivity.places import bounds_but_speeds, bounds_with
 from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.records import PlacePrices
-from planner.sensitivity.savings import Change, more_of
 
 MILL = load_machine("mill")
 TENTH = 1.0 - 1.0 / (1.0 + MORE_LIMIT)
@@ -80,10 +79,9 @@ def test_bounds_of_speeds_beside_those_of_all_other_limits_are_the_bounds_of_all
     toolpath = dataclasses.replace(given, feed=fast * given.feed)
     path = round_corners(toolpath, MILL, BezierCorner(), blend_tangents=True)
     samples = sample_path(path, MILL, third_order=True)
-    of_feed = Change(machine=lambda share: MILL, feed=lambda share: 1.0 + share)
-    more = of_feed if change == "feed" else Change(machine=more_of(MILL, change))
     rest = bounds_but_speeds(samples, MILL)
     assert rest is not None
     assert np.isfinite(rest).any()
-    np.testing.assert_array_equal(bounds_with(samples, more, 0.1, rest), bounds_with(samples, more, 0.1))
-    assert (bounds_with(samples, more, 0.1, rest) != bounds_with(samples, more, 0.0, rest)).any()
+    more = bounds_with(samples, MILL, change, 0.1, rest)
+    np.testing.assert_array_equal(more, bounds_with(samples, MILL, change, 0.1))
+    assert (more != bounds_with(samples, MILL, change, 0.0, rest)).any()

@@ -3,20 +3,10 @@ the prices of the first plan foretold (commands/study/what_if.py).
 
 What the prices of a plan (sensitivity/prices.py) say of other values of its settings, without planning again.
 
-Of a limit L the price p = dT/d(ln L) is known, and what 10 % more saves, between a least and a most. The
-cycle time is convex in one over a limit, so that a straight line there foretells a change to r L as
-
-    T(r L) - T(L)  =  p (1 - 1/r),
-
-for r < 1 at least that much. For r > 1 what 10 % more saves is known, and more of it saves ever less where
-another limit takes over, for which the simplest curve through both is taken: with x = 1 - 1/r and d = 1 -
-1/1.1
-
-    saved(x)  =  x saved(d)/d (1 + c d) / (1 + c x),      c >= 0 such that its slope at 0 is -p where that is the larger one.
-
-Of the tolerance the price is dT/d(tolerance) = s, and what d = 10 um more save is known: the same curve in x,
-so much more of it, and less costs s times the change. Settings without a price have no forecast, and changes
-at once are added up.
+The price p = dT/d(ln L) of a limit, of the feed or of the tolerance is known, and what more of it saves,
+between a least and a most. Other values follow by the power law of sensitivity/prices.py: less of it costs p/n
+(1 - r^-n) at r times the value, more of it saves in proportion to 1 - r^-n. Settings without a price have no
+forecast, and changes at once are added up.
 """
 
 from __future__ import annotations
@@ -40,7 +30,7 @@ from planner.feedrate.constraints.limits import LIMITS
 from planner.machine import Machine
 from planner.report.compare import Row, row_of_plan, tried
 from planner.report.summary import json_ready
-from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
+from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, POWER
 from planner.sensitivity.records import PriceList
 
 if TYPE_CHECKING:
@@ -130,47 +120,25 @@ def forecast(
 
 
 def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: float) -> Forecast | None:
-    if setting.name == TOLERANCE:
-        return _of_tolerance(prices, setting.value - tolerance)
     axis, _, quantity = setting.name.removeprefix("axes.").partition(".")
-    of_key = {limit.key: limit.name for limit in LIMITS if limit.key}
-    name = FEED if setting.name == FEED else of_key.get(setting.name, f"{quantity}.{axis}")
+    of_key = {limit.key: limit.name for limit in LIMITS if limit.key} | {FEED: FEED, TOLERANCE: TOLERANCE}
+    name = of_key.get(setting.name, f"{quantity}.{axis}")
+    price = {FEED: prices.feed, TOLERANCE: prices.tolerance, **prices.limits}.get(name)
     present = value_of(setting.name, machine, tolerance)
-    if present is None or name not in (FEED, *prices.limits):
+    if present is None or price is None or not math.isfinite(present):
         return None
-    planned = present if name == FEED or setting.name in of_key else _planned_limit(name, machine)
-    price = prices.feed if name == FEED else prices.limits[name] * planned
-    ratio = setting.value / present
-    share = 1.0 - 1.0 / ratio
-    if ratio <= 1.0 or name not in prices.ranges:
-        return Forecast(price * share, price * share)
-    return _beyond(prices, name, price, share, 1.0 - 1.0 / (1.0 + MORE_LIMIT))
-
-
-def _beyond(prices: PriceList, name: str, slope: float, x: float, known: float) -> Forecast:
-    """By the curve of the module's text, with the slope dT/dx at 0 and what is saved at x = `known`."""
-    saved = prices.saved[name]
-    bend = max(-slope * known / saved - 1.0, 0.0) if saved > 0.0 else 0.0  # c d
-    part = x / known
-    part *= (1.0 + bend) / (1.0 + bend * part)
-    least, most = prices.ranges[name]
-    return Forecast(-most * part, -least * part)
-
-
-def _planned_limit(name: str, machine: Machine) -> float:
-    """A limit in the unit of its price: mm or rad, and s."""
-    quantity, _, axis = name.partition(".")
-    return float(machine.limits(quantity, (axis,))[0])  # type: ignore[arg-type]
-
-
-def _of_tolerance(prices: PriceList, more: float) -> Forecast | None:
-    """Of so much more tolerance [mm]."""
-    if prices.tolerance is None or not math.isfinite(more):
-        return None
-    straight = prices.tolerance * more
-    if more <= 0.0 or TOLERANCE not in prices.ranges:
-        return Forecast(straight, straight)
-    return _beyond(prices, TOLERANCE, prices.tolerance, more, MORE_TOLERANCE)
+    slope = price
+    if setting.name not in of_key:  # in the unit of the price: mm or rad, and s
+        slope *= float(machine.limits(quantity, (axis,))[0])  # type: ignore[arg-type]
+    elif name != FEED:
+        slope *= present
+    n = POWER[name.partition(".")[0]]
+    gain = 1.0 - (setting.value / present) ** -n
+    if gain <= 0.0 or name not in prices.ranges:
+        return Forecast(slope / n * gain, slope / n * gain)
+    more = MORE_TOLERANCE / present if name == TOLERANCE else MORE_LIMIT
+    least, most = (saved * gain / (1.0 - (1.0 + more) ** -n) for saved in prices.ranges[name])
+    return Forecast(-most, -least)
 
 
 REASONS_SHOWN = 5  # why points did not pass

@@ -107,7 +107,8 @@ def price_list(price: float, saved: float, tolerance: float, saved_tolerance: fl
 
 @given(st.floats(1e-3, 10.0), st.floats(0.1, 10.0), st.floats(0.3, 1.0))
 def test_a_forecast_agrees_with_the_prices_it_is_made_of(worth: float, ratio: float, flat: float) -> None:
-    """At 10 % and 10 um more it is what the plan says; its slopes below are the prices; more never costs."""
+    """At 10 % and 10 um more it is what the plan says; its slopes below are the prices; more never costs. Far away it goes with
+    limit^-1/3, as lengths alone with jerk do."""
     jerk = MILL.axes["x"].jerk
     tenth = worth * (1.0 - 1.0 / 1.1) * flat
     prices = price_list(-worth / jerk, tenth, -worth, 0.01 * worth * flat)
@@ -121,8 +122,8 @@ def test_a_forecast_agrees_with_the_prices_it_is_made_of(worth: float, ratio: fl
     assert of("axes.x.jerk", 1.1 * jerk) == pytest.approx(-tenth, rel=1e-9)
     assert of("tolerance", 0.03) == pytest.approx(-0.01 * worth * flat, rel=1e-9)
     assert of("axes.x.jerk", jerk * (1 - 1e-6)) == pytest.approx(1e-6 * worth, rel=1e-4)
-    assert of("tolerance", 0.02 - 1e-6) == pytest.approx(1e-6 * worth, rel=1e-6)
-    assert of("tolerance", 0.02 + 1e-7) == pytest.approx(-1e-7 * worth, rel=1e-3)
+    assert of("tolerance", 0.02 - 1e-6) == pytest.approx(1e-6 * worth, rel=1e-4)
+    assert of("axes.x.jerk", jerk / 8.0) == pytest.approx(3.0 * worth, rel=1e-9)
     assert (of("axes.x.jerk", ratio * jerk) > 0.0) == (ratio < 1.0) or ratio == 1.0
     assert (of("tolerance", ratio * 0.02) > 0.0) == (ratio < 1.0) or ratio == 1.0
     unknown = forecast(

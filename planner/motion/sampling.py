@@ -12,7 +12,7 @@ How far its arc length is off is measured in the middle and at the quarters, by 
 polynomial q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what
 is left is measured between these places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step
 from there by the slope of the polynomial, and where that is not enough, steps by the curve itself
-(`_refine`). The samples themselves are in lots.py.
+(`_refine`). The samples themselves are in at_times.py.
 """
 
 from __future__ import annotations

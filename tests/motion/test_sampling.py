@@ -12,7 +12,7 @@ from planner.corners.elements import ElementTable, element_length, element_point
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.spline import span_dtype
-from planner.motion.lots import LANES, sample
+from planner.motion.at_times import sample
 from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses
 from planner.nc.reader import parse_program
 from planner.smoothing.spline_path import spline_shape, with_spline
@@ -95,12 +95,12 @@ def even_law(grid: Grid) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_a_sample_does_not_depend_on_the_others_of_its_lot(name):
+def test_a_sample_does_not_depend_on_the_others_beside_it(name):
     """Each time alone, to the last digit: chunks of any size give the same bytes."""
     table, grid = CASES[name]
     axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
     inverse, law = inverses(table, grid, axes), even_law(grid)
-    times = np.linspace(0.0, grid.s[-1], 3 * LANES + 5)
+    times = np.linspace(0.0, grid.s[-1], 53)
     together = sample(table, law, grid, inverse, read_only(times), axes)
     for n, time in enumerate(times):
         for whole, single in zip(

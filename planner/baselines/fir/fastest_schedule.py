@@ -25,13 +25,11 @@ from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Speeds that are tried at first, from the fastest leg's to what the shortest leg is best run at from rest to
-# rest; then others between them, to this natural logarithm of their ratio.
-SPEEDS = 10
-FINEST = 0.03
-# Margins that are tried; from the second on with speeds near the best of the one before.
-MARGINS = np.array([1.0, 2.0, 1.8, 1.6, 1.4, 1.2])
-NEARBY = (2.0, 1.41, 1.0, 0.71, 0.5)
+# Speeds that are tried, from the fastest leg's to what the shortest leg is best run at from rest to rest, each
+# with each of the margins.
+SPEEDS = 24
+MARGINS = (1.0, 1.2, 1.4, 1.6, 2.0)
+SETTLED = 8  # of these, the most promising of each run, are made into motions
 # Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
 # they are tried at all corners, as a corner may be so slow that a stop is faster.
 STOPS = (1.0, 0.0)
@@ -93,57 +91,20 @@ def _least_time(guide: LegGuide, stops: Array) -> FloatArray:
 def _settled(guide: LegGuide, machine: Machine) -> Schedule:
     """The fastest of the settled schedules, each run with the choices that are most promising for it."""
     margins = MARGINS if guide.profile_filters is None else MARGINS[:1]
-    speeds, times = _search(guide, machine, margins)
-    plans = [
-        plan_for(guide, machine, speed, np.full(guide.runs, margin))
-        for speed, margin in zip(speeds, margins, strict=True)
-    ]
-    return settled_fastest(plans, times, machine)
-
-
-def _search(guide: LegGuide, machine: Machine, margins: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """For each margin (K,) the best speed of each run [mm/s] and its time [s], both (K, S), by the times of
-    schedules.
-
-    Where nothing waits at the first margin, the others would make filters longer for nothing; and where the
-    second, the largest, is slower, those between them are not tried.
-    """
     high = guide.largest(guide.feed)
     low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
-    step = np.log(high / low) / (SPEEDS - 1)
-    tries = [np.exp(-k * step) * high for k in range(SPEEDS)]
-    speeds, times = (np.empty((len(margins), guide.runs)) for _ in range(2))
-    speeds[:], times[:] = _best_speeds(guide, machine, margins[0], tries, step)
-    plan = plan_for(guide, machine, speeds[0], np.full(guide.runs, margins[0]))
-    hopeful: Array = np.logical_or.reduceat((plan.gap() > 0)[:-1], guide.first[:-1])
-    for k in range(1, len(margins)):
-        if k == 2:
-            hopeful = hopeful & (times[1] <= times[0])
-        if not hopeful.any():
-            break
-        picked = guide.pick(hopeful)
-        tries = [np.minimum(speeds[k - 1, hopeful] * ratio, high[hopeful]) for ratio in NEARBY]
-        step = np.full(picked.runs, np.log(NEARBY[0] / NEARBY[1]))
-        speeds[k, hopeful], times[k, hopeful] = _best_speeds(picked, machine, margins[k], tries, step)
-    return speeds, times
-
-
-def _best_speeds(
-    guide: LegGuide, machine: Machine, margin: float, tries: list[FloatArray], step: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Best speed (S,) [mm/s] of each run and its time (S,) [s]: among `tries`, `step` (S,) apart in
-    logarithm, and between them."""
-    margins, high = np.full(guide.runs, margin), guide.largest(guide.feed)
-    best, best_time = high, np.full(guide.runs, np.inf)
-    while tries:
-        for speed in tries:
-            time = plan_for(guide, machine, speed, margins).time()
-            better = time < best_time
-            best, best_time = np.where(better, speed, best), np.where(better, time, best_time)
-        step = step / 2
-        signs = (-1, 1) if (step > FINEST).any() else ()
-        tries = [np.minimum(best * np.exp(sign * step), high) for sign in signs]
-    return best, best_time
+    tries = [
+        (high * (low / high) ** (k / (SPEEDS - 1)), np.full(guide.runs, margin))
+        for k in range(SPEEDS)
+        for margin in margins
+    ]
+    times = np.array([plan_for(guide, machine, *one).time() for one in tries])
+    best = np.argsort(times, axis=0, kind="stable")[:SETTLED]
+    speeds, margins_of = (
+        np.take_along_axis(np.array(column), best, axis=0) for column in zip(*tries, strict=True)
+    )
+    plans = [plan_for(guide, machine, *one) for one in zip(speeds, margins_of, strict=True)]
+    return settled_fastest(plans, np.take_along_axis(times, best, axis=0), machine)
 
 
 def filters_for(

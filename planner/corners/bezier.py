@@ -71,13 +71,3 @@ class BezierCorner(ScaledShape):
         rows = np.zeros((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = reach, w1, w2
         return rows
-
-
-def kappa_max(d: FloatArray, theta: FloatArray, sigma2: float) -> FloatArray:
-    """(n,) largest curvature of the pair between straight legs [1/mm] (eq. (17) times sigma2).
-
-    d      : (n,) tangent length [mm]
-    theta  : (n,) turning angle [rad]
-    sigma2 : shape number [-]
-    """
-    return sigma2 * 8.0 * np.sin(theta / 2) / (3.0 * d * np.cos(theta / 2) ** 2)

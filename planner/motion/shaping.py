@@ -64,12 +64,6 @@ class Shaper:
         path [mm]."""
         return float(self.weight @ (self.delay - self.middle) ** 2)
 
-    def remains(self, mode: Mode) -> float:
-        """The rest of a mode's ringing, as a fraction of the ringing without shaping [-]."""
-        w = 2.0 * math.pi * mode.frequency
-        pole = -mode.damping * w + 1j * w * math.sqrt(1.0 - mode.damping**2)
-        return float(abs((self.weight * np.exp(-pole * (self.delay - self.length))).sum()))
-
 
 def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
     """The zero-vibration shaper of all modes (Singer and Seering 1990): 2^n copies for n modes; one copy

@@ -124,18 +124,9 @@ class PlannedBlocks:
     highest: FloatArray
 
 
-def block_feeds(trajectory: Trajectory, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
-    """F words for the blocks of a program: an upper envelope of the planned feed (module text).
-
-    blocks : number of blocks of the program
-
-    Returns the feed of each block (blocks,) [mm/s]; NaN for rapids and for blocks that move nowhere.
-    """
-    return feeds_of(planned_blocks(trajectory, toolpath), toolpath, machine, blocks)
-
-
 def feeds_of(planned: PlannedBlocks, toolpath: Toolpath, machine: Machine, blocks: int) -> FloatArray:
-    """(blocks,) `block_feeds` [mm/s] from what is known of the blocks."""
+    """(blocks,) F words for the blocks of a program [mm/s], an upper envelope of the planned feed (module text);
+    NaN for rapids and for blocks that move nowhere."""
     cut = np.flatnonzero(~toolpath.rapid)
     run = runs_of_feed(planned.highest[cut], planned.duration[cut], RUN_PERIODS * machine.dt)
     cap = np.zeros(len(cut))  # of each run

@@ -16,7 +16,7 @@ from whole_plans import evaluate_corner, smooth_path
 
 from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
-from planner.corners.bezier import BezierCorner, kappa_max
+from planner.corners.bezier import BezierCorner
 from planner.corners.blend import middle_from_tolerance
 from planner.geometry.build import toolpath_from_program
 from planner.nc.program import Program
@@ -144,7 +144,6 @@ def test_curvature_is_largest_at_the_joint_and_is_equation_17(theta, sigma2, d):
     kappa, _ = planar_curvature(found.by_s, toolpath)
     expected = sigma2 * 8 * np.sin(theta / 2) / (3 * d * np.cos(theta / 2) ** 2)
     assert kappa[200] == pytest.approx(expected, rel=1e-6)
-    assert kappa_max(d, theta, sigma2) == pytest.approx(expected, rel=1e-12)
     assert kappa.max() <= expected * (1 + 1e-6)
 
 

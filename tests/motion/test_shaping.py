@@ -15,18 +15,25 @@ from planner.motion.shaping import ShapedMotion, shaper_of
 MODES = st.builds(Mode, frequency=st.floats(2.0, 200.0), damping=st.floats(0.0, 0.5))
 
 
+def remains(shaper, mode):
+    """The rest of a mode's ringing, as a fraction of the ringing without shaping [-]."""
+    w = 2.0 * np.pi * mode.frequency
+    pole = w * (-mode.damping + 1j * np.sqrt(1.0 - mode.damping**2))
+    return abs((shaper.weight * np.exp(-pole * (shaper.delay - shaper.length))).sum())
+
+
 @given(st.lists(MODES, min_size=1, max_size=3))
 def test_nothing_remains_of_any_mode(modes):
     shaper = shaper_of(tuple(modes))
     assert shaper.weight.sum() == pytest.approx(1.0)
     assert shaper.length == pytest.approx(sum(damped_period(m.frequency, m.damping) for m in modes) / 2)
-    assert all(shaper.remains(mode) < 1e-9 * np.exp(60 * mode.damping) for mode in modes)
+    assert all(remains(shaper, mode) < 1e-9 * np.exp(60 * mode.damping) for mode in modes)
 
 
 def test_another_frequency_rings():
     shaper = shaper_of((Mode(frequency=18.0),))
-    assert shaper.remains(Mode(frequency=20.0)) > 0.15
-    assert shaper_of(()).remains(Mode(frequency=18.0)) == pytest.approx(1.0)
+    assert remains(shaper, Mode(frequency=20.0)) > 0.15
+    assert remains(shaper_of(()), Mode(frequency=18.0)) == pytest.approx(1.0)
 
 
 def test_the_papers_moving_average_is_this_shaper_and_a_shorter_average():

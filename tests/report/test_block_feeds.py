@@ -17,7 +17,7 @@ from planner.nc.writer import retimed
 from planner.planning.job.plan import Plan
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.stop import StopMethod
-from planner.report.word_feed import RUN_PERIODS, SPREAD, block_feeds, planned_blocks, runs_of_feed
+from planner.report.word_feed import RUN_PERIODS, SPREAD, feeds_of, planned_blocks, runs_of_feed
 
 MACHINE = load_machine("mill")
 PROGRAM = """G21 G90 G17
@@ -51,7 +51,7 @@ def test_blocks_from_rest_to_rest_take_the_closed_form_s_time() -> None:
 def test_which_blocks_have_a_feed(method: str) -> None:
     made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method=method)
     program, path = made.program, made.toolpath
-    feeds = block_feeds(made.trajectory, path, MACHINE, len(program))
+    feeds = feeds_of(planned_blocks(made.trajectory, path), path, MACHINE, len(program))
     still = np.isin(np.arange(len(program)), path.zero_length)
     cuts = np.isin(program.kind, (Kind.LINE, Kind.ARC))
     np.testing.assert_array_equal(np.isfinite(feeds), cuts & ~still)
@@ -59,13 +59,15 @@ def test_which_blocks_have_a_feed(method: str) -> None:
     assert (feeds[cuts & ~still] > slowest).all()
 
 
-def feeds_of(made: Plan) -> np.ndarray:
-    return block_feeds(made.trajectory, made.toolpath, made.machine, len(made.program))
+def feeds_planned(made: Plan) -> np.ndarray:
+    return feeds_of(
+        planned_blocks(made.trajectory, made.toolpath), made.toolpath, made.machine, len(made.program)
+    )
 
 
 def test_no_block_is_held_below_its_planned_feed() -> None:
     made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method="second-order")
-    feeds, got = feeds_of(made), made.trajectory
+    feeds, got = feeds_planned(made), made.trajectory
     cut = np.isfinite(feeds[got.block])
     assert (feeds[got.block][cut] >= got.feed[cut] * (1.0 - 1e-9)).all()
     assert (feeds[np.isfinite(feeds)] <= made.program.feed[np.isfinite(feeds)]).all()
@@ -75,7 +77,7 @@ def test_blocks_of_a_run_share_their_feed() -> None:
     """From rest to rest over hundreds of blocks of 20 um: a few F words, each the highest feed of its run."""
     steps = "\n".join(f"X{k / 50:.2f}" for k in range(1, 401))
     made = plan(parse_program(f"G21 G64 P0.01 F18000\nG1 {steps}\n", MACHINE), MACHINE)
-    feeds, got = feeds_of(made), made.trajectory
+    feeds, got = feeds_planned(made), made.trajectory
     first = np.flatnonzero(np.diff(feeds, prepend=0.0))
     assert 2 <= len(first) <= 12
     lasting = np.add.reduceat(planned_blocks(got, made.toolpath).duration, first)
@@ -106,7 +108,7 @@ def test_a_block_without_a_sample_is_not_held_up() -> None:
     text = "G21 G61.1 F3000\n" + "".join(f"G1 X{k / 1000:.3f}\n" for k in range(1, 6))
     made = StopMethod().plan(parse_program(text, MACHINE), MACHINE.model_copy(update={"dt": 0.02}))
     mean = made.toolpath.length / planned_blocks(made.trajectory, made.toolpath).duration
-    assert (feeds_of(made) >= 2.0 * mean.min()).all()
+    assert (feeds_planned(made) >= 2.0 * mean.min()).all()
 
 
 def test_a_block_that_reaches_the_programmed_feed_keeps_it() -> None:
@@ -114,7 +116,7 @@ def test_a_block_that_reaches_the_programmed_feed_keeps_it() -> None:
     program = parse_program("G1 X50 F3000\nX0 F2000\n", MACHINE)
     made = OptimalMethod(corner="bezier").plan(program, MACHINE)
     assert made.trajectory.feed.max() < program.feed.max()
-    np.testing.assert_array_equal(feeds_of(made), program.feed)
+    np.testing.assert_array_equal(feeds_planned(made), program.feed)
 
 
 def pentagon() -> str:
@@ -140,7 +142,7 @@ def test_planned_again_the_program_takes_the_planned_time(text: str, words: int)
     source = f"G21 G90 G17 F6000\n{text}M2\n".encode()
     method = OptimalMethod(corner="spline", rounds=8)
     made = method.plan(parse_program(source, machine), machine)
-    result = retimed(source, made.program, feeds_of(made))
+    result = retimed(source, made.program, feeds_planned(made))
     assert result.count(b"F") <= words
     again = method.plan(parse_program(result, machine), machine)
     assert again.trajectory.cycle_time == pytest.approx(made.trajectory.cycle_time, rel=0.01)

@@ -133,10 +133,6 @@ class Chain:
             pairs.append(np.stack([angle, c - 2.0 * np.pi * np.round(c / (2.0 * np.pi))], axis=1))
         return np.stack(pairs, axis=1)
 
-    def from_pole(self, place: dict[str, Any]) -> Any:
-        """|sin(tilt)|, the distance of the tool's direction from the pole: 0 where c has no influence on it; numbers or arrays (n,)."""
-        return np.abs(np.sin(place[self.data.rotary[0]]))
-
     @property
     def _point(self) -> Vector:
         return self.data.x_rot_point, self.data.y_rot_point, self.data.z_rot_point

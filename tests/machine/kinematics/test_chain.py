@@ -139,4 +139,3 @@ def test_a_point_on_the_axis_of_the_table_needs_no_linear_motion() -> None:
     q = found.joints(place)
     for letter, value in (("x", 12.0), ("y", -7.0), ("z", 5.0)):
         np.testing.assert_allclose(q[letter], value, atol=1e-13)
-    assert np.abs(found.from_pole({"a": np.array([0.0, 0.5])}) - [0.0, np.sin(0.5)]).max() < 1e-15

@@ -12,7 +12,6 @@ from whole_plans import apexes
 import planner
 from benchmarks.jobs import problems
 from planner.base.names import NORMAL, QUICK
-from planner.corners.bezier import kappa_max
 from planner.corners.smooth import CLOSE
 from planner.feedrate.constraints.assemble import CURVATURE_MARGIN
 from planner.geometry.build import toolpath_from_program
@@ -96,7 +95,8 @@ def test_isolated_corners_are_passed_at_the_closed_form_s_speed(dt, tolerance, n
 
     corners, limited_by = at_apexes(isolated_corners(1e7, dt, tolerance, normal))
     np.testing.assert_allclose(corners.tol_ap, tolerance - rate * share, rtol=smaller)
-    speed = np.sqrt(share / kappa_max(corners.d_in, theta, SIGMA2))
+    kappa = SIGMA2 * 8.0 * np.sin(theta / 2) / (3.0 * corners.d_in * np.cos(theta / 2) ** 2)
+    speed = np.sqrt(share / kappa)
     np.testing.assert_allclose(corners.closed_form, speed, rtol=smaller)
     np.testing.assert_allclose(corners.planned, speed * np.sqrt(1.0 - CURVATURE_MARGIN), rtol=smaller)
     assert all(holds in names for names in limited_by)

@@ -4,8 +4,8 @@ of their cubics.
 Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed
 has degree 4: it is looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is
 zero (Newton). The normal acceleration is looked at in the same places. For the tolerance see nlp.py: control
-points within the budget of those of the leg's own cubic, along places that never go back. On arcs a step is
-looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
+points within the budget of those of the leg's own cubic, along places that never go back (legs.py). On arcs a
+step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.joint.legs import LegFormulas, along_tangent, formula_point, nearest_point
+from planner.joint.legs import LegFormulas, along_tangent, formula_point, nearest_point, put_places
 from planner.joint.run import TubeRun
 
 PLACES = 33  # where a step is looked at first [-]
@@ -160,17 +160,15 @@ def _of_arc(keeps, r, c, s0, end, known, budgets, work):
 
 
 @njit(cache=True, error_model="numpy")
-def _of_line(keeps, r, c, s0, end, known, budgets, work):
-    """The same on a line."""
-    legs, s = keeps.legs, s0
+def _of_line(keeps, r, c, places, end, budgets, work):
+    """The same on a line, of control points with the places (3,) and `end` on it."""
     point, tangent, bend = work[0], work[2], work[4]
-    formula_point(legs, r, s, point, tangent, bend)
-    worst = _apart(c[0], point, tangent, 0.0) / budgets[0]
-    for m in range(1, 4):
-        s = end if m == 3 and known else max(nearest_point(legs, r, c[m], s, point, tangent), s)
-        formula_point(legs, r, s, point, tangent, bend)
-        worst = max(worst, _apart(c[m], point, tangent, 0.0) / (budgets[1] if m == 3 else keeps.budget[r]))
-    return worst, s
+    worst = 0.0
+    for m in range(4):
+        formula_point(keeps.legs, r, end if m == 3 else places[m], point, tangent, bend)
+        budget = budgets[m // 3] if m % 3 == 0 else keeps.budget[r]
+        worst = max(worst, _apart(c[m], point, tangent, 0.0) / budget)
+    return worst
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -178,7 +176,7 @@ def worst_shares(keeps, leg, h, state, jerk, place):
     """The largest share of a limit in N steps, and of the tolerance in each of them (N,).
 
     leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points
-    along the leg: where places on arcs are sought from
+    along the leg: where places on arcs are sought from; whether the first node is where its leg begins, on a line (0)
     """
     N, axes = jerk.shape
     limit, before, tube = 0.0, 0.0, np.zeros(N)
@@ -187,6 +185,8 @@ def worst_shares(keeps, leg, h, state, jerk, place):
         *(np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)),
         *(np.zeros((4, axes)), np.zeros((4, 1)), np.zeros((4, 1))),
     )
+    on_line, x = np.zeros((N, 3)), state.copy().reshape(N + 1, 3 * axes)
+    last = put_places(keeps.legs, leg, place[0, 0] <= 0.0, x, h, on_line, np.zeros((N, 3), np.bool_))
     for i in range(N):
         r = leg[i]
         limit = max(limit, _of_limits(keeps, r, h[i], state[i, 1], state[i, 2], jerk[i]))
@@ -207,7 +207,8 @@ def worst_shares(keeps, leg, h, state, jerk, place):
         if keeps.legs.radius[r] > 0.0:
             tube[i], before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
         else:
-            tube[i], before = _of_line(keeps, r, c, before, end, ends, budgets, work)
+            end = keeps.legs.length[r] if ends else last if i == N - 1 else on_line[i + 1, 0]
+            tube[i] = _of_line(keeps, r, c, on_line[i], end, budgets, work)
     return limit, tube
 
 

@@ -81,6 +81,60 @@ def nearest_point(legs, r, c, x, point, tangent):
 
 
 @njit(cache=True, error_model="numpy")
+def _in_order(place, low, high):
+    """Make places (n,) of points in turn such that they never go back: halfway between the largest before and the
+    smallest behind, so that the farthest of them is moved by as little as can be; from `low` to `high`."""
+    least, before, behind = np.empty(len(place)), low, high
+    for k in range(len(place) - 1, -1, -1):
+        behind = min(behind, place[k])
+        least[k] = behind
+    for k in range(len(place)):
+        before = max(before, place[k])
+        place[k] = min(max(0.5 * (before + least[k]), low), high)
+
+
+@njit(cache=True, error_model="numpy")
+def put_places(legs, leg, at_vertex, x, h, place, stays):
+    """The places of the nodes and the inner control points of N steps that are on lines into `place` (N, 3), in order:
+    a motion may go back along a leg as far as one place is near enough to what it passes twice. `stays` (N, 3):
+    whether a place is no nearest one that moves with its point. Returns the place of the last node if that is on a
+    line.
+
+    leg       : (N,) of the steps
+    at_vertex : whether the first node is where its leg begins
+    x         : (N+1, 3 A) position, velocity and acceleration at the nodes
+    h         : (N,) durations
+    """
+    N, axes, begin, last = len(leg), x.shape[1] // 3, 0, 0.0
+    c, point, tangent = np.empty(axes), np.empty(axes), np.empty(axes)
+    while begin < N:
+        r, end, vertex = leg[begin], begin + 1, at_vertex or begin > 0
+        while end < N and leg[end] == r:
+            end += 1
+        if legs.radius[r] == 0.0:
+            nearest = np.empty(3 * (end - begin))
+            for n in range(len(nearest)):
+                i, m = begin + n // 3, n % 3
+                third = h[i] / 3.0
+                for k in range(axes):
+                    c[k] = x[i, k] + m * third * x[i, axes + k]
+                    if m == 2:
+                        c[k] += 1.5 * third * third * x[i, 2 * axes + k]
+                nearest[n] = nearest_point(legs, r, c, 0.0, point, tangent)
+            nearest[0] = 0.0 if vertex else nearest[0]
+            last = nearest_point(legs, r, x[N, :axes], 0.0, point, tangent)
+            last = max(last, nearest[0])
+            order = nearest.copy()
+            _in_order(order, nearest[0], last if end == N else legs.length[r])
+            for n in range(len(order)):
+                i, m = begin + n // 3, n % 3
+                place[i, m] = order[n]
+                stays[i, m] = order[n] != nearest[n] or order[n] <= 0.0 or order[n] >= legs.length[r]
+        begin = end
+    return last
+
+
+@njit(cache=True, error_model="numpy")
 def formula_point(legs, r, x, point, tangent, bend):
     """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
     if legs.curve[r] >= 0:

@@ -35,6 +35,7 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.own_laws import watched
 from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, window_of
+from planner.joint.rows import H_MIN
 from planner.joint.run import TubeRun
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that
@@ -59,6 +60,9 @@ START = (0.3, 0.05)
 # Laws of the position are about a place, and of the tolerance along a curve the rows know the tangents at nodes.
 # Where one is exceeded it is lowered by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
+# Where steps want to be shorter than they may become (problem.py) a window is searched once more from what was found,
+# if that is worth this share of the time [-].
+SHORTENED = 1e-3
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
 Tries = tuple[tuple[float, float], ...]
@@ -262,7 +266,7 @@ class _Search:
         takes their place."""
         run = self.run
         for prox, missed in tries:
-            pull = PULL
+            pull, taken = PULL, False
             tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
             needed = near(run.laws, begun)
             for number in range(TOLD if len(run.laws) else TIGHTENED):
@@ -280,7 +284,11 @@ class _Search:
                 over = self._taken(lo, hi, window, begun)
                 if over is None:
                     self.price[lo:hi] = step_prices(run, window, z)
-                    return True
+                    taken, begun = True, Window(self.guess, lo, hi)
+                    shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
+                    if shorter <= SHORTENED * window.u[:, -1].sum():
+                        return True
+                    continue
                 if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                     break
                 pull = PULL_AGAIN if run.laws.moved else PULL
@@ -290,6 +298,8 @@ class _Search:
                 tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
                 tight[:, 1:] *= np.where(near_enough, tightened(of_laws, number), 1.0)
                 needed |= (of_laws > NEAR).any(axis=0)
+            if taken:
+                return True
         return False
 
     def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window) -> FloatArray | None:

@@ -190,6 +190,7 @@ def _present(run: TubeRun, leg: Array, at_vertex: Array) -> Array:
     on[:, 4 * axes : 8 * axes] = not fed or (run.feed[leg] > run.velocity.min()).any()
     more[:, rows.FEED_NODE : rows.TUBE_NODE] = fed
     more[at_vertex, rows.ORDER_NODE] = False
+    more[run.curvature[leg] == 0, rows.ORDER_NODE : rows.NORMAL_NODE] = False
     limited = np.isfinite(run.across_max[leg])
     more[~limited, rows.NORMAL_NODE] = False
     more[~limited, rows.NORMAL_ROWS : rows.LAW_ROWS] = False

@@ -9,9 +9,9 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
 
     y                                          rows
     p                at the node               the tolerance
-    v, a             at the node               limits of the axes; feed; order; normal acceleration
+    v, a             at the node               limits of the axes; feed; normal acceleration; on arcs: order
     j                                          limits of the axes
-    v + a h/2        Bezier ordinate           limits of the axes; order: not backwards along the leg
+    v + a h/2        Bezier ordinate           limits of the axes; order, on arcs: not backwards along the leg
     v + a h/4, v + a h/2 + j h2/12,            feed
     v + 3 a h/4 + j h2/4
     p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic
@@ -27,8 +27,10 @@ the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
 
 The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the
 vertex), along which n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is
-convex. On an arc the inner control points belong to the tangents at the places of the step's nodes (run.py),
-which move with them: those rows depend on a second vector, p or the next node's, through `lin.node`.
+convex, and a motion may go back along it: its points belong to places in order (`put_places`), which are not
+the nearest ones where it does, and are taken as fixed. On an arc the inner control points belong to the
+tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second
+vector, p or the next node's, through `lin.node`.
 
 Other limits (laws.py) have rows of another kind, with their derivatives by p, v, a, j and h, behind all
 others where a window needs them.
@@ -47,7 +49,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.joint.laws import LawRows, put_law_rows
-from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
+from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent, put_places
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
 
 # Vectors y, in this order.
@@ -189,7 +191,8 @@ def put_rows(legs, limits, x, u, lin):
     search on arcs begins."""
     N, axes = len(u), u.shape[1] - 1
     y, point = np.empty((VECTORS, axes)), np.empty(axes)
-    more = 8 * axes
+    more, stays = 8 * axes, np.zeros((N, 3), np.bool_)
+    put_places(legs, limits.leg, limits.at_vertex[0], x, u[:, axes], lin.place, stays)
     for i in range(N):
         g, n = lin.g[i], lin.n[i]
         vectors_of_step(x[i], u[i], axes, y, lin.alpha[i], lin.e[i])
@@ -217,7 +220,13 @@ def put_rows(legs, limits, x, u, lin):
         for c in range(1 if curved else 3):
             vector, row = (P, C1, C2)[c], more + TUBE_NODE + c
             room = limits.room_node[i] if c == 0 else limits.room[i]
-            place = nearest_point(legs, r, y[vector], lin.place[i, c], point, lin.tangent[i, c])
+            place = lin.place[i, c]
+            if curved:
+                place = nearest_point(legs, r, y[vector], place, point, lin.tangent[i, c])
+            else:
+                for k in range(axes):
+                    lin.tangent[i, c, k] = 0.0 if stays[i, c] else legs.drift[r, k]
+                    point[k] = legs.base[r, k] + place * legs.drift[r, k]
             if c == 0 and at_vertex:
                 for k in range(axes):
                     point[k] = legs.base[r, k] + legs.radius[r] * legs.e1[r, k]

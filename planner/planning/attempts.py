@@ -2,8 +2,8 @@
 (planning/page.py).
 
 The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round
-has reshaped, with a motion that need not be fit for delivery. Where it does not end, or where a small path
-doubles back or bends within the tolerance, the splines are reshaped, and it begins there once more; where it
+has reshaped, with a motion that need not be fit for delivery. Where it does not end, or where a curve of a
+small path bends within the tolerance, the splines are reshaped, and it begins there once more; where it
 cannot run, or leaves something, the motion on that path is delivered.
 """
 
@@ -20,7 +20,6 @@ from planner.base.sizes import SIZES
 from planner.corners.budget import filters_count
 from planner.feedrate.constraints.limits import Limits
 from planner.geometry.legs import legs_of
-from planner.geometry.toolpath import Joint
 from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.choice import better, counted_time, faster
 from planner.planning.job.job import Job
@@ -36,8 +35,8 @@ if TYPE_CHECKING:
 
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not
 # searched [-]: on 30,000 lines of dense chords the search took half of the computing and found nothing; on a
-# random job of ten blocks it found 9e-4. Nor are the splines of such a motion reshaped because its path
-# doubles back somewhere: 4,153 blocks of a V-carving took 50 CPU s instead of 19 for 8e-5 of the time.
+# random job of ten blocks it found 9e-4. Nor are the splines of such a motion reshaped because its path bends
+# somewhere.
 LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 SAME_TIME = 1e-4  # less is the gap of the solvers [-]
 # Steps that a motion has on a leg at least (joint/guess.py).
@@ -85,11 +84,11 @@ def _known_on_paths(job: Job) -> bool:
 
 def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
     """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended
-    from the first ones, and where the path doubles back or bends inside its tolerance."""
+    from the first ones, and where a curve bends inside its tolerance."""
     if tried.joint and settings.effort.search.smooth:  # what is faster is not what is asked for
         return False
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
-    return small and (tried.best is None or (tried.steps <= CHEAP and _turns_within(job)))
+    return small and (tried.best is None or (tried.steps <= CHEAP and _bends_within(job)))
 
 
 def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
@@ -181,7 +180,7 @@ RETRIES = (
     Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
     Retry(
         ("search, reshaped splines", "reshape"),
-        "the search has not ended, or a small path turns within its tolerance: from reshaped splines; where it cannot run these alone",
+        "the search has not ended, or a small path bends within its tolerance: from reshaped splines; where it cannot run these alone",
         "1, rounds 40",
         "5e-4, 8e-3",
     ),
@@ -228,13 +227,8 @@ def _at_feed(job: Job) -> float:
     return float(np.sum(job.toolpath.length / job.toolpath.feed))
 
 
-def _turns_within(job: Job) -> bool:
-    """Whether the path turns back on both ends of a block so short that one place is within the tolerance of
-    both, or a curve bends with a radius below it: splines that are reshaped find a way without the detour,
-    the search does not find it from the first ones."""
+def _bends_within(job: Job) -> bool:
+    """Whether a curve bends with a radius below its tolerance: splines that are reshaped find a way without the
+    detour, the search does not find it from the first ones."""
     path = job.toolpath
-    turn = np.sum(path.tangent_end[:-1] * path.tangent_start[1:], axis=1)
-    back = (turn < 0.0) & (path.joint[1:-1] != Joint.STOP)
-    short = (path.length < path.tolerance[:-1] + path.tolerance[1:])[1:-1]
-    bends = path.curvature * path.tolerance[:-1] > 1.0
-    return bool(bends.any() or (short & back[:-1] & back[1:]).any())
+    return bool((path.curvature * path.tolerance[:-1] > 1.0).any())

@@ -15,6 +15,7 @@ from planner.joint import laws, own, rows
 from planner.joint.checks import normal_shares, worst_shares
 from planner.joint.curvature import Barrier
 from planner.joint.guess import guess_from
+from planner.joint.legs import put_places
 from planner.joint.motion import integrated
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
@@ -164,6 +165,30 @@ def test_shares_are_those_of_a_fine_sampling():
     shares.append(np.linalg.norm(speeds, axis=2) / run.feed[0])
     assert limit == pytest.approx(max(share.max() for share in shares), rel=1e-6)
     assert (tube >= np.abs(places[..., 1]).max(axis=0) / run.budget[0]).all()
+
+
+def test_places_on_a_line_go_never_back_and_the_farthest_is_moved_by_as_little_as_can_be():
+    """By half of what the motion goes back by: of two points, one of which is before the other, one has to be."""
+    run, _ = begun("corner")
+    steps = 12
+    rng = np.random.default_rng(11)
+    h, jerk = rng.uniform(1e-3, 4e-3, steps), run.jerk * rng.uniform(-1.0, 1.0, (steps, 2))
+    turning = np.array([[0.3 * run.length[0], 0.0], [-30.0, 5.0], [4000.0, 0.0]])
+    state = integrated(turning, h, jerk)
+    leg, place, stays = np.zeros(steps, np.int64), np.zeros((steps, 3)), np.zeros((steps, 3), np.bool_)
+    legs = own.keeps_of(run).legs
+    last = put_places(legs, leg, True, state.reshape(steps + 1, -1), h, place, stays)
+    third = h[:, None] / 3.0
+    p, v = state[:, 0], state[:, 1]
+    inner = np.stack([p[:-1] + third * v[:-1], p[1:] - third * v[1:]], axis=1)
+    nearest = np.concatenate([p[:-1, None], inner], axis=1)[:, :, 0].ravel()
+    nearest[0] = 0.0  # at a vertex
+    back = np.maximum.accumulate(nearest) - np.minimum.accumulate(nearest[::-1])[::-1]
+    assert back.max() > 0.1  # the motion does go back
+    assert (np.diff(place.ravel()) >= 0.0).all()
+    assert np.abs(place.ravel() - nearest).max() == pytest.approx(back.max() / 2.0, rel=1e-9)
+    np.testing.assert_array_equal(stays.ravel()[1:], (np.abs(place.ravel() - nearest) > 1e-9)[1:])
+    assert last == pytest.approx(p[-1, 0])
 
 
 # --- what it finds -------------------------------------------------------------------------------------------------------------

@@ -64,3 +64,12 @@ def test_feeds_that_change_where_it_turns_back_are_kept():
     assert made.verdict.passed, made.verdict.faults
     slow = 2 * (2.0 - 2 * 0.03) / 10.0
     assert slow < made.cycle_time < made.stop_time
+
+
+@pytest.mark.parametrize("off", [0.0, 0.01], ids=["along the line", "beside it"])
+def test_a_leg_back_that_one_place_is_within_the_tolerance_of_costs_nothing(off):
+    """Of both its ends, so that the motion goes straight on while the place that it belongs to stays there."""
+    straight, back = (
+        planned(points).cycle_time for points in ([(15.0, off)], [(8.0, 0.0), (7.985, off), (15.0, off)])
+    )
+    assert back == pytest.approx(straight, rel=2e-4)

@@ -6,8 +6,6 @@ Nothing is imported before Ctrl-C has its handler, so that an interrupt during t
 other.
 """
 
-from __future__ import annotations
-
 import gc
 import sys
 from typing import TYPE_CHECKING, Any

@@ -1,7 +1,5 @@
 """Arrays inside records: right shape, finite, and read-only, or an error that names the field."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

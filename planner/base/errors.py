@@ -10,8 +10,6 @@ Packages that only some solvers and outputs need are imported when they are need
 where they are missing.
 """
 
-from __future__ import annotations
-
 import importlib
 import unicodedata
 from typing import Any

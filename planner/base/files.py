@@ -1,8 +1,6 @@
 """Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer
 never. And names of files in texts that are written."""
 
-from __future__ import annotations
-
 import os
 import stat
 import sys

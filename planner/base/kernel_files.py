@@ -15,8 +15,6 @@ as well. Windows has other means than owners and modes, and gives everybody a fo
 path alone is looked at.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

@@ -9,8 +9,6 @@ A kernel that cannot be kept, because no directory can be written or the disk is
 the next run, which takes a minute for all of them, and is nothing to fail for: one warning says so.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect

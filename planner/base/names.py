@@ -8,8 +8,6 @@ and the messages name them. Nothing heavy is imported here: a method is named by
 To add a method: its module in `planner/planning/methods/` and a row of `METHODS`.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

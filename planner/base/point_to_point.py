@@ -9,8 +9,6 @@ jerk j for A/j, none for p/A - A/j and -j for A/j with the largest acceleration 
 cruise, and the same backwards. The tests compare it with ruckig.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

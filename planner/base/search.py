@@ -1,7 +1,5 @@
 """Search in ascending values; the kernels have their own, as numba compiles its searchsorted slowly."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -11,8 +11,6 @@ d/ds on c and for d/dc on f (Faa di Bruno):
     f(c)''' = f' c''' + 3 f'' c' c'' + f''' c'^3
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

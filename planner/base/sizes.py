@@ -17,8 +17,6 @@ module is imported, and holds for the processes that are started from there.
 A size beyond which something is refused is no setting: there is no large way behind it.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Set
 from dataclasses import dataclass, field, fields, replace

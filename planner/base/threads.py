@@ -1,7 +1,5 @@
 """How many threads the planner may use. What it finds does not depend on it."""
 
-from __future__ import annotations
-
 import functools
 import os
 import threading

@@ -9,8 +9,6 @@ tol_*     a part of the contour error budget [mm]   dt        interpolation peri
 *_max     a limit      *_grid  sampled along s      *_t       sampled in time      *_sq  squared
 """
 
-from __future__ import annotations
-
 import math
 
 MM_PER_INCH = 25.4  # by definition

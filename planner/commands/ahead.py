@@ -12,8 +12,6 @@ comes to geometry, path, feedrate, samples and verdict while the first compiles 
 Both keep their kernels in the same place, and each loads what it finds.
 """
 
-from __future__ import annotations
-
 import sys
 
 from planner.base import kernel_files

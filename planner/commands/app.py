@@ -5,8 +5,6 @@ typer's messages are for programmers, and lack the one hint that helps. A file w
 option that resembles it; what is missing with what its help says.
 """
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

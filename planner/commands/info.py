@@ -1,7 +1,5 @@
 """`planner info`: what a program holds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

@@ -7,8 +7,6 @@ are removed first. Python runs the handler between two of its instructions, so a
 but nothing after it happens.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

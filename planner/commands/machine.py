@@ -1,7 +1,5 @@
 """`planner machine`: the built-in machines, and a machine file to start from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

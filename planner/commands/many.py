@@ -5,8 +5,6 @@ is that of one program, with `--json` and its share of the threads. What it writ
 it or nothing, so that Ctrl-C loses only what was not finished.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,8 +1,6 @@
 """Arguments and options that several commands share; the names they may take come from
 `planner.base.names`."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import math

@@ -1,8 +1,6 @@
 """Common to `what-if` and `sweep`: the options of a job that is planned many times, and how such a command
 ends."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections import Counter

@@ -16,8 +16,6 @@ is the default. The maximum is at the joint for every theta in (0, pi) if sigma2
 corners have it beside the joint, at most 0.3 % higher (tested).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

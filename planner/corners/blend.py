@@ -30,8 +30,6 @@ vertex is met within E(m). Between straight legs E(m) = 2 s m is the exact verte
 the corner is kept short enough that theta plus what the legs bend by stays below `BEND_MAX`.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from enum import IntEnum
 from typing import Self

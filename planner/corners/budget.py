@@ -20,8 +20,6 @@ tight; X (eps - c X) is a parabola with its top at eps/(2c), hence
 and where a short leg keeps the corner from using eps_ap, X = min(A, (eps - eps_ap)/c).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

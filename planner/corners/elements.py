@@ -12,8 +12,6 @@ the one place where an element's geometry is turned from w to arc length:
 with ' on the left for d/ds and on the right for d/dw.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

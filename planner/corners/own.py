@@ -12,8 +12,6 @@ tangent and its curvature (corners/blend.py, where the error bound asks for f(w)
 well). All of that is checked. The kernels know f by the coefficients of z^3 ... z^12 with z = 1 - w.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from functools import cached_property
 

@@ -11,8 +11,6 @@ Paper 002's five-point example: corner 1 keeps its full d = 0.292 mm on a leg of
 it at 0.25.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -21,8 +21,6 @@ The last period of a motion may be shorter than dt; here it is not. A motion com
 jerk or acceleration: what changes is when it is at its end, not where it passes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 from math import factorial

@@ -17,8 +17,6 @@ motion measured is the one that is delivered, with the standstills that its samp
 the last run nothing is added: the filtered motion ends Td after the setpoints do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ All of the motion is judged again in each round: behind the first place that is 
 by no whole number of periods, so that other setpoints are delivered there.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

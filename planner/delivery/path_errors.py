@@ -11,8 +11,6 @@ then measured, where a motion matched closely would run past a vertex and be far
 Where another way along the path fits these, what was found first counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

@@ -26,8 +26,6 @@ after all. If the verdict
    vertices inside.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import NamedTuple, Protocol, Self, TypeVar

@@ -12,8 +12,6 @@ E the mean over the delays, a and b being 0 at negative times. A and B are taken
 straight lines between them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -16,8 +16,6 @@ infinite. Between them the motion goes on as at smooth joints, in exact stop mod
 has a kink there is a corner.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

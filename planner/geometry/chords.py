@@ -7,8 +7,6 @@ subtracted from the tolerance at the joints of the chords: corners rounded insid
 tolerance of the segment.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

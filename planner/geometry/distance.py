@@ -1,7 +1,5 @@
 """How far points are from the segments of the programmed path near the ones that they are at."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -15,8 +15,6 @@ Alone it moves from rest to rest in the shortest time (base/point_to_point.py), 
 while the other axes wait.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

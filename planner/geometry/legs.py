@@ -8,8 +8,6 @@ The kernels see one numpy record per leg (`leg_dtype`): a tuple of ten arrays wo
 per call.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A curve of degree p with control points P_i, weights w_i and knots u_i is r(u) =
 w_i, on the domain [u_p, u_n].
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from functools import cached_property

@@ -8,8 +8,6 @@ speed is symmetric about its middle, so its mean is F / 2.) A move of the length
 d.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -4,8 +4,6 @@ On a span the point is sum_m coef[m] tau^m, tau in [0, 1]; it stands for the pro
 `begin` to `begin + width`, counted along the legs from the start of the job [mm].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -14,8 +14,6 @@ likewise. Behind the place of a joint the feed is that of the next block; it is 
 feed changes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The axes that F goes by: x, y and z, where they stand u, v and w, where these stand too the rotary axes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

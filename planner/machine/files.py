@@ -1,7 +1,5 @@
 """Machine files, and the machines that come with the package."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import tomllib

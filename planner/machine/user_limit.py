@@ -29,8 +29,6 @@ rows are not close to linear and a margin (feedrate/sampling/own_rows.py), tight
 the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, Protocol

@@ -4,8 +4,6 @@ A time gives an arc length s by the time law; the polynomial of the grid interva
 parameter w, and that the place and its derivatives.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

@@ -1,7 +1,5 @@
 """A motion of the tip as a motion of the joints, the setpoints that the axis controllers get, and back."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

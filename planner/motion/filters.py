@@ -24,8 +24,6 @@ M is zero at w_r for T = k 2 pi / w_r (eq. 10). A mode with damping ratio z ring
 what then remains of it is |M| at its pole -z w_r + i w_d, about z for small z.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 from math import factorial

@@ -4,8 +4,6 @@ motion down where it must.
 The judge has code of its own for each of them (verifier/limits.py, verifier/user_limits.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

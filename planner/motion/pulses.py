@@ -15,8 +15,6 @@ The paper floors the long axis' pulses, n'_x = floor(T V_x), and carries the sho
 (benchmarks/solvers/pulse_variants.py).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -15,8 +15,6 @@ from there by the slope of the polynomial, and where that is not enough, steps b
 (`_refine`). The samples themselves are in at_times.py.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

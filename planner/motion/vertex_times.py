@@ -8,8 +8,6 @@ decide, not nearness alone: closed paths, full circles and neighbouring turns of
 (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -14,8 +14,6 @@ motion (pmCircleInit goes by a length, not by an angle). P adds P - 1 turns. Pla
 about z, (z, x) about y, (y, z) about x.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

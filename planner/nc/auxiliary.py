@@ -7,8 +7,6 @@ are divided so that n changes by at most `SURFACE_STEP` in a part, and a part ha
 radius; an arc has that of its largest.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

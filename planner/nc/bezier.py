@@ -9,8 +9,6 @@ Here the (w_i P_i, w_i) are used as they stand, one more coordinate: knots are i
 pieces halved by averages of them, which keeps the curve exactly (Piegl and Tiller, The NURBS Book, ch. 5).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -6,8 +6,6 @@ have it. Homing is a rapid to the position of G28, else to machine zero, and sai
 may move ($J jogs) and is refused.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.nc import codes

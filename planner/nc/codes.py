@@ -5,8 +5,6 @@ Codes are integers in tenths, as RS274NGC has them: G61.1 is 611. Two codes of o
 each other.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

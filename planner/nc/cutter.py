@@ -20,8 +20,6 @@ refuses an arc that begins early by more than 0.0254 in mm programs where a corn
 vectors in the plane are complex numbers: n(t) = i t.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Sequence

@@ -15,8 +15,6 @@ level before the series (G98), if that is higher.
 to `CLEARANCE` above the last depth. At G88 the operator retracts, and the plan has a rapid for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

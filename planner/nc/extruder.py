@@ -9,8 +9,6 @@ E is in the program's units, and starts at 0. The words are gone through once mo
 blocks are known: a row of the program has one block at most where E stands beside G0 to G3.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, NamedTuple

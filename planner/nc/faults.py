@@ -5,8 +5,6 @@ them. An axis that is not planned may be named as long as it does not move: all 
 after G91 they are 0. The compiled loop (plain.py) checks it by `treatment` and `parked`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -6,8 +6,6 @@ describe only that. A corner is the turn between the end of one feed move and th
 tangents; moves of length zero are passed over, and a rapid, dwell or stop between two moves separates them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -9,8 +9,6 @@ P words are dwells beside G4, and of a canned cycle on the line or in force. Lin
 seconds. Fanuc and Haas have all of them in milliseconds; written with a point Haas takes seconds.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 

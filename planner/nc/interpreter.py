@@ -8,8 +8,6 @@ F is read in the units in force *before* a G20 or G21 on its line. Rows that are
 goes on with the next line, so that `info` can show them all.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple

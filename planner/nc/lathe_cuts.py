@@ -21,8 +21,6 @@ the moves of G75, and that the first groove has no relief: the programming manua
 55.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

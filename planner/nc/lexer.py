@@ -13,8 +13,6 @@ float(text): the digits form an integer below 2^53 and the point a power of ten 
 one division rounds once. Longer numbers are marked NaN by the compiled loop and read by Python.
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_right
 from dataclasses import dataclass, replace

@@ -1,8 +1,6 @@
 """Motion of blocks: G0 to G3, splines, drilling cycles and threads, G28 and G30, homing by switches, and the
 words that switch cutter radius compensation (cutter.py) with what is refused while it is on."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -6,8 +6,6 @@ I, K and R stay radii. An arc in G18 or G19 lies in a plane of two axes only if 
 system is a quarter turn; other angles are refused there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

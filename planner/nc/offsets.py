@@ -16,8 +16,6 @@ else of the rotary axes. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes 
 turn, forwards unless the number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -7,8 +7,6 @@ engraving). It follows the same rules as the interpreter: feed first, then S, th
 is not certainly right is left to the interpreter, which says what is wrong.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

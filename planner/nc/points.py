@@ -5,8 +5,6 @@ The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n
 moves, and `tolerance` [mm] or null. Numbers are written so that they read back exactly.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

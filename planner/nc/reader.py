@@ -3,8 +3,6 @@ line, column, the word, and what to do. The content of a text says which of the 
 content does not.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import re

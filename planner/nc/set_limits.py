@@ -15,8 +15,6 @@ diagonal the axes' own let the path have up to sqrt(3) of it, which is said too.
 change nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

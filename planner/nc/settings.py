@@ -11,8 +11,6 @@ stands first on its line, its own words are
 and P and Q behind a G code or a coordinate.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption

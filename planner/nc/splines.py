@@ -5,8 +5,6 @@ A curve of several lines is one block, at the line where it begins. The knots of
 repeated, as LinuxCNC has them; those of G6.2 stand in its lines, as Fanuc has it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

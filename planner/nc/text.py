@@ -6,8 +6,6 @@ words for the events, of which M0, M1, M6 and M60 are full stops by themselves. 
 `DECIMALS`, a tenth of what the reader may be off.
 """
 
-from __future__ import annotations
-
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.program import Kind, PathControl, Program, plain

@@ -16,8 +16,6 @@ Tapers of length E at its entry (L1), its end (L2) or both (L3) lead between the
 depth; on them the pitch along z stays P.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ minute; the next other one has G94 and its feed.
 Numbers are rounded down to `SIGNIFICANT` digits: each move takes up to 0.1 % longer than asked.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A comparison of methods (report/compare.py) as a table for the terminal, as JSON and as CSV."""
 
-from __future__ import annotations
-
 import csv
 import functools
 import io

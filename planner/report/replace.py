@@ -12,8 +12,6 @@ wait, and what is hidden there under the lock is the leftover of a killed run. W
 without such locks do without.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import itertools

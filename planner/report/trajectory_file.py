@@ -25,8 +25,6 @@ as Parquet (`.parquet`; the schema's key `planner` holds pulses per mm and the t
 or CSV (`.csv`). The file appears as a whole: it is written beside its place, forced to disk and renamed.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ Only `t` and the positions are required. Positions may also be one NumPy array (
 axes, `xyz`. Columns of other names are left alone.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

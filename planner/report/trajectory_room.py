@@ -14,8 +14,6 @@ Times are nearly always k dt. Where every time but the last is within its roundi
 digits, they are taken as that. The last period may be shorter.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import zipfile

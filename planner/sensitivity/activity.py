@@ -8,8 +8,6 @@ time, and the prices tell which of them costs time. Of the bounds on the feed it
 lowest is active. "none" is the time in which no limit is reached, "rest" that of the dwells.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -12,8 +12,6 @@ how much more each of them takes of it. Corner shapes that filters and limits de
 scaled there as Bezier corners are, and bend while they grow: they are priced to within a third.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

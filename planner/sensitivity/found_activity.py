@@ -5,8 +5,6 @@ A limit, or the tolerance, is active in a step that comes within `HELD` of it; s
 Shown is the one that has the largest price there. Where the motion of the start stays, it is what held that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

@@ -14,8 +14,6 @@ Where the programmed feed and an axis velocity hold together, more of one alone 
 motion has, that part is what counts. Where the start's motion stays nothing is priced.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from math import fsum  # `sum` rounds otherwise from Python 3.12 on
 

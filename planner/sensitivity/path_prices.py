@@ -24,8 +24,6 @@ problem says, 10 um half, on five points at 4 ms, where chords use 40 %. There n
 would be is a hint.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

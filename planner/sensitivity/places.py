@@ -12,8 +12,6 @@ with multipliers lam of the rows g and mu of the bounds. A neighbour that cannot
 smaller.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The records of a plan, the same for every method: tables of corners, the profile on the grid, prices."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -10,8 +10,6 @@ The distance itself is taken from the vector p(x) - q, never from an expanded sq
 digits; at the nearest point an error of x enters it only squared.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -10,8 +10,6 @@ it would leave only its tip to pass the vertex at. What fits there by less than 
 near to two vertices in the wrong order, which is a fault (findings.out_of_order).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -7,8 +7,6 @@ fail without them, and says where they act. Eq. 20 is a comparison: a motion may
 fails for it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

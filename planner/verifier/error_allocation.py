@@ -41,8 +41,6 @@ the motion gains over it. It is no bound: other shapes within eps may be faster,
 turn at each of their corners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial, reduce

@@ -20,8 +20,6 @@ How far a motion that is lost was off is measured within the tolerance: from the
 can be on, in order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """The faults of a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for
 who made it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum

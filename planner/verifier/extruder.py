@@ -16,8 +16,6 @@ Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the dig
 with.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

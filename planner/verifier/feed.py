@@ -17,8 +17,6 @@ So far as sampling does not tell where a block begins and ends (`reach` in switc
 both, and the larger F counts.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -37,8 +37,6 @@ before the first setpoint that one, and after the last one that. The periods nee
 velocity was not delivered, it is what whoever read the positions derived from them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """From what the readings of a motion showed to checks and to faults in sentences."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

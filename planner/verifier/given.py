@@ -1,8 +1,6 @@
 """The state of knowledge about the numbers of a trajectory: which of them were delivered, and to how many
 digits."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 

@@ -23,8 +23,6 @@ and the tool's tip in the machine is the joints plus the vector from the spindle
 Program coordinates have the tool's length in z (G43), which turns with neither.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """`verify`: from a delivered motion to a verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

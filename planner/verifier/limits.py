@@ -26,8 +26,6 @@ where the second term is taken off.
 Only columns that were delivered are judged as columns, and compared with the positions.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -32,8 +32,6 @@ known. Its samples enter no contour error, and a vertex on lost pieces that no c
 the distance inf.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ are vertices like those of the program: the motion has to pass each of them in o
 cannot be left out although its ends coincide. A curve is cut likewise (bends.py).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ speed meanwhile is below s = min(|u1|, |u2|) - A max(h1, h2), so that
     P >= s |u2 - u1| 2/(h1 + h2).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -20,8 +20,6 @@ comes close to the bound but for its decay. After the end nothing shakes it any 
 The deflection during the motion holds its static part too, a/w^2 under a constant acceleration a.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -27,8 +27,6 @@ Seconds. No program takes 200 times as long as at its programmed feed, but for a
 less.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -14,8 +14,6 @@ A speed of (1 - 1e-3) F is a fault on a thread longer than 2000 eps. A move shor
 not judged.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -14,8 +14,6 @@ tau(d1), and no longer. Of a motion that leaves with the whole jerk, that is how
 samples fall.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The limits need to know the block of the path under each sample, so the matching
 first. Three samples are carried over from block to block, for the third differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 

@@ -23,8 +23,6 @@ together is known to two chords. So far from the switch a place belongs to both 
 counts. On a straight line d = 0, and at 100 mm/s, 4,000 mm/s2 and 1 ms that is 3e-5 mm.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

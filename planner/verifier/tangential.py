@@ -9,8 +9,6 @@ direction turns by no more than N h/(2 v) from that of the middle, so that L - c
 taken off.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -13,8 +13,6 @@ derivatives, against the largest bound of the samples that they are taken from. 
 rounding of q and of the positions, times dq/dx.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

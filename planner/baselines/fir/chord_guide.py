@@ -8,8 +8,6 @@ fast the limits of the axes let a point go round a circle of this curvature in t
     |a_k| <= kappa v^2 amplitude_k,   |j_k| <= kappa^2 v^3 amplitude_k,   amplitude_k = sqrt(T_k^2 + N_k^2) = sqrt(1 - n_k^2).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ gap of standstill at some joints, and ends with a standstill that lasts until th
 dwell. Times are counted from the start of the run, so that an hour of motion costs no digits.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

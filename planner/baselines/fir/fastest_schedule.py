@@ -9,8 +9,6 @@ costs when the most promising are settled.
 Where the command waits anyway a full stop costs little more, and what it parts may have filters of its own.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

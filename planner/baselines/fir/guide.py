@@ -9,8 +9,6 @@ declared so is checked and made read-only, picked for some runs and put back, fo
 way.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields

@@ -16,8 +16,6 @@ leave the motion by up to |normal acceleration| dt^2/8 more, which is added.
 Acceleration is linear and jerk constant on every piece: their peaks are exact.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

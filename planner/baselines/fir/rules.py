@@ -47,8 +47,6 @@ Peaks of the axes within an isolated corner (Tv >= Td), with eta = (Tk - T2)/T2 
     jerk          max(|w1|, |w2|;  |w1 + w2| if 0 < Tk < 2 T2;  |w2 - w1| if Tk > T1) / (T1 T2)
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

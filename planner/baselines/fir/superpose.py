@@ -12,8 +12,6 @@ what the step that was commanded Td ago contributes by itself:
     p = p_e + w_e (t - t_e - Td/2) + sum Dw R(t - t_e),    v = w_e + sum Dw S(t - t_e),    a = sum Dw h(t - t_e).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

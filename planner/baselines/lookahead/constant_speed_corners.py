@@ -12,8 +12,6 @@ with the samples g_i of one component a smooth function exceeds them by at most 
 g_{i+1}| / 8 but for terms of fourth order, which is added. What is added depends on where intervals end.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

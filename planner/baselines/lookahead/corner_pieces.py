@@ -24,8 +24,6 @@ has the accelerations M_i that solve (h_i the pieces' durations, d_i = (p_{i+1} 
 and on piece i starts with the velocity d_i - h_i (2 M_i + M_{i+1})/6 and has the jerk (M_{i+1} - M_i)/h_i.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -12,8 +12,6 @@ A limit A_n on the normal acceleration adds alpha <= A_n/(2s) and Ac <= A_n/s: a
 largest, the acceleration is normal, Vc 2s/T1 and Ac s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

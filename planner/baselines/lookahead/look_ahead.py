@@ -23,8 +23,6 @@ corner at constant low speed
 Everything is linear in the number of joints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ From V' over D (measured from where the ramp would have begun) a motion reaches 
              V' + j y^2,  y > 0 from  j y^3 + 2V' y - D = 0     below   (Cardano; V' may be negative).
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 from typing import Any, NamedTuple
 

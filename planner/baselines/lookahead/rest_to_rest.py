@@ -6,8 +6,6 @@ own, so a spline is a chain of legs between two full stops, passed from one to t
 allow and without acceleration (look_ahead.py).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ the same job use them as well. A program, machine or method that has changed sin
 points do not belong to the same table.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping, Sequence

@@ -8,8 +8,6 @@ the files, so that workers need no file system in common. A point whose worker d
 by Dask, up to `DEATHS` times; a local process that dies ends the sweep, and the points so far are kept.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import logging

@@ -7,8 +7,6 @@ the chords then miss by more, which is measured, the density is raised and all i
 rapid moves, standstills and places where something else happens (an M word) are vertices in any case.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ A word that stands in no table is refused with its line. Where the tables come f
     LinuxCNC  2.9: docs/src/gcode/g-code.adoc, m-code.adoc, overview.adoc
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field, replace
 

@@ -4,8 +4,6 @@ The rules are the control's own: E is a step after M83 and under G91; Marlin's G
 at the start nothing tells, nor after a tool change or a macro; G92 and places do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -25,8 +25,6 @@ Held against LinuxCNC's own planner on five programs, and on their planned paths
 um and P of 1 um and more: -2.1 to +0.9 % (tests/controls/export/test_linuxcnc_model.py has some of them).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

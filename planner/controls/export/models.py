@@ -32,8 +32,6 @@ Tested against these controls' own code on five programs where their times are a
 (tests/controls/export/test_models.py); Marlin's were not.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ G90, G91, the motion code and F are said again wherever straight moves have chan
 that it belongs to: grbl empties its buffer at an S on a line of its own.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import PurePath
 from typing import NoReturn

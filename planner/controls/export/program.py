@@ -12,8 +12,6 @@ Plan and chords share the tolerance: what the verdict found of the plan's errors
 of LinuxCNC add up to it at most. A plan that uses all of it leaves no room; one with a tenth less does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

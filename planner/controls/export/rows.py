@@ -14,8 +14,6 @@ before. Everything else stays a line of its own:
     E of an extruder                       beside straight moves; arcs that a printer does not know share theirs among their chords
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """The text of a plan's program whose lines an export goes by: its own, the expanded one, or one that is
 written for it."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import re

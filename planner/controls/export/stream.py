@@ -22,8 +22,6 @@ which is the motion itself where its jerk is constant in the interval. So a few 
 stay within a given distance of every setpoint on every axis.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The words of a line beside its move, in the words of a control: tool, spindle, coolant, modes, dwells,
 stops, codes of other kinds."""
 
-from __future__ import annotations
-
 from planner.base.units import MILLISECOND
 from planner.controls.export.controls import is_command, is_setting
 from planner.controls.export.output import Output, called

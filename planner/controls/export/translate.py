@@ -5,8 +5,6 @@ move, and a stop after it. The move is that of the program, word for word, or a 
 same coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

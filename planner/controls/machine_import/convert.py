@@ -15,8 +15,6 @@ Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); 
 machines for such controls.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,6 @@
 """grbl's settings, as `$$` prints them: $110-$115 largest rates [mm/min], $120-$125 accelerations [mm/s2],
 $11 junction deviation [mm], $130-$135 travel [mm], always in mm ($13 is the unit of reports)."""
 
-from __future__ import annotations
-
 import re
 
 from planner.base.units import SECONDS_PER_MINUTE

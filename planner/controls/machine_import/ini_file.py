@@ -14,8 +14,6 @@ Klipper: klippy/configfile.py):
                where the rest says nothing
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -6,8 +6,6 @@ them alone. What it does at corners is in the table [control] of the machine fil
 times (controls/export/models.py).
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.base.errors import InputError

@@ -17,8 +17,6 @@ The table [kinematics] is what the commands of HAL set the pins of the kinematic
 `[TABLE]KEY`. Pins that nothing sets are 0, as in LinuxCNC (src/emc/kinematics/trtfuncs.c).
 """
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

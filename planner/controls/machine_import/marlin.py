@@ -9,8 +9,6 @@ deviation (M205 J), or a jump of velocity by axis that they may have (M205 X Y Z
 jerk.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE

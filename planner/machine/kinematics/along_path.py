@@ -5,8 +5,6 @@ A path gives position and derivatives of all its axes, p(s) and the angles; q(s)
 derivatives that the chain rule gives to third order (base/series.py), exact but for rounding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

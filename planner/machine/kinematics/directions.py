@@ -12,8 +12,6 @@ direction then leaves the plane of the two directions by more than the tolerance
 alone, the path has too few points for the machine, and is refused with the place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ Derivatives along a path are those of the Taylor polynomial p + p' t + p'' t^2/2
 expression, by casadi's automatic differentiation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -9,8 +9,6 @@ a fast table carries far from its axis may be held by it; the verdict then has v
 jerk.x at 1.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -11,8 +11,6 @@ Between instructions may stand device control (ESC . letter), the frame of print
 at the end, characters that are no instruction; they are left out with a note.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ EA leave pen and position as they found them. A file starts at (0, 0) with the p
 absolute coordinates. A fault is recorded and reading goes on, so that `info` can show them all.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from bisect import bisect_left

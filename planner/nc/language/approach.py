@@ -12,8 +12,6 @@ R is that of the tool's centre. Departure is the same, backwards. The coordinate
 at H (approach) or at the end (departure): so manuals up to TNC 640 have it, later ones move all axes at once.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ asks its condition in the block of its body, at its end. A line of the Python so
 so that an error of Python's arithmetic is told as the statement's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -11,8 +11,6 @@ the next one in the plane; all others are given out at the end, since a corner m
 before it.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Iterator

@@ -7,8 +7,6 @@ before the first % is skipped where it cannot be a program: some line of it is n
 words has a code or a coordinate.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

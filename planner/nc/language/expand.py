@@ -1,8 +1,6 @@
 """A program with parameters, expressions, loops or subprograms through the interpreter, and what was expanded
 on the way."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import re

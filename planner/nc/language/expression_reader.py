@@ -1,8 +1,6 @@
 """Reading expressions by the ranks of their operators (Pratt's method): one reader, and the table of a
 dialect (`tree.Language`)."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import ClassVar

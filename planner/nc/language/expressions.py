@@ -1,8 +1,6 @@
 """Python source of a language: expressions by its templates, and basic blocks, lines that run one after the
 other."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

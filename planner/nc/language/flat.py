@@ -5,8 +5,6 @@ the program has it: moves, arcs, feeds, dwells, canned cycles, work offsets, too
 numbers and comments are left out. Numbers are rounded to `DECIMALS`.
 """
 
-from __future__ import annotations
-
 from pathlib import PurePath
 
 from planner.machine import Machine

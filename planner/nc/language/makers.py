@@ -10,8 +10,6 @@ their order, which is not documented, is refused. A shift alone becomes a G52; e
 the coordinates of the work system (`travel`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -6,8 +6,6 @@ Also sentences that are said first (`assumed_row`), and holes of several dialect
 as upper limit, with a full stop where the spindle turns round, pecking with decreasing infeeds, milled bores.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 

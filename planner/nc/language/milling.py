@@ -11,8 +11,6 @@ t from its sides and (s - t) sqrt(2) from the inner corner; both are more than t
 if s > (1 + 1/sqrt(2)) r. So that is the most.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ letters, places, the numbers that are not computed. `take` puts both together, s
 a few numpy operations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

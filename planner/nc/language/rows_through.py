@@ -6,8 +6,6 @@ direction and the side of compensation change. Rows come out absolute (G90), wit
 the expanded program needs neither frames nor compensation. With none in force rows pass as they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

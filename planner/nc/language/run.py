@@ -8,8 +8,6 @@ A program may run for ever. It is stopped after `TURNS_MAX` turns of loops, jump
 calls, with a sentence that names the line.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections import Counter
 from collections.abc import Callable, Mapping

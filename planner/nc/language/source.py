@@ -5,8 +5,6 @@ word or a code that calls a subprogram, is looked at again here as text; all oth
 of rows (`tree.PlainRows`).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ Blanks mean nothing, also inside numbers and names; case means nothing. Operator
 left to right; a sign belongs to what follows it, so that -2**2 is 4.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

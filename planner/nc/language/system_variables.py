@@ -6,8 +6,6 @@ of a machine here: offsets, G28 and G30 positions and tool lengths are kept by a
 machine's unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Commands that ask and set the way from a program's rows to the interpreter (`rows_through`): frame,
 compensation, corners."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from planner.base.arrays import FloatArray

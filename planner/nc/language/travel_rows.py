@@ -1,8 +1,6 @@
 """Rows of words on their way to the interpreter, the moves that they say, in mm, and the frame that maps
 these and their arcs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

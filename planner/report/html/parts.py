@@ -1,7 +1,5 @@
 """Parts that pages share: columns of numbers, plotly's script, templates, and filling these."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib

@@ -1,7 +1,5 @@
 """A plan again, from the files that `planner plan -o DIR` wrote: for a report of it."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

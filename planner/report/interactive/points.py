@@ -1,7 +1,5 @@
 """A program of points: straight moves from one to the next, for paths that do not come from an NC program."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Fanuc's and Haas' macros: their expressions, loops (WHILE [c] DO 1 ... END 1), and calls and returns (M97,
 M98, M99, G65, G66)."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from planner.nc.language import tree

@@ -4,8 +4,6 @@
 A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles.py) and G70 runs to cut it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

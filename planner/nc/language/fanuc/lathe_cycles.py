@@ -5,8 +5,6 @@ Rows are those of a lathe under LinuxCNC: G7 (diameters), G18, G33 for threads; 
 to can be read by others.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable, Iterable, Mapping

@@ -6,8 +6,6 @@ K, G50 S the D of G96, G4 X U a dwell, T0203 rows of its own (T2 M6, G43 H3; T02
 G50 with coordinates are refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from planner.nc.language.fanuc.parser import FanucParser

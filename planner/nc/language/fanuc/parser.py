@@ -6,8 +6,6 @@ differs from 0 for EQ and NE, and a word with such a value is left out. The righ
 no brackets. AND binds as * does, OR and XOR as + does.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.nc.language import tree

@@ -22,8 +22,6 @@ Patterns act where they are defined, on the cycle that was defined last; Q301 0:
 at Q204 above the surface. In all cycles Q200 clearance, Q201 depth, Q203 surface, Q204 second clearance, Q211 dwell at the bottom.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -4,8 +4,6 @@ Source: HEIDENHAIN TNC 640 (34059x), conversational programming, M functions of 
 axes.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.base.units import MM_PER_INCH

@@ -1,7 +1,5 @@
 """Labels, calls, repeats, Q parameters and FN functions of a conversational program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from planner.nc.language import tree

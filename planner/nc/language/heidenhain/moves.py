@@ -9,8 +9,6 @@ CT's centre lies on the normal n of the direction at the start, at radius = |v|^
 end; behind CR the direction is that of the moves that were executed (`makers.tangent_arc`).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ LBL n ... LBL 0 is a subprogram where CALL LBL n calls it, and runs where the pr
 LBL n REP m goes back to LBL n m times. The tool axis is Z. FMAX is rapid for its block only.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

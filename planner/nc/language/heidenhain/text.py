@@ -8,8 +8,6 @@ on the next line. What follows `;` is a comment, and a line that begins with `*`
     EXP; PI
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ program, else that of the file name.ngc in its folder. Parameters 1 to 30 are a 
 then zeros; so are named parameters without an underscore. M98 shares its caller's.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.nc.language import tree

@@ -6,8 +6,6 @@ RND= CHR= CHF=                  rounding or chamfer at the end of the move
 G40 G41 G42                     radius compensation (NORM, G450)
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.base.units import MM_PER_INCH

@@ -5,8 +5,6 @@ Variables of DEF and PROC are a call's own; R parameters are shared. Commands of
 in shared names.
 """
 
-from __future__ import annotations
-
 import re
 
 from planner.nc.language import tree

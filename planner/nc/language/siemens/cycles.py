@@ -27,8 +27,6 @@ Patterns of holes, each drilled by the cycle of MCALL:
 Controls may begin a row at its other end, if that is nearer; here it begins at its first hole.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 

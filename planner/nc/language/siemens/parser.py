@@ -4,8 +4,6 @@ Lines of plain words stay as the lexer split them. The mode of G90 and G91 is th
 for AC and IC.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -9,8 +9,6 @@ Variables are declared by DEF and are 0 at first; R parameters are R0 to R999. $
 $P_EP[X] are positions of an axis.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Container

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
-from planner.nc.program import Kind, PathControl, Program, SplineTable
+from planner.nc.points import program_of_points
+from planner.nc.program import Kind, Program, SplineTable
 
+SOURCE = "NURBS"  # what messages call the program
 # Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured
 # [fraction of the chord].
 CHORDS_MIN, HALVINGS = 4, 40
@@ -126,7 +128,7 @@ class Nurbs:
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
         points = self.at(self.stations(sagitta))
-        return chords(points, self.axes, feed)
+        return program_of_points(points, np.full(len(points) - 1, feed), None, SOURCE, self.axes)
 
     def exact_program(self, feed: float) -> Program:
         """The curve itself as a program of one block, as G6.2 is read: every method plans it.
@@ -141,29 +143,7 @@ class Nurbs:
             raise InputError(f"NURBS of degree {self.degree}; exact curves have degree 1, 2 or {DEGREE_MAX}")
         pieces = cubic_pieces(homogeneous(self.points, self.weights), self.knots, self.degree)
         points, weights = pieces[..., :-1] / pieces[..., -1:], pieces[..., -1]
-        program = chords(points[[0, -1], [0, -1]], self.axes, feed)
+        ends = points[[0, -1], [0, -1]]
+        program = program_of_points(ends, np.full(1, feed), None, SOURCE, self.axes)
         splines = SplineTable(block=np.zeros(len(pieces)), points=points, weights=weights)
         return dataclasses.replace(program, kind=np.full(1, Kind.SPLINE), splines=splines)
-
-
-def chords(points: FloatArray, axes: tuple[str, ...], feed: float) -> Program:
-    """A program of G1 moves at `feed` [mm/s] through points (B+1, A) [mm]; the machine stands at the first of
-    them."""
-    blocks = len(points) - 1
-    none: Array = np.zeros(0)
-    return Program(
-        source="NURBS",
-        axes=axes,
-        start=points[0],
-        kind=np.full(blocks, Kind.LINE),
-        end=points[1:],
-        feed=np.full(blocks, feed),
-        dwell=np.zeros(blocks),
-        line=np.arange(1, blocks + 1),
-        path_control=np.full(blocks, PathControl.BLEND),
-        tolerance=np.full(blocks, np.nan),
-        arc_block=none,
-        arc_center=np.zeros((0, len(axes))),
-        arc_normal=none,
-        arc_sweep=none,
-    )

@@ -20,11 +20,15 @@ _FORMAT = "points"
 
 
 def program_of_points(
-    position: FloatArray, feed: FloatArray, tolerance: float | None, source: str = SOURCE
+    position: FloatArray,
+    feed: FloatArray,
+    tolerance: float | None,
+    source: str = SOURCE,
+    axes: tuple[str, ...] = AXES,
 ) -> Program:
     """A program that goes straight from each point to the next.
 
-    position  : (n+1, 3) x, y and z [mm]
+    position  : (n+1, A) places of the axes, x, y and z where no others are named [mm, rad]
     feed      : (n,) [mm/s]; inf for rapid moves
     tolerance : contour error budget [mm]; None for that of the machine
     source    : what messages call it
@@ -34,7 +38,7 @@ def program_of_points(
     moves = len(position) - 1
     return Program(
         source=source,
-        axes=AXES,
+        axes=axes,
         start=position[0],
         kind=np.where(np.isinf(feed), Kind.RAPID, Kind.LINE),
         end=position[1:],
@@ -43,6 +47,7 @@ def program_of_points(
         line=np.arange(1, moves + 1),
         path_control=np.full(moves, PathControl.BLEND),
         tolerance=np.full(moves, np.nan if tolerance is None else tolerance),
+        arc_center=np.zeros((0, len(axes))),
     )
 
 

@@ -1,6 +1,5 @@
 """A program of points: straight moves from one to the next, for paths that do not come from an NC program."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES, Machine, load_machine
-from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
+from planner.machine.kinematics.chain import LINEAR, kinematics_of
 from planner.machine.kinematics.directions import rotary_along
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.points import AXES, program_of_points
-from planner.nc.program import Program, no_splines
+from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.planning.methods.registry import DEFAULT_MACHINE
 from planner.report.judging import judge
@@ -126,21 +125,9 @@ def tip_path(
         raise InputError(
             f"angles or directions: {turns.shape[0]} for {len(at)} tips; one finite row for each is needed"
         )
-    return _program(chain, np.hstack([at + np.array([0.0, 0.0, chain.length]), turns]), feed, tolerance)
-
-
-def _program(chain: Chain, points: FloatArray, feed: float | None, tolerance: float | None) -> Program:
-    moves = len(points) - 1
-    speed = np.full(moves, np.inf if feed is None else feed)
-    plain = program_of_points(np.ascontiguousarray(points[:, : len(LINEAR)]), speed, tolerance)
-    return dataclasses.replace(
-        plain,
-        axes=chain.axes,
-        start=points[0],
-        end=points[1:],
-        arc_center=np.zeros((0, len(chain.axes))),
-        splines=no_splines(len(chain.axes)),
-    )
+    points = np.hstack([at + np.array([0.0, 0.0, chain.length]), turns])
+    speed = np.full(len(at) - 1, np.inf if feed is None else feed)
+    return program_of_points(points, speed, tolerance, axes=chain.axes)
 
 
 def verify(

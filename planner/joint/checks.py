@@ -38,6 +38,7 @@ class Keeps(NamedTuple):
     budget: FloatArray  # (R,)
     curvature: FloatArray  # (R,)
     vertex_budget: FloatArray  # (R+1,)
+    passed: Array  # (R,)
 
 
 @njit(cache=True, error_model="numpy")
@@ -126,21 +127,12 @@ def _split(c, part, piece):
 
 
 @njit(cache=True, error_model="numpy")
-def _of_arc(keeps, r, c, s0, end, known, budgets, work):
-    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten,
-    from the place s0; budgets (2,) of both ends. It ends at the place `end`, or, if that is not known, at one
-    sought from there. Returns where it ends too."""
-    legs, budget = keeps.legs, keeps.budget[r]
-    point, ahead, tangent, ahead_tangent, bend, piece, s, part_of_s = work
-    worst = 0.0
-    s3 = end if known else max(nearest_point(legs, r, c[3], end, point, tangent), s0)
-    formula_point(legs, r, s3, ahead, ahead_tangent, bend)
-    s[2, 0] = s3 + along_tangent(legs.length[r], c[2], s3, False, ahead, ahead_tangent)
-    formula_point(legs, r, s0, ahead, ahead_tangent, bend)
-    s[1, 0] = s0 + along_tangent(legs.length[r], c[1], s0, True, ahead, ahead_tangent)
-    s[0, 0], s[1, 0], s[2, 0], s[3, 0] = s0, min(s[1, 0], s3), max(s[2, 0], s0), s3
-    if s[1, 0] > s[2, 0]:
-        s[1, 0] = s[2, 0] = 0.5 * (s[1, 0] + s[2, 0])
+def _in_pieces(keeps, r, c, s, budgets, work):
+    """The largest share of the tolerance of a step with the control points c (4, A) whose places are the cubic
+    with the ordinates s (4, 1), both overwritten; budgets (2,) of both ends."""
+    legs, budget, worst = keeps.legs, keeps.budget[r], 0.0
+    point, ahead, tangent, ahead_tangent, bend, piece, _, part_of_s = work
+    formula_point(legs, r, s[0, 0], ahead, ahead_tangent, bend)
     for n in range(PIECES):
         part = 1.0 / (PIECES - n)
         _split(c, part, piece)
@@ -156,7 +148,34 @@ def _of_arc(keeps, r, c, s0, end, known, budgets, work):
         last = _apart(piece[3], ahead, ahead_tangent, 0.0) / (budgets[1] if n == PIECES - 1 else budget)
         far = max(begin, inner / budget, last)
         worst = max(worst, far + bend_of(keeps.curvature[r], legs.rate[r], x) / budget)
-    return worst, s3
+    return worst
+
+
+@njit(cache=True, error_model="numpy")
+def _of_passed(keeps, r, c, s0, s3, budgets, work):
+    """The same of a step on a leg that is passed, evenly from the place s0 to s3."""
+    s = work[6]
+    for m in range(4):
+        s[m, 0] = s0 + (s3 - s0) * m / 3.0
+    return _in_pieces(keeps, r, c, s, budgets, work), s3
+
+
+@njit(cache=True, error_model="numpy")
+def _of_arc(keeps, r, c, s0, end, known, budgets, work):
+    """The largest share of the tolerance of a step on an arc with the control points c (4, A), overwritten,
+    from the place s0; budgets (2,) of both ends. It ends at the place `end`, or, if that is not known, at one
+    sought from there. Returns where it ends too."""
+    legs = keeps.legs
+    point, ahead, tangent, ahead_tangent, bend, _, s, _ = work
+    s3 = end if known else max(nearest_point(legs, r, c[3], end, point, tangent), s0)
+    formula_point(legs, r, s3, ahead, ahead_tangent, bend)
+    s[2, 0] = s3 + along_tangent(legs.length[r], c[2], s3, False, ahead, ahead_tangent)
+    formula_point(legs, r, s0, ahead, ahead_tangent, bend)
+    s[1, 0] = s0 + along_tangent(legs.length[r], c[1], s0, True, ahead, ahead_tangent)
+    s[0, 0], s[1, 0], s[2, 0], s[3, 0] = s0, min(s[1, 0], s3), max(s[2, 0], s0), s3
+    if s[1, 0] > s[2, 0]:
+        s[1, 0] = s[2, 0] = 0.5 * (s[1, 0] + s[2, 0])
+    return _in_pieces(keeps, r, c, s, budgets, work), s3
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,7 +223,10 @@ def worst_shares(keeps, leg, h, state, jerk, place):
         if ends:
             budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1])
         end = keeps.legs.length[r] if ends else max(place[i, 2], before)
-        if keeps.legs.radius[r] > 0.0:
+        if keeps.passed[r]:
+            end = place[i, 0] + 3.0 * (place[i, 1] - place[i, 0])
+            tube[i], before = _of_passed(keeps, r, c, place[i, 0], end, budgets, work)
+        elif keeps.legs.radius[r] > 0.0:
             tube[i], before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
         else:
             end = keeps.legs.length[r] if ends else last if i == N - 1 else on_line[i + 1, 0]

@@ -185,12 +185,13 @@ def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelle
     begin = np.append(0, last[:-1] + 1)
     per_length = run.length / (travelled[last + 1] - travelled[begin])
     places = np.empty((len(leg), 4))
+    number, many = np.arange(len(leg)) - begin[leg], last - begin + 1
     for k, (control, fraction) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
         there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
         x = (there - travelled[begin][leg]) * per_length[leg]
         for _ in range(NEAREST_STEPS):
             miss, along = control - run.points(leg, x), run.tangents(leg, x)
             x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[leg])
-        places[:, k] = x
+        places[:, k] = np.where(run.passed[leg], run.length[leg] * (number + fraction) / many[leg], x)
     places[begin, 0], places[last, 3] = 0.0, run.length
     return np.maximum.accumulate((places + run.offset[leg][:, None]).ravel()).reshape(-1, 4)

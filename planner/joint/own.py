@@ -205,8 +205,11 @@ class _Search:
         return Steps(h=self.guess.h, position=p, velocity=v, acceleration=a, jerk=self.jerk)
 
     def places(self) -> FloatArray:
-        """(N+1,) of the nodes along the run [mm]."""
-        return np.append(self.guess.place[:, 0], self.run.offset[-1])
+        """(N+1,) of the nodes along the run [mm]; those at vertices are there."""
+        leg = self.guess.leg
+        begins = np.diff(leg, prepend=-1) > 0
+        place = np.where(begins, self.run.offset[leg], self.guess.place[:, 0])
+        return np.append(place, self.run.offset[-1])
 
     def _side_by_side(self, begin: list[int], end: list[int], parts: bool = True) -> None:
         """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are
@@ -349,4 +352,5 @@ def keeps_of(run: TubeRun) -> Keeps:
         budget=run.budget,
         curvature=run.curvature,
         vertex_budget=run.vertex_budget,
+        passed=run.passed,
     )

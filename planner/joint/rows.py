@@ -74,6 +74,8 @@ class StepLimits(NamedTuple):
     """The limits of N steps, in the units of the problem."""
 
     leg: Array  # (N,)
+    passed: Array  # (N,) whether the step's leg is passed
+    target: FloatArray  # (N, 3, A) where the node and the inner control points belong to there
     at_vertex: Array  # (N,) whether the step's node is where its leg begins
     on: Array  # (N, R) rows that there are
     box: FloatArray  # (4, A) jerk, acceleration, velocity, velocity
@@ -215,13 +217,16 @@ def put_rows(legs, limits, x, u, lin):
         put_radii(x[i], u[i], axes, limits.feed[i], lin.radius[i])
         for m in range(3):
             _ball(y, FEED_1 + m, lin.radius[i, m], more + FEED_ROWS + m, g, n)
-        r, at_vertex, curved = limits.leg[i], limits.at_vertex[i], legs.radius[limits.leg[i]] > 0.0
+        r, at_vertex, passed = limits.leg[i], limits.at_vertex[i], limits.passed[i]
+        curved = legs.radius[r] > 0.0 and not passed
         lin.node[i] = 0.0
         for c in range(1 if curved else 3):
             vector, row = (P, C1, C2)[c], more + TUBE_NODE + c
             room = limits.room_node[i] if c == 0 else limits.room[i]
             place = lin.place[i, c]
-            if curved:
+            if passed:
+                lin.tangent[i, c], point[:] = 0.0, limits.target[i, c]
+            elif curved:
                 place = nearest_point(legs, r, y[vector], place, point, lin.tangent[i, c])
             else:
                 for k in range(axes):

@@ -51,6 +51,8 @@ ARC_FRACTION, TURN_MAX = 0.005, 0.5
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
 # axis by the budget [-]: finer ones take more steps and end hardly sooner.
 SHARP = 0.25
+# An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`).
+PASSED = 2.0
 ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
@@ -166,6 +168,14 @@ class TubeRun:
         feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
         change = np.sign(np.diff(feed, prepend=feed[0]))
         return -np.where(change != 0.0, change, _word_change(self.word))
+
+    @property
+    def passed(self) -> Array:
+        """(R,) legs whose steps have their places by number, not where they are nearest: inside of so narrow a
+        bend the nearest place stands still, goes back, or is on another branch while a motion goes on. Not
+        where F changes: there the motion has to be nearest to the vertex."""
+        changes = np.append(self.switch, 0.0) != 0.0
+        return (PASSED * self.curvature * self.budget > 1.0) & ~(changes[:-1] | changes[1:])
 
     def word_share(self, leg: Array, velocity: FloatArray) -> FloatArray:
         """(n,) share of the feed that motions use, counted in the axes that F goes by; 0 where those are

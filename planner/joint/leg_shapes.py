@@ -1,12 +1,16 @@
-"""The legs of the free optimum (run.py): where they begin, and their coefficients."""
+"""The legs of the free optimum (run.py): where they begin, their coefficients, and their feed in the axes of F."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.geometry.build import feed_groups, path_per_length
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
+from planner.geometry.word_feed import ROTARY, goes_by
+
+ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
 def edges_of(toolpath: Toolpath) -> Array:
@@ -46,3 +50,33 @@ def shapes_of(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, F
         shape["drift"][curve], shape["radius"][curve] = 0.0, 1.0 / bend
         shape["rate"][curve] = np.maximum(third / bend, np.sqrt(fourth / bend))
     return shape
+
+
+def words_of(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:
+    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why
+    no motion can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so
+    that F is a limit of its own; it has to be of the same axes everywhere, and to change with the feed in all
+    of them."""
+    groups, by = feed_groups(toolpath.axes), goes_by(toolpath)[row]
+    share = np.where(by == ROTARY, toolpath.radius, 1.0)
+    share = share / path_per_length(toolpath.axes, toolpath.radius, toolpath)[row]
+    feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
+    every = np.ones(len(groups))
+    if not (finite & (share < 1.0 - ROUNDING)).any():
+        return np.empty((len(row), 0)), every, ""
+    word = (feed * share)[:, None]
+    if len(np.unique(by[finite])) > 1:
+        return word, every, "F goes by other axes from block to block"
+    if (np.sign(np.diff(feed, prepend=feed[0])) * word_change(word) < 0.0).any():
+        return word, every, "F rises where the feed in all axes falls"
+    return word, (groups == by[finite][0]).astype(np.float64), ""
+
+
+def word_change(word: FloatArray) -> FloatArray:
+    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for
+    rounding of it."""
+    if not word.shape[1]:
+        return np.zeros(len(word))
+    known = np.where(np.isfinite(word[:, 0]), word[:, 0], np.finfo(np.float64).max)
+    change = np.diff(known, prepend=known[0])
+    return np.where(np.abs(change) > ROUNDING * known, np.sign(change), 0.0)

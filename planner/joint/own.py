@@ -140,12 +140,8 @@ class _Cut:
     steps."""
 
     def __init__(self, guess: Guess):
-        self.leg, self.h, self.state, self.place = (
-            guess.leg,
-            guess.h.copy(),
-            guess.state.copy(),
-            guess.place.copy(),
-        )
+        self.leg, self.h = guess.leg, guess.h.copy()
+        self.state, self.place = guess.state.copy(), guess.place.copy()
 
     def __len__(self) -> int:
         return len(self.h)
@@ -206,9 +202,8 @@ class _Search:
 
     def places(self) -> FloatArray:
         """(N+1,) of the nodes along the run [mm]; those at vertices are there."""
-        leg = self.guess.leg
-        begins = np.diff(leg, prepend=-1) > 0
-        place = np.where(begins, self.run.offset[leg], self.guess.place[:, 0])
+        begins = np.diff(self.guess.leg, prepend=-1) > 0
+        place = np.where(begins, self.run.offset[self.guess.leg], self.guess.place[:, 0])
         return np.append(place, self.run.offset[-1])
 
     def _side_by_side(self, begin: list[int], end: list[int], parts: bool = True) -> None:
@@ -340,17 +335,8 @@ class _Search:
 
 def keeps_of(run: TubeRun) -> Keeps:
     """The limits of the run, for the kernel."""
-    names = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
-    of_legs = {name: getattr(run, name) for name in names}
-    return Keeps(
-        legs=LegFormulas(**of_legs, points=run.curves.points, weight=run.curves.weight),
-        velocity=run.velocity,
-        acceleration=run.acceleration,
-        jerk=run.jerk,
-        feed=run.feed,
-        normal=run.across_max,
-        budget=run.budget,
-        curvature=run.curvature,
-        vertex_budget=run.vertex_budget,
-        passed=run.passed,
-    )
+    formula = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
+    same = ("velocity", "acceleration", "jerk", "feed", "budget", "curvature", "vertex_budget", "passed")
+    of_legs, of_run = ({name: getattr(run, name) for name in names} for names in (formula, same))
+    legs = LegFormulas(**of_legs, points=run.curves.points, weight=run.curves.weight)
+    return Keeps(legs=legs, normal=run.across_max, **of_run)

@@ -144,6 +144,8 @@ def _limits(
         if node in (0, len(cut)):
             more = on[step, 8 * len(run.axis) :]
             more[rows.ORDER_MID] = more[rows.NORMAL_ROWS : rows.LAW_ROWS] = False
+    passed = run.passed[leg]
+    on[np.ix_(passed, 8 * len(run.axis) + np.array([rows.ORDER_NODE, rows.ORDER_MID, rows.ARC]))] = False
     turns = turns_far(cut.state[lo : hi + 1, 1]) & np.isfinite(run.across_max[leg])
     beside = np.minimum(np.append(normal[0], normal[:-1]), np.append(normal[1:], normal[-1]))
     normal[turns] = np.minimum(normal, beside)[turns]  # of both its nodes
@@ -155,8 +157,8 @@ def _limits(
     more[turns | np.append(False, turns[:-1]), rows.NORMAL_NODE] = False
     return StepLimits(
         leg=leg,
-        passed=run.passed[leg],
-        target=(_targets(run, leg, cut.place[lo:hi]) - units.origin) / length,
+        passed=passed,
+        target=(_targets(run, leg, np.flatnonzero(passed), cut.place[lo:hi]) - units.origin) / length,
         at_vertex=at_vertex,
         on=np.hstack([on, laws[1]]),
         box=axes * inside,
@@ -180,11 +182,10 @@ def _limits(
     )
 
 
-def _targets(run: TubeRun, leg: Array, place: FloatArray) -> FloatArray:
-    """(N, 3, A) where the node and the inner control points of steps belong to, if their leg is passed: at the
-    places (N, 4) along the run [mm]."""
+def _targets(run: TubeRun, leg: Array, of: Array, place: FloatArray) -> FloatArray:
+    """(N, 3, A) where the nodes and the inner control points of the steps `of` (n,), whose legs are passed, belong
+    to: at the places (N, 4) along the run [mm]."""
     targets: FloatArray = np.zeros((len(leg), 3, len(run.axis)))
-    of = np.flatnonzero(run.passed[leg])
     local = place[of] - run.offset[leg[of]][:, None]
     for c, (node, sign) in enumerate(((0, 0.0), (0, 1.0), (3, -1.0))):
         third = sign * (local[:, 3] - local[:, 0])[:, None] / 3.0
@@ -209,8 +210,6 @@ def _present(run: TubeRun, leg: Array, at_vertex: Array) -> Array:
     more[~limited, rows.NORMAL_NODE] = False
     more[~limited, rows.NORMAL_ROWS : rows.LAW_ROWS] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
-    more[run.passed[leg], rows.ORDER_NODE : rows.ORDER_MID + 1] = False
-    more[run.passed[leg], rows.ARC] = False
     more[:, rows.SWITCH] = at_vertex & (run.switch[leg] != 0.0)
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False
     more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE, rows.SWITCH]] = False

@@ -30,7 +30,7 @@ vertex), along which n = (y - nearest)/room2 holds whether or not the nearest po
 convex, and a motion may go back along it: its points belong to places in order (`put_places`), which are not
 the nearest ones where it does, and are taken as fixed. On an arc the inner control points belong to the
 tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second
-vector, p or the next node's, through `lin.node`.
+vector, p or the next node's, through `lin.node`. On an arc that is passed (run.py) places are fixed.
 
 Other limits (laws.py) have rows of another kind, with their derivatives by p, v, a, j and h, behind all
 others where a window needs them.

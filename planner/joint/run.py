@@ -21,6 +21,9 @@ meets P(x(t)) at both ends with its velocity has the control points
 and differs from it by at most max |d4/dt4 P(x(t))|/384: kappa rate^2 dx^4/384 on an even step over dx, where
 kappa, kappa rate and kappa rate^2 bound the second, third and fourth derivative of P. So these are the points
 that the control points of a step belong to; on a line they are the places themselves.
+
+An arc or a curve that bends with a radius below the tolerance is passed (`TubeRun.passed`): its steps have fixed
+places, one after the other, and take as little time as they want to.
 """
 
 from __future__ import annotations
@@ -35,12 +38,10 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
 from planner.feedrate.constraints.limits import JERK, Limits
-from planner.geometry.build import feed_groups, path_per_length
 from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.geometry.word_feed import ROTARY, goes_by
 from planner.joint.laws import PUSH
-from planner.joint.leg_shapes import edges_of, shapes_of
+from planner.joint.leg_shapes import edges_of, shapes_of, word_change, words_of
 from planner.joint.own_laws import RunLaws, laws_of
 from planner.machine import Machine
 from planner.machine.user_limit import QUANTITIES
@@ -53,7 +54,6 @@ ARC_FRACTION, TURN_MAX = 0.005, 0.5
 SHARP = 0.25
 # An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`).
 PASSED = 2.0
-ROUNDING = 1e-9  # of the length in the axes of F over that in all axes [-]
 
 
 class Budgets(NamedTuple):
@@ -167,7 +167,7 @@ class TubeRun:
         motion is so fast."""
         feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
         change = np.sign(np.diff(feed, prepend=feed[0]))
-        return -np.where(change != 0.0, change, _word_change(self.word))
+        return -np.where(change != 0.0, change, word_change(self.word))
 
     @property
     def passed(self) -> Array:
@@ -236,7 +236,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
         held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
-        word, counts, differs = _words(toolpath, row)
+        word, counts, differs = words_of(toolpath, row)
         yield TubeRun(
             axis=np.flatnonzero(moves),
             left=_kept_as_it_is(toolpath, slice(first[0], first[-1])) or differs,
@@ -291,36 +291,6 @@ def _laws(
         edges=np.cumsum(toolpath.length[segments])[:-1],
         block=toolpath.block[segments],
     )
-
-
-def _words(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:
-    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why
-    no motion can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so
-    that F is a limit of its own; it has to be of the same axes everywhere, and to change with the feed in all
-    of them."""
-    groups, by = feed_groups(toolpath.axes), goes_by(toolpath)[row]
-    share = np.where(by == ROTARY, toolpath.radius, 1.0)
-    share = share / path_per_length(toolpath.axes, toolpath.radius, toolpath)[row]
-    feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
-    every = np.ones(len(groups))
-    if not (finite & (share < 1.0 - ROUNDING)).any():
-        return np.empty((len(row), 0)), every, ""
-    word = (feed * share)[:, None]
-    if len(np.unique(by[finite])) > 1:
-        return word, every, "F goes by other axes from block to block"
-    if (np.sign(np.diff(feed, prepend=feed[0])) * _word_change(word) < 0.0).any():
-        return word, every, "F rises where the feed in all axes falls"
-    return word, (groups == by[finite][0]).astype(np.float64), ""
-
-
-def _word_change(word: FloatArray) -> FloatArray:
-    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for
-    rounding of it."""
-    if not word.shape[1]:
-        return np.zeros(len(word))
-    known = np.where(np.isfinite(word[:, 0]), word[:, 0], np.finfo(np.float64).max)
-    change = np.diff(known, prepend=known[0])
-    return np.where(np.abs(change) > ROUNDING * known, np.sign(change), 0.0)
 
 
 def budgets_of(

@@ -6,6 +6,7 @@ moves, and `tolerance` [mm] or null. Numbers are written so that they read back 
 """
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,18 @@ def points_file(program: Program) -> bytes:
 def are_points(data: bytes) -> bool:
     """True if a file holds points: no NC program begins with a brace."""
     return data[:64].lstrip().startswith(b"{")
+
+
+def own_text(program: Program) -> bytes | None:
+    """The NC text of a program, or a plotter's, if it was given as a text, or read from a file that is still
+    there; None for points."""
+    data = program.text
+    if data is None:
+        try:
+            data = Path(program.source).read_bytes()
+        except (OSError, ValueError):
+            return None
+    return None if are_points(data) else data
 
 
 def read_points(data: bytes, source: str) -> Program:

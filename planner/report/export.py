@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.nc.points import SOURCE, points_file
+from planner.nc.points import SOURCE, own_text, points_file
 from planner.planning.job.at_tip import joints_of
 from planner.report.judging import KEPT, KEPT_POINTS, KEPT_TEXT
-from planner.report.planned import LeftOut, planned_program, source_text
+from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
 from planner.report.summary import json_ready, not_limited, summary, tool_point_summary, uniform, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
@@ -84,7 +84,9 @@ def write_plan(
         if report:
             from planner.report.html.page import REPORT, report_page
 
-            page = report_page(plan, source_text(plan), {**summary(plan), "notes": [*plan.notes, *notes]})
+            page = report_page(
+                plan, own_text(plan.program), {**summary(plan), "notes": [*plan.notes, *notes]}
+            )
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])

@@ -7,7 +7,6 @@ parameters, loops or calls is expanded first: one line of it may be executed at 
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,7 @@ from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.nc.language.detect import is_plotter_file
-from planner.nc.points import are_points
+from planner.nc.points import own_text
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
@@ -58,7 +57,7 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
     same motion, for example because a line would become too long.
     """
     assert plan.trajectory is not None
-    source, data = plan.program.source, source_text(plan)
+    source, data = plan.program.source, own_text(plan.program)
     if data is None:
         raise LeftOut(f"the program is points, which have no F words, or {source} is no longer there")
     if any(event.text == "M220" for event in plan.program.events if event.text[0] == "M"):
@@ -110,7 +109,7 @@ def _as_programmed(feeds: FloatArray, toolpath: Toolpath) -> FloatArray:
 
 
 def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
-    if _is_source(plan, text):
+    if own_text(plan.program) == text:
         return ["planned.ngc equals the program: no block is planned slower than its F word"]
     lasting = planned.duration[~plan.toolpath.rapid]
     short = int((lasting < plan.machine.dt).sum())
@@ -120,22 +119,6 @@ def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
         f"planned.ngc: {short:,} of {len(lasting):,} blocks last less than a period of {plan.machine.dt * 1e3:g} ms; a control that "
         "joins or looks ahead over such blocks runs the original faster, because F words can only slow it down"
     ]
-
-
-def _is_source(plan: Plan, text: bytes) -> bool:
-    return source_text(plan) == text
-
-
-def source_text(plan: Plan) -> bytes | None:
-    """The NC text of the program, if it was given as a text, or read from a file that is still there; None
-    for points."""
-    data = plan.program.text
-    if data is None:
-        try:
-            data = Path(plan.program.source).read_bytes()
-        except (OSError, ValueError):
-            return None
-    return None if are_points(data) else data
 
 
 def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:

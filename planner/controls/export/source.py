@@ -2,9 +2,7 @@
 written for it."""
 
 import dataclasses
-import os
 import re
-from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +14,7 @@ from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word,
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.language.detect import without_leader
-from planner.nc.points import are_points
+from planner.nc.points import own_text
 from planner.nc.program import FEED_MOVES, Program, plain
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC
@@ -29,10 +27,7 @@ SAME_PLACE = 1e-6  # of an end point that was written with seven decimals and re
 
 def text_of(program: Program) -> bytes | None:
     """The program's own NC text; None for points and plotter files."""
-    text = program.text
-    if text is None and os.path.isfile(program.source):
-        text = Path(program.source).read_bytes()
-    return None if text is None or program.pen or are_points(text) else text
+    return None if program.pen else own_text(program)
 
 
 def source_of(plan: Plan) -> Source:

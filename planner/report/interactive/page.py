@@ -23,12 +23,12 @@ from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
+from planner.nc.points import own_text
 from planner.planning.job.at_tip import joints_of
 from planner.report.export import check_places, write_plan
 from planner.report.figure import COLOURS, FEED, QUANTITIES, MotionColumns, Panel, profile_panels, three
 from planner.report.html.data import Samples, programmed_path, samples_of
 from planner.report.html.page import REPORT, path_picture, report_page
-from planner.report.planned import source_text
 from planner.report.plotly_figure import BARE, PROGRAMMED, colourings, panel_figure, scene_in_box
 from planner.report.replace import check_file, write_whole
 from planner.report.rows import VERDICT, plan_rows
@@ -55,7 +55,7 @@ class ReportPage:
     @cached_property
     def text(self) -> str:
         """The page, HTML with all that it needs."""
-        return report_page(self._plan, source_text(self._plan))
+        return report_page(self._plan, own_text(self._plan.program))
 
     def save(self, file: str | Path = REPORT, *, force: bool = False) -> Path:
         """Write the page to a file.

@@ -88,7 +88,7 @@ def test_the_first_lines_of_every_command(tmp_path: Path) -> None:
         ["verify", out, "-q"],
         ["compare", job, *how],
         ["what-if", job, *how, "--set", "x.jerk=+10%"],
-        ["sweep", job, *how, "--vary", "tolerance=0.01,0.02", "-o", tmp_path / "sweep"],
+        ["sweep", job, *how, "--vary", "tolerance=0.01,0.02", "-o", tmp_path / "sweep", "--threads", "1"],
         ["export", out, "--for", "pvt", "-o", tmp_path / "pvt"],
         ["export", out, "--for", "linuxcnc", "-o", tmp_path / "linuxcnc"],
     ):

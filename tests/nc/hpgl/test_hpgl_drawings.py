@@ -26,7 +26,7 @@ MACHINE = load_machine("plotter")
 
 @pytest.mark.slow
 @given(strokes=drawings, dialect=dialect)
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_every_dialect_reads_as_the_same_path(strokes, dialect):
     program = parse_program(written(strokes, dialect), source="drawing.plt")
     assert_same_path(path_of(program), expected(strokes), FINE)

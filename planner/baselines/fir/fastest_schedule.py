@@ -23,11 +23,10 @@ from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Speeds that are tried, from the fastest leg's to what the shortest leg is best run at from rest to rest, each
-# with each of the margins.
-SPEEDS = 24
+# Margins that are tried, each with so many speeds, from the fastest leg's to what the shortest leg is best run at
+# from rest to rest; the most promising speeds of each margin are made into motions.
 MARGINS = (1.0, 1.2, 1.4, 1.6, 2.0)
-SETTLED = 8  # of these, the most promising of each run, are made into motions
+SPEEDS, SETTLED = 40, 3
 # Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
 # they are tried at all corners, as a corner may be so slow that a stop is faster.
 STOPS = (1.0, 0.0)
@@ -91,18 +90,15 @@ def _settled(guide: LegGuide, machine: Machine) -> Schedule:
     margins = MARGINS if guide.profile_filters is None else MARGINS[:1]
     high = guide.largest(guide.feed)
     low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
-    tries = [
-        (high * (low / high) ** (k / (SPEEDS - 1)), np.full(guide.runs, margin))
-        for k in range(SPEEDS)
-        for margin in margins
-    ]
-    times = np.array([plan_for(guide, machine, *one).time() for one in tries])
-    best = np.argsort(times, axis=0, kind="stable")[:SETTLED]
-    speeds, margins_of = (
-        np.take_along_axis(np.array(column), best, axis=0) for column in zip(*tries, strict=True)
-    )
-    plans = [plan_for(guide, machine, *one) for one in zip(speeds, margins_of, strict=True)]
-    return settled_fastest(plans, np.take_along_axis(times, best, axis=0), machine)
+    tries = np.array([high * (low / high) ** (k / (SPEEDS - 1)) for k in range(SPEEDS)])
+    plans, times, runs = [], [], np.arange(guide.runs)
+    for margin in margins:
+        of = np.full(guide.runs, margin)
+        promised = np.array([plan_for(guide, machine, speed, of).time() for speed in tries])
+        for best in np.argsort(promised, axis=0, kind="stable")[:SETTLED]:
+            plans.append(plan_for(guide, machine, tries[best, runs], of))
+            times.append(promised[best, runs])
+    return settled_fastest(plans, np.array(times), machine)
 
 
 def filters_for(

@@ -6,7 +6,7 @@ FOLDER of --peers holds `lcnc_fast.py`, `lcnc_canon.py` and the compiled `tp_har
 variable PLANNER_PEERS). The machine is peers.toml: 100 mm/s and 2000 mm/s2 per axis, tolerance 0.05 mm, jerk 2e5 mm/s3, which
 LinuxCNC does not limit. Its naive CAM detector joins moves within the tolerance. Dwells are left out of all times.
 
-Plans are made without reshaping (`rounds=0`): what is looked at are the F words. A program without M2 gets one.
+Plans are made on splines: what is looked at are the F words. A program without M2 gets one.
 """
 
 from __future__ import annotations
@@ -114,9 +114,9 @@ def _measured(file: Path, machine: Machine, peers: Path, folder: Path) -> dict[s
         text += b"\nM2\n"
     job, again = folder / "job.ngc", folder / "planned.ngc"
     job.write_bytes(text)
-    plan = planner.plan(job, machine, rounds=0).require()
+    plan = planner.plan(job, machine, geometry="spline").require()
     again.write_bytes(planned_program(plan)[0])
-    replanned = planner.plan(again, machine, rounds=0).require()
+    replanned = planner.plan(again, machine, geometry="spline").require()
     assert plan.trajectory is not None
     assert replanned.trajectory is not None
     dwells = float(plan.toolpath.dwell.sum())

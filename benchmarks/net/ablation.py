@@ -77,7 +77,7 @@ def _never_alone(*_: Any, **__: Any) -> None:
 # How each of `RETRIES` is switched off, by its first step.
 SWITCHES: dict[str, Switch] = {
     "search": _not_in_long_steps,
-    "search, reshaped splines": _no_attempt("search, reshaped splines"),
+    "search, once more": _no_attempt("search, once more"),
     "runs alone": _set(runs_alone, "VERDICTS", 0),
     "closed form": _no_attempt("closed form"),
     "splines": _set(geometry, "STOP_ROUNDS", 0),

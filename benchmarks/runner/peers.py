@@ -54,7 +54,7 @@ def along_splines(solver: str) -> Callable[[Program, Machine, float | None], Pla
 
     def planned(program: Program, machine: Machine, tolerance: float | None) -> Plan:
         own = _convex() if name == SEQUENTIAL_CONVEX else _copp(linear=name == COPP_LP)
-        method = OptimalMethod(corner="spline", rounds=0, solver=own, effort=effort or NORMAL)
+        method = OptimalMethod(corner="spline", solver=own, effort=effort or NORMAL)
         return method.plan(program, machine, tolerance)
 
     return planned

@@ -1,4 +1,4 @@
-"""Geometry and feed together: what method `tube` with its own solver finds beyond rounds of reshaping, and whether its start matters.
+"""Geometry and feed together: what method `tube` finds beyond the feed along splines, and whether its start matters.
 
     python -m benchmarks.solvers.joint
 
@@ -21,12 +21,10 @@ import planner
 from benchmarks.jobs import problems
 from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
-from planner.base.names import NORMAL
 from planner.machine import Machine
 from planner.nc.program import Program
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.tube import TubeMethod
-from planner.planning.optimal.effort import EFFORTS
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "nc"
 # File, first motion block, blocks, feed [mm/s].
@@ -38,8 +36,8 @@ WINDOWS = {
 BRACKET = Path(planner.__file__).parent / "examples" / "bracket.ngc"
 # Settings of `optimal`, without the search that its default ends with, from whose motions it may begin.
 STARTS = {
-    "reshaped": OptimalMethod(rounds=EFFORTS[NORMAL].rounds),
-    "first spline": OptimalMethod(effort="quick", rounds=0),
+    "splines": OptimalMethod(corner="spline"),
+    "coarse grid": OptimalMethod(effort="quick", corner="spline"),
 }
 
 

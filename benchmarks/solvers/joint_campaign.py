@@ -4,8 +4,8 @@
     python -m benchmarks.solvers.joint_campaign --hard                           into results/joint-hard.json and .md
 
 The random programs of jobs/random_lines.py, or those on which the search is hard: tolerances of a micrometre, legs of very different
-lengths, a low normal acceleration. Each is planned on the built-in `mill` and on the machine of jobs/problems.py, by `optimal` with the
-rounds of reshaping that effort `normal` has and no search, and by `optimal` as it is by default.
+lengths, a low normal acceleration. Each is planned on the built-in `mill` and on the machine of jobs/problems.py, by `optimal` along
+splines, and by `optimal` as it is by default.
 """
 
 from __future__ import annotations
@@ -33,11 +33,9 @@ from planner.machine import Machine
 from planner.nc.program import Program
 from planner.planning.job.plan import Plan
 from planner.planning.job.trace import Trace
-from planner.planning.optimal.effort import EFFORTS
 
 ALLOWED = 1e-4  # share of the cycle time by which the search may end slower than `optimal` [-]
 NICE = 10  # of the processes
-ROUNDS = EFFORTS["normal"].rounds
 # Of the hard jobs: tolerances [mm], shares of a long leg over a short one, normal accelerations [mm/s2].
 TOLERANCES, SHARES, NORMAL = (0.001, 0.0001), (30.0, 1000.0), (200.0, 20.0)
 LONG, LEGS = 50.0, 12  # [mm], legs of each kind
@@ -97,7 +95,7 @@ def made(job: int | str, name: str) -> dict[str, Any]:
     machine, found, trace = machines()[name].model_copy(update=settings), counted(), Trace()
     row: dict[str, Any] = {"job": job, "machine": name, "blocks": len(program.kind)}
     try:
-        row |= _of("optimal", planner.plan(program, machine, rounds=ROUNDS))
+        row |= _of("optimal", planner.plan(program, machine, geometry="spline"))
         found.clear()
         began = time.process_time()
         row |= _of("search", planner.plan(program, machine, log=trace))
@@ -170,9 +168,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         if "fault" in row:
             text += f"\nJob {row['job']} on {row['machine']} was refused: {row['fault']}\n"
-    return (
-        "`optimal` as it is by default against `optimal` with rounds of reshaping and no search.\n\n" + text
-    )
+    return "`optimal` as it is by default against `optimal` along splines.\n\n" + text
 
 
 def table_of_hard(rows: list[dict[str, Any]]) -> str:

@@ -70,7 +70,7 @@ def begun(program: Program, machine: Machine) -> tuple[TubeRun, Guess] | None:
     """The one run of a job and its motion on the first splines cut into steps; None for several runs, or where vertices coincide."""
     toolpath = toolpath_from_program(program, machine)
     runs = list(tube_runs_of(toolpath, machine))
-    plan = OptimalMethod(effort="quick", rounds=0).plan(program, machine)
+    plan = OptimalMethod(effort="quick", corner="spline").plan(program, machine)
     if len(runs) != 1 or plan.trajectory is None or np.isfinite(runs[0].across_max).any():
         return None
     times = np.maximum.accumulate(passing_times(plan.trajectory, toolpath))

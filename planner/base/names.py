@@ -37,7 +37,7 @@ class MethodName:
     home     : "module:class" of the method
     settings : arguments of the class that the name stands for
     solvers  : names of the solvers that it can use, the default first; empty where it has no choice
-    shapes   : whether it takes a geometry, a corner shape, an effort, rounds of reshaping, and `shaped`
+    shapes   : whether it takes a geometry, a corner shape, an effort, and `shaped`
     joints   : whether it keeps limits of joints, and others that are functions of the place
     """
 
@@ -78,7 +78,7 @@ METHODS: dict[str, MethodName] = {
 METHOD_ALIASES = {"toppra": SECOND_ORDER}
 SOLVERS = tuple(dict.fromkeys(solver for method in METHODS.values() for solver in method.solvers))
 # Settings of `planner.plan` that only methods of `shapes` use.
-OF_SHAPES = ("geometry", "corner", "effort", "rounds", "shaped")
+OF_SHAPES = ("geometry", "corner", "effort", "shaped")
 OF_SEARCH = {"smooth": (OPTIMAL,)}  # and those of the joint search, with the methods that have them
 
 

@@ -49,12 +49,11 @@ class Sizes:
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
 
     # Threads: they take 1 ms to begin. A point takes 2 us on a grid and some us to solve; a span 20 us to
-    # relax, 100 us to improve.
+    # relax.
     grid_shared: int = _size(PARTS, 5_000, 10)  # points of a grid that are worth a thread
     intervals_shared: int = _size(PARTS, 5_000, 10)  # of its intervals, to be sampled
     points_shared: int = _size(PARTS, 3_000, 0)  # fewer are solved by one thread
     relaxed_shared: int = _size(PARTS, 2_000, 0)  # spans; fewer are relaxed by one thread
-    improved_shared: int = _size(PARTS, 400, 0)  # spans; fewer are improved by one thread
     read_shared: int = _size(PARTS, 65_536, 0)  # samples; fewer are judged by one thread
     # grid points; more are priced while the motion is judged, by another thread
     priced_beside: int = _size(PARTS, 30_000, 0)
@@ -69,16 +68,12 @@ class Sizes:
     filtered_at_once: int = _size(PARTS, 50_000, 37)  # times behind filters: 5 MB
     convolved_at_once: int = _size(PARTS, 50_000, 40)  # setpoints, for the planner: 5 MB
     stops_at_once: int = _size(PARTS, 500, 2)  # 5 MB an array
-    prices_at_once: int = _size(PARTS, 100_000, 17)  # points of the grid: half a kilobyte each
 
     # Splines. Ranges cost a window more for each of them.
     relaxed_window: int = _size(ROUTES, 240, 120)  # control points relaxed at a time ...
     relaxed_overlap: int = _size(ROUTES, 30, 30)  # ... and of them again with the next window
     relaxed_range: int = _size(ROUTES, 4_000, 140)  # runs of fewer than two are relaxed as one
     laid_range: int = _size(ROUTES, 4_000, 20)  # vertices; runs of fewer than two are laid as a whole
-    improved_window: int = _size(ROUTES, 400, 120)  # control points improved at a time ...
-    improved_overlap: int = _size(ROUTES, 40, 40)  # ... and of them again with the next window
-    improved_range: int = _size(ROUTES, 4_000, 140)  # runs of fewer than two are improved as one
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time

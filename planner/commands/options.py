@@ -294,15 +294,6 @@ _PLANNING: dict[str, tuple[Any, Any]] = {
             known=names.EFFORTS,
         ),
     ),
-    # For comparisons; users have --effort.
-    "rounds": (
-        int | None,
-        typer.Option(
-            "--rounds",
-            min=0,
-            help="rounds of reshaping the splines (default: those of the effort, fewer where they gain nothing)",
-        ),
-    ),
     "smooth": (
         float | None,
         typer.Option(

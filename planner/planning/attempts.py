@@ -1,10 +1,9 @@
 """The attempts of methods `optimal` and `second-order` at a motion, in the order in which they are made
 (planning/page.py).
 
-The joint search ends where it ends from any start nearby, so it begins on the first splines, which no round
-has reshaped, with a motion that need not be fit for delivery. Where it does not end, or where a curve of a
-small path bends within the tolerance, the splines are reshaped, and it begins there once more; where it
-cannot run, or leaves something, the motion on that path is delivered.
+The joint search ends where it ends from any start nearby, so it begins on splines with a motion that need not
+be fit for delivery. Where it does not end it begins once more from one that is, which stays where it fails
+again; where it cannot run, or leaves something, the motion on that path is delivered.
 """
 
 from __future__ import annotations
@@ -35,8 +34,7 @@ if TYPE_CHECKING:
 
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not
 # searched [-]: on 30,000 lines of dense chords the search took half of the computing and found nothing; on a
-# random job of ten blocks it found 9e-4. Nor are the splines of such a motion reshaped because its path bends
-# somewhere.
+# random job of ten blocks it found 9e-4.
 LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 SAME_TIME = 1e-4  # less is the gap of the solvers [-]
 # Steps that a motion has on a leg at least (joint/guess.py).
@@ -61,7 +59,7 @@ def is_searched(job: Job, settings: Settings) -> bool:
 
 
 def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
-    """The joint search from the motion on the first splines."""
+    """The joint search from a motion on splines."""
     from planner.planning.joint_search import joint_plan
 
     first, steps = first_motion(job, settings), _least_steps(job)
@@ -78,32 +76,25 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _known_on_paths(job: Job) -> bool:
-    """Whether a motion on first splines has all limits: it has neither the drives' power nor filters."""
+    """Whether a motion on splines has all limits: it has neither the drives' power nor filters."""
     return job.real[0].fir is None and bool(np.isinf(Limits.of(job.machine, job.toolpath.axes).power).all())
 
 
-def _worth_reshaping(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether the joint search is worth it from reshaped splines too: of small jobs, where it has not ended
-    from the first ones, and where a curve bends inside its tolerance."""
-    if tried.joint and settings.effort.search.smooth:  # what is faster is not what is asked for
-        return False
+def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
+    """Whether the joint search of a small job has not ended."""
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
-    return small and (tried.best is None or (tried.steps <= CHEAP and _bends_within(job)))
+    return small and tried.best is None
 
 
-def _from_reshaped(job: Job, settings: Settings, tried: Tried) -> Tried:
-    """The joint search from the motion on reshaped splines."""
+def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """The joint search from a motion on splines that keeps its limits everywhere, and stays where that fails."""
     from planner.planning.joint_search import joint_plan
 
     path = kept_on_path(job, settings)
     if path is None:
         return tried
-    planned, motion = path
-    found = joint_plan(job, settings, planned, settings.effort.search, _others(ON_PATH, settings), motion)
-    if found.plan is None:
-        return dataclasses.replace(tried, path=path)
-    best = found.plan if tried.best is None else faster(tried.best, found.plan)
-    return dataclasses.replace(tried, best=best, path=path, joint=True)
+    found = joint_plan(job, settings, path[0], settings.effort.search, _others(ON_PATH, settings), path[1])
+    return dataclasses.replace(tried, best=found.plan, path=path, joint=found.plan is not None)
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -150,11 +141,11 @@ def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 ATTEMPTS = (
     Attempt("joint search", _searched, _joint),
-    Attempt("search, reshaped splines", _worth_reshaping, _from_reshaped),
+    Attempt("search, once more", _not_ended, _once_more),
     Attempt("motion on the path", _not_joint, _on_path),
     Attempt("closed form", _closed_form_may_be_faster, _closed_form),
 )
-# Of a run on which the joint search does not end: from the first splines, and from reshaped ones.
+# Of a run on which the joint search does not end: the first, and the second one.
 ALONE, ON_PATH = ATTEMPTS[1:], ATTEMPTS[2:]
 
 
@@ -179,9 +170,9 @@ class Retry(NamedTuple):
 RETRIES = (
     Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
     Retry(
-        ("search, reshaped splines", "reshape"),
-        "the search has not ended, or a small path bends within its tolerance: from reshaped splines; where it cannot run these alone",
-        "1, rounds 40",
+        ("search, once more",),
+        "the search has not ended: from a motion that stays where it fails",
+        "1",
         "5e-4, 8e-3",
     ),
     Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "3e-3, 4e-2"),
@@ -225,10 +216,3 @@ def _least_steps(job: Job) -> int:
 def _at_feed(job: Job) -> float:
     """Time of the moves at their programmed feed [s]."""
     return float(np.sum(job.toolpath.length / job.toolpath.feed))
-
-
-def _bends_within(job: Job) -> bool:
-    """Whether a curve bends with a radius below its tolerance: splines that are reshaped find a way without the
-    detour, the search does not find it from the first ones."""
-    path = job.toolpath
-    return bool((path.curvature * path.tolerance[:-1] > 1.0).any())

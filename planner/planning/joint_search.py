@@ -146,6 +146,8 @@ def joint_plan(
         why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
         found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
     left = [k for k, one in enumerate(found) if one.steps is None]
+    if len(left) == len(found) and not made.plans:  # the motion is the start's, which others deliver
+        return Joint(None, steps)
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
     stayed = others.kept(job) if made.stays else (planned, motion) if motion else None
     held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None

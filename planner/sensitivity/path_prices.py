@@ -12,9 +12,8 @@ hold together and both must give (equal axes at 45 degrees) the time has a kink 
 between the left one and the right one. Prices of the programmed feed and of axis velocities are those of more
 of them: where both are equal, neither alone is worth anything.
 
-Splines are shaped by a problem of their own, which has the tolerance among its constraints: a round of
-reshaping (planning/optimal/reshape.py) from the present shape gives dT/d(tolerance) at every site as a
-multiplier, added up at the nearest joint of the program. Accelerations are priced with the path as it is.
+On splines the tolerance has no price: they are laid before the feed is known. Accelerations are priced with
+the path as it is.
 
 **Finite changes** are foretold as prices.py says.
 
@@ -23,8 +22,6 @@ need some of it back (delivery/periods.py), which no multiplier knows: 10 % more
 problem says, 10 um half, on five points at 4 ms, where chords use 40 %. There nothing may be saved, and what
 would be is a hint.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -36,9 +33,8 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.lagrangian import Lagrangian, lagrangian
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution, Prices
-from planner.geometry.toolpath import Joint
 from planner.machine import Machine
-from planner.sensitivity.corner_prices import RoundedPath, sums
+from planner.sensitivity.corner_prices import RoundedPath
 from planner.sensitivity.places import bounds_but_speeds, bounds_with, by_place
 from planner.sensitivity.prices import MORE_LIMIT, STEP, WITHIN, dearest, more_of, price_list
 from planner.sensitivity.records import PriceList
@@ -51,26 +47,10 @@ LESS = 0.5
 CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
 
 
-class SitePrices(NamedTuple):
-    """The prices of the corridor of splines at J sites."""
-
-    place: FloatArray  # (J,) along the legs [mm]
-    price: FloatArray  # (J,) dT/d(tolerance) there [s/mm]
-
-
 def path_prices(
-    samples: PathSamples,
-    problem: FeedrateProblem,
-    solution: FeedrateSolution,
-    machine: Machine,
-    by_site: SitePrices | None = None,
+    samples: PathSamples, problem: FeedrateProblem, solution: FeedrateSolution, machine: Machine
 ) -> PriceList:
-    """The prices of a solution.
-
-    by_site : what the corridor of splines costs; None for single corners
-
-    Raises ValueError if the solver of the solution gives no multipliers.
-    """
+    """The prices of a solution. Raises ValueError if its solver gives no multipliers."""
     now, path, cycle_time = lagrangian(problem, solution), samples.path, solution.cycle_time
     rest = bounds_but_speeds(samples, machine)
     prices = solution.prices
@@ -83,12 +63,7 @@ def path_prices(
         more[name] = bounds_with(samples, machine, name, MORE_LIMIT, rest)
         saved[name] = -2.0 * float(now.feed_sq_max @ (1.0 - np.sqrt(problem.feed_sq_max / more[name])))
     dear, together, rounded = None, None, None
-    if by_site is not None:
-        together = _by_joint(path, by_site.place, by_site.price)
-        alone = np.zeros(len(path.toolpath) + 1)
-        alone[path.legs.first] = together
-        dear = dearest(path.toolpath, alone)
-    elif isinstance(path, SmoothPath) and not len(path.spline):
+    if isinstance(path, SmoothPath) and not len(path.spline):
         rounded = RoundedPath(samples, path, problem, solution, machine, now)
         for name in map(ACCELERATION.called, problem.axes[: problem.machine_axes]):
             slope[name] = float(rounded.change(more_of(machine, name, STEP)).sum()) / STEP
@@ -123,14 +98,6 @@ def _by_share(problem: FeedrateProblem, prices: Prices) -> tuple[dict[str, float
                 name = kind.called(axis)
                 limit[name], by_share[name] = float(least), float(price[k]) * float(planned[k])
     return limit, by_share
-
-
-def _by_joint(path: SmoothPath, place: FloatArray, price: FloatArray) -> FloatArray:
-    """(R+1,) prices of places along the legs, added up at the nearest joint that is no full stop."""
-    joints = np.concatenate([[0.0], np.cumsum(path.legs.length)])
-    inner = np.flatnonzero(path.joint != Joint.STOP)
-    middles = (joints[inner[1:]] + joints[inner[:-1]]) / 2.0
-    return sums(inner[np.searchsorted(middles, place)], price, len(joints))
 
 
 def _by_speed(

@@ -78,10 +78,9 @@ AIM = 0.1  # of the gap that is asked for: multipliers are not driven below what
 
 
 class Problem(NamedTuple):
-    """A convex problem over n control points and m sites (module text), linear . c added to its objective."""
+    """A convex problem over n control points and m sites (module text)"""
 
     H: FloatArray  # (A, n, 6) lower bands
-    linear: FloatArray  # (n, A)
     free: Array  # (n,) False for control points that stay
     sites: Sites  # (m, ..), their spans counted from the first of these control points
 
@@ -117,8 +116,8 @@ def _constraint(sites, c, g, e):
 
 @njit(cache=True, error_model="numpy")
 def _objective(problem, c, gradient):
-    """1/2 c'Hc + linear.c, and its gradient (n, A)."""
-    H, linear = problem.H, problem.linear
+    """1/2 c'Hc and its gradient (n, A)."""
+    H = problem.H
     axes, n, width = H.shape
     total = 0.0
     for k in range(axes):
@@ -131,8 +130,7 @@ def _objective(problem, c, gradient):
                 if d > 0:
                     gradient[i - d, k] += value * c[i, k]
         for i in range(n):
-            total += (0.5 * gradient[i, k] + linear[i, k]) * c[i, k]
-            gradient[i, k] += linear[i, k]
+            total += 0.5 * gradient[i, k] * c[i, k]
     return total
 
 

@@ -2,7 +2,7 @@
 and proved to be inside.
 
 Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed
-is known yet; planning/optimal/reshape.py weights them by what the time-optimal motion pays for.
+is known yet.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are
 tightened by as much as the bound is too large, and relaxed again.
@@ -22,7 +22,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
-from planner.smoothing.basis import DEGREE, ORDER, Knots
+from planner.smoothing.basis import DEGREE, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import third_derivative_energy
@@ -50,7 +50,6 @@ from planner.smoothing.windows import (
 )
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
-FIRST_GAP = 30.0  # gap of the first multipliers [of the last gap], where no energy is known
 # An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to
 # rounding, which would then decide what the spline is.
 STRAIGHT = 1e-4
@@ -63,14 +62,10 @@ RANGE = SIZES.relaxed_range
 
 
 class Goal(NamedTuple):
-    """The aim of the control points c of all runs: the least 1/2 c'Hc + force/2 (c - c_now)'Q(c - c_now), to
-    a gap for each run plus the share `relative` of the integral of its squared third derivatives, if H is its
-    form."""
+    """The aim of the control points c of all runs: the least 1/2 c'Hc, the integral of the squared third
+    derivatives, to a gap that is a share of it."""
 
     H: FloatArray  # (A, n, 6) lower bands of all runs
-    Q: FloatArray  # (A, n, 6)
-    force: FloatArray  # (Q,)
-    gap: FloatArray  # (Q,) in the units of H
     relative: float
     axis_weights: FloatArray  # (A,) of the squared third derivatives
     reach: Reach
@@ -84,7 +79,6 @@ class Relaxed(NamedTuple):
     control: FloatArray  # (n, A)
     used: FloatArray  # (J,) radius that each site may use, smaller than before where the certificate asked for it [mm]
     left: FloatArray  # (S,) what the certificate leaves of the tolerance, of the last try: negative where it fails [mm]
-    multiplier: FloatArray  # (J,) of the sites' constraints (interior_point.py)
 
 
 class Run(NamedTuple):
@@ -94,61 +88,55 @@ class Run(NamedTuple):
     knots: Knots
     sites: Sites
     H: FloatArray  # (A, n, 6) lower bands
-    linear: FloatArray  # (n, A)
     middle: FloatArray  # (n, A) a spline well inside the corridor
     fixed_first: int
     fixed_last: int
 
 
 @njit(cache=True, error_model="numpy")
-def _relaxed_window(window, run, control, radius, goal, gap):
-    """The optimum of a window's control points while the others stay: control points (hi - lo, A),
-    multipliers (site_end - site,)."""
+def _relaxed_window(window, run, control, radius, goal):
+    """The optimum (hi - lo, A) of a window's control points while the others stay."""
     n, (lo, hi, j0, j1), sites = len(control), window, run.sites
     a, b = max(lo - DEGREE, 0), min(hi + DEGREE, n)
     origin, free = control[a].copy(), np.zeros(b - a, np.bool_)
     free[lo - a : hi - a] = True
     part, near = run.H[:, a:b].copy(), control[a:b] - origin
     span, target = sites.span[j0:j1] - a, sites.target[j0:j1] - origin
-    energy = 0.0
-    if goal.relative > 0.0:
-        last = min(hi, len(run.knots.breaks) - 1)
-        energy = third_derivative_energy(run.knots, goal.axis_weights, control, a, last)
+    last = min(hi, len(run.knots.breaks) - 1)
+    energy = third_derivative_energy(run.knots, goal.axis_weights, control, a, last)
     around = Sites(
         span, sites.place[j0:j1], sites.weights[j0:j1], target, sites.along[j0:j1], sites.slide[j0:j1], radius[j0:j1]
     )  # fmt: skip
-    accuracy = Accuracy(energy, energy + FIRST_GAP * gap, max(gap, STRAIGHT * energy), goal.relative)
-    found = minimise_in_corridor(Problem(part, run.linear[a:b], free, around), near, accuracy, ITERATIONS)
-    return found.control[lo - a : hi - a] + origin, found.multiplier
+    accuracy = Accuracy(energy, energy, STRAIGHT * energy, goal.relative)
+    found = minimise_in_corridor(Problem(part, free, around), near, accuracy, ITERATIONS)
+    return found.control[lo - a : hi - a] + origin
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def relax_range(run, goal, gap, begin, end, control, multiplier):
-    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A), with the
-    multipliers (J,) of their sites. Reads `DEGREE` control points more on both sides."""
-    done = begin
+def relax_range(run, goal, begin, end, control):
+    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A). Reads
+    `DEGREE` control points more on both sides."""
+    done, nothing = begin, np.zeros(len(run.sites.span))
     while done < end:
-        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, multiplier, goal.reach)
-        window = window_of(run, lo, hi)
-        moved, prices = _relaxed_window(window, run, control, run.sites.radius, goal, gap)
-        control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
+        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, nothing, goal.reach)
+        control[lo:hi] = _relaxed_window(window_of(run, lo, hi), run, control, run.sites.radius, goal)
         done = hi
 
 
 @njit(cache=True, error_model="numpy")
-def _relax_run(run, start, prices, goal, gap, only_outside):
+def _relax_run(run, start, goal, only_outside):
     """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or
     only in windows around the sites where it has no certificate; returns whether the result has a
-    certificate, and the rest of `Relaxed`, with multipliers `prices` (J,) where no window is relaxed."""
+    certificate, and the rest of `Relaxed`."""
     control, radius = start.copy(), run.sites.radius.copy()
-    multiplier, ratio_site = prices.copy(), np.zeros(len(radius))
+    ratio_site = np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
     end = len(control) - run.fixed_last
     if only_outside:
         certificate = certify(run.corridor, run.knots, run.sites.place, control)
         ratio_site, left = certificate.site, certificate.left
         if certificate.span.max() <= 1.0:
-            return True, control, radius, left, multiplier
+            return True, control, radius, left
     for attempt in range(int(only_outside), ROUNDS):
         done, site = run.fixed_first, 0
         while True:
@@ -164,65 +152,44 @@ def _relax_run(run, start, prices, goal, gap, only_outside):
                     window, sites, control, run.middle, ratio_site, goal.reach.overlap
                 )
                 control[lo:hi], radius[window.site : window.site_end] = closer, smaller
-            moved, prices = _relaxed_window(window, run, control, radius, goal, gap)
-            control[lo:hi], multiplier[window.site : window.site_end] = moved, prices
+            control[lo:hi] = _relaxed_window(window, run, control, radius, goal)
             done = hi
         certificate = certify(run.corridor, run.knots, run.sites.place, control)
         ratio_site, left = certificate.site, certificate.left
         if certificate.span.max() <= 1.0:
-            return True, control, radius, left, multiplier
-    return False, control, radius, left, multiplier
-
-
-@njit(cache=True, error_model="numpy")
-def _run(q, corridor, splines, runs, used, goal):
-    """Run q, its sites with the radii that they may use (J,), and what the goal is there."""
-    own, knots, old = run_corridor(corridor, q), run_knots(splines, q), run_control(splines, q)
-    (n, axes), begin = old.shape, control_first(splines, q)
-    H, linear = np.empty((axes, n, ORDER)), np.zeros((n, axes))
-    for k in range(axes):
-        for i in range(n):
-            for d in range(ORDER):
-                pull = goal.force[q] * goal.Q[k, begin + i, DEGREE - d]
-                H[k, i, DEGREE - d] = goal.H[k, begin + i, DEGREE - d] + pull
-                if d <= i:
-                    linear[i, k] -= pull * (old[i - d, k] - old[0, k])
-                    if d > 0:
-                        linear[i - d, k] -= pull * (old[i, k] - old[0, k])
-    sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
-    middle = greville_control(own, knots.breaks)
-    return Run(own, knots, sites, H, linear, middle, runs.fixed_first[q], runs.fixed_last[q])
+            return True, control, radius, left
+    return False, control, radius, left
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _begin(q, corridor, splines, runs, used, goal, inside):
-    """Run q, and its control points (n, A) to begin with: those that it has, or a little further inside."""
-    run, start = _run(q, corridor, splines, runs, used, goal), run_control(splines, q).copy()
-    if inside:
-        start += (1.0 - AGAIN) * (run.middle - start)
+def _begin(q, corridor, splines, runs, used, goal):
+    """Run q, its sites with the radii that they may use (J,), and its control points (n, A) to begin with, a
+    little further inside than they are."""
+    own, knots, start = run_corridor(corridor, q), run_knots(splines, q), run_control(splines, q).copy()
+    sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
+    middle, H = greville_control(own, knots.breaks), goal.H[:, control_first(splines, q) :][:, : len(start)]
+    run = Run(own, knots, sites, H.copy(), middle, runs.fixed_first[q], runs.fixed_last[q])
+    start += (1.0 - AGAIN) * (middle - start)
     return run, start
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _finish(q, run, start, prices, splines, goal, only_outside, found):
+def _finish(q, run, start, splines, goal, only_outside, found):
     """Relax run q and write it into the columns of `Relaxed`, which hold what was before."""
-    certified, control, radius, left, multiplier = found
-    certified[q], moved, smaller, kept, prices = _relax_run(
-        run, start, prices, goal, goal.gap[q], only_outside
-    )
+    certified, control, radius, left = found
+    certified[q], moved, smaller, kept = _relax_run(run, start, goal, only_outside)
     if certified[q]:
         control[control_first(splines, q) : control_first(splines, q + 1)] = moved
         radius[splines.site_first[q] : splines.site_first[q + 1]] = smaller
     left[splines.span_first[q] : splines.span_first[q + 1]] = kept
-    multiplier[splines.site_first[q] : splines.site_first[q + 1]] = prices
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _relax(corridor, splines, runs, used, goal, only_outside, own, found):
+def _relax(corridor, splines, runs, used, goal, own, found):
     """Write the runs `own` (k,) into the columns of `Relaxed`, which hold what was before."""
     for q in own:
-        run, start = _begin(q, corridor, splines, runs, used, goal, not only_outside)
-        _finish(q, run, start, np.zeros(len(run.sites.span)), splines, goal, only_outside, found)
+        run, start = _begin(q, corridor, splines, runs, used, goal)
+        _finish(q, run, start, splines, goal, False, found)
 
 
 def _relax_long(
@@ -235,14 +202,13 @@ def _relax_long(
     found: Relaxed,
 ) -> None:
     """Write run q, relaxed in ranges (module text), into the columns of `Relaxed`."""
-    run, control = _begin(q, corridor, splines, runs, used, goal, True)
-    prices, gap = np.zeros(len(run.sites.span)), float(goal.gap[q])
+    run, control = _begin(q, corridor, splines, runs, used, goal)
 
     def work(begin: int, beyond: int) -> None:
-        relax_range(run, goal, gap, begin, beyond, control, prices)
+        relax_range(run, goal, begin, beyond, control)
 
     in_ranges(int(run.fixed_first), len(control) - int(run.fixed_last), RANGE, REACH.window, work)
-    _finish(q, run, control, prices, splines, goal, True, found)
+    _finish(q, run, control, splines, goal, True, found)
 
 
 def relax(
@@ -252,31 +218,27 @@ def relax(
     used: FloatArray,
     left: FloatArray,
     goal: Goal,
-    only_outside: bool = False,
 ) -> Relaxed:
     """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for
     any number of threads.
 
     used : (J,) radius that each site may use [mm], the present splines strictly inside
     left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]
-    only_outside : only where they have no certificate
     """
     found = Relaxed(
         certified=np.zeros(len(splines.fits), dtype=np.bool_),
         control=splines.control.copy(),
         used=used.copy(),
         left=left.copy(),
-        multiplier=np.zeros(len(used)),
     )
     fitting = np.flatnonzero(splines.fits)
     size = np.diff(splines.span_first)[fitting]
-    if not only_outside:
-        for q in fitting[size >= 2 * RANGE].tolist():
-            _relax_long(q, corridor, splines, runs, used, goal, found)
-        fitting, size = fitting[size < 2 * RANGE], size[size < 2 * RANGE]
+    for q in fitting[size >= 2 * RANGE].tolist():
+        _relax_long(q, corridor, splines, runs, used, goal, found)
+    fitting, size = fitting[size < 2 * RANGE], size[size < 2 * RANGE]
 
     def work(own: Array) -> None:
-        _relax(corridor, splines, runs, used, goal, only_outside, own, found)
+        _relax(corridor, splines, runs, used, goal, own, found)
 
     in_shares(fitting, size, SPANS_SHARED, work)
     return found

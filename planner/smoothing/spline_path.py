@@ -70,8 +70,7 @@ def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None =
     splines = lay(corridor, of_run)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
-    H, nothing = third_derivative_bands(splines, weights), np.zeros(len(of_run))
-    goal = Goal(H, np.zeros_like(H), nothing, nothing, RELATIVE_GAP, weights, REACH)
+    goal = Goal(third_derivative_bands(splines, weights), RELATIVE_GAP, weights, REACH)
     left = np.full(splines.span_first[-1], np.inf)
     same = None if known is None else _same_runs(runs, known)
     if same is not None:

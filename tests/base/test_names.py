@@ -82,7 +82,7 @@ def test_a_name_close_by_is_suggested() -> None:
         (["--method", "toppra", "--corner", "bezier"], "second-order", "bezier"),
         (["--method", "toppra", "--solver", "toppra", "--corner", "bezier"], "second-order", "bezier"),
         (["--method", "second-order", "--geometry", "corners"], "second-order", "bezier"),
-        (["--method", "second-order", "--corner", "spline", "--rounds", "0"], "second-order", "spline"),
+        (["--method", "second-order", "--corner", "spline"], "second-order", "spline"),
     ],
 )
 def test_command_lines_of_earlier_versions(

@@ -25,8 +25,6 @@ def run(*arguments: object) -> Result:
         (["--method", "stop", "--corner", "auto"], "corner = auto: method stop does not use it"),
         (["--method", "bezier", "--corner", "bezier"], "it is for optimal and second-order"),
         (["--solver", "reachability"], "solver = reachability: method optimal does not use it"),
-        (["--method", "bezier", "--rounds", "0"], "rounds = 0: method bezier does not use it"),
-        (["--corner", "bezier", "--rounds", "2"], "bezier corners have none"),
         (["--format", "parquet"], "name one with -o DIR"),
     ],
 )
@@ -40,7 +38,7 @@ def test_options_that_would_be_ignored_are_refused(tmp_path: Path, arguments: li
 
 
 def test_a_setting_beside_a_method_is_refused() -> None:
-    for setting in ({"corner": "auto"}, {"solver": "toppra"}, {"rounds": 0}):
+    for setting in ({"corner": "auto"}, {"solver": "toppra"}, {"effort": "quick"}):
         with pytest.raises(InputError, match="set it there"):
             planner.plan("absent.ngc", method=StopMethod(), **setting)
 

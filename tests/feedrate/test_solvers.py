@@ -137,16 +137,6 @@ def test_a_whole_job_with_every_solver(name, tmp_path):
     assert "NLP" in made.solver or "Convex" in made.solver
 
 
-@pytest.mark.slow
-def test_splines_are_reshaped_by_the_multipliers_of_ipopt(tmp_path):
-    job = tmp_path / "corner.ngc"
-    job.write_text(CORNER)
-    times = [
-        plan(job, corner="spline", solver="ipopt", rounds=n).require().trajectory.cycle_time for n in (0, 2)
-    ]
-    assert times[1] < times[0] * (1 - 1e-4)
-
-
 @pytest.mark.parametrize(
     "solver", [JerkLimitedNLP(points_max=100), JerkLimitedNLP(solver="fatrop", points_max=100),
                SequentialConvex(points_max=100)],

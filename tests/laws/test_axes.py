@@ -79,7 +79,6 @@ def test_a_mirrored_job_in_nine_axes_takes_the_same_time(method: str) -> None:
     text = SHORT if method in SEARCHED else NINE
     mirrored = text.translate(str.maketrans({"A": "A-", "Y": "Y-", "U": "U-"}))
     one, other = planned(text, machine, method), planned(mirrored, machine, method)
-    # rounds of reshaping, which a job with linear and rotary axes takes by `optimal`, end where rounding leads them
     assert other.cycle_time == pytest.approx(one.cycle_time, rel=3e-4 if method == "optimal" else 1e-6)
 
 

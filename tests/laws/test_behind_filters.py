@@ -95,7 +95,7 @@ def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):
 @pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.02, 0.013), (0.01, 0.02, 0.005), (0.03,)], ids=str)
 def test_any_number_of_filters_on_splines(lengths):
-    assert_kept(OptimalMethod(rounds=1).plan(CORNER, machine(lengths)), lengths)
+    assert_kept(OptimalMethod(corner="spline").plan(CORNER, machine(lengths)), lengths)
 
 
 @pytest.mark.slow

@@ -29,7 +29,6 @@ PLAIN = {"fir-plain", "fir-spline-plain"}
 HOLDING = tuple(name for name in METHODS if name not in PLAIN | {"tube"})
 # Methods that choose a full stop where it is faster: never slower than stopping everywhere, to the accuracy of their grids.
 NOT_SLOWER = {"optimal": 2e-3, "bezier": 1e-6, "kinematic": 1e-6, "second-order": 1e-6, "stop": 1e-9}
-FEW_ROUNDS = 1  # of reshaping: the laws hold after any number of them
 seeds = st.integers(0, 10**6)
 UNITS = {"x": 1.0, "y": 1.0, "z": 1.0, "a": 180.0 / np.pi}  # a machine file's rotary axes are in degrees
 
@@ -81,7 +80,7 @@ def machine(seed: int = 0, **more) -> Machine:
 @given(seed=seeds, axes=st.integers(2, 4))
 @settings(max_examples=8)
 def test_tolerance_and_limits_hold(method, seed, axes):
-    few = {"rounds": FEW_ROUNDS} if method == "optimal" else {}
+    few = {"effort": "quick"} if method == "optimal" else {}
     made = plan(random_job(seed, axes), machine(seed), method=method, **few)
     assert made.require().verdict.passed, made.verdict.faults
     free = {"jerk"} if method == "second-order" else set()

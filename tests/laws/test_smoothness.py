@@ -66,5 +66,5 @@ def test_smooth_trades_time_for_jerk():
 
 
 def test_smooth_without_the_joint_search_is_said():
-    made = planned(RETRACT, smooth=0.1, rounds=0)
+    made = planned(RETRACT, smooth=0.1, geometry="spline")
     assert any("smooth has no effect" in note for note in made.notes)

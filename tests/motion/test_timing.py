@@ -265,7 +265,7 @@ def test_places_follow_one_another_at_a_crawl():
         toolpath=toolpath_from_program(program, machine),
         stages=Stages(None),
     )
-    made = OptimalMethod(corner="spline", rounds=1).plan_job(job)
+    made = OptimalMethod(corner="spline").plan_job(job)
     motion = made.making.motion
     times = np.sort(np.random.default_rng(3).uniform(0.0, motion.end, 20_000))
     seen = motion.at(times, machine.dt)

@@ -20,7 +20,7 @@ def test_what_quick_finds_is_taken_where_shorter_steps_find_nothing(monkeypatch)
     machine = problems.machine(normal_acceleration=900.0)
     program = parse_program(ZIGZAG)
     quick = plan(program, machine, effort="quick").require()
-    on_splines = plan(program, machine, effort="quick", rounds=2).require()
+    on_splines = plan(program, machine, effort="quick", geometry="spline").require()
     searched = joint_search.searched_runs
 
     def not_in_shorter_steps(runs, start, search, *more, **named):

@@ -140,7 +140,7 @@ def circle(radius: float, chords: int) -> str:
 def test_planned_again_the_program_takes_the_planned_time(text: str, words: int) -> None:
     machine = MACHINE.model_copy(update={"tolerance": 0.02})
     source = f"G21 G90 G17 F6000\n{text}M2\n".encode()
-    method = OptimalMethod(corner="spline", rounds=8)
+    method = OptimalMethod(corner="spline")
     made = method.plan(parse_program(source, machine), machine)
     result = retimed(source, made.program, feeds_planned(made))
     assert result.count(b"F") <= words

@@ -1,7 +1,7 @@
-"""The convex problems of the smoothing as second-order cone programmes for Clarabel: an oracle that shares nothing with the kernels.
+"""The convex problem of the smoothing as a second-order cone programme for Clarabel: an oracle that shares nothing with the kernels.
 
 Clarabel minimises 1/2 x'Px + q'x over A x + s = b, s in a product of cones. A site |e_j| <= r_j is (1, e_j/r_j) in a cone of A + 1,
-a row a pair of nonnegative numbers, and what stays a zero.
+and what stays a zero.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from scipy import sparse
 
 from planner.base.arrays import Array, FloatArray
 from planner.smoothing.basis import ORDER
-from planner.smoothing.combined_rows import Rows
-from planner.smoothing.combined_solver import CombinedProblem
 from planner.smoothing.interior_point import Problem
 from planner.smoothing.sites import Sites
 
@@ -27,7 +25,6 @@ def best_value(P: Any, q: FloatArray, blocks: list[tuple[FloatArray, FloatArray,
     clarabel = pytest.importorskip("clarabel", reason="clarabel is not installed (pip install '.[test]')")
     kinds = {
         "zero": clarabel.ZeroConeT,
-        "positive": clarabel.NonnegativeConeT,
         "cone": clarabel.SecondOrderConeT,
     }
     cones = [kinds[kind](size) for _, b, kind, size in blocks for _ in range(len(b) // size) if len(b)]
@@ -41,24 +38,6 @@ def best_value(P: Any, q: FloatArray, blocks: list[tuple[FloatArray, FloatArray,
     return float(found.obj_val)
 
 
-def dense_rows(rows: Rows, n: int) -> FloatArray:
-    """(R, n, A+1) the rows as combined.py defines them, from their places, kinds and factors."""
-    axes = rows.along.shape[2]
-    out = np.zeros((len(rows.kind), n, axes + 1))
-    for p in range(len(rows.span)):
-        basis = rows.basis[p].reshape(4, ORDER)
-        own = slice(rows.span[p], rows.span[p] + ORDER)
-        for r in range(rows.first[p], rows.first[p + 1]):
-            kind = rows.kind[r]
-            if kind < 3 * axes:
-                out[r, own, kind % axes] = rows.factor[r, 0] * basis[kind // axes + 1]
-            else:
-                way = kind - 3 * axes
-                out[r, own, :axes] = rows.factor[r, 0] * np.outer(basis[way + 1], rows.along[p, way])
-            out[r, own, axes] = rows.factor[r, 1:4] @ basis[:3]
-    return out
-
-
 def of_corridor(problem: Problem, control: FloatArray) -> float:
     """The optimum of interior_point.py's problem; what is not free stays as in `control` (n, A)."""
     n, axes = control.shape
@@ -68,34 +47,7 @@ def of_corridor(problem: Problem, control: FloatArray) -> float:
     stays = flat[~problem.free].ravel()
     hold = _picked(stays, n * axes)
     blocks = [(hold, control[~problem.free].ravel(), "zero", 1), (A, b, "cone", axes + 1)]
-    return best_value(P, problem.linear.T.ravel(), blocks)
-
-
-def of_window(problem: CombinedProblem, start: FloatArray) -> float:
-    """The optimum of combined_solver.py's problem; what is not free stays as in `start` (n, A+1)."""
-    n, columns = problem.linear.shape
-    size = n * columns
-    P = sparse.diags(
-        [problem.H[: size - d, d] for d in range(min(problem.H.shape[1], size))],
-        range(min(problem.H.shape[1], size)),
-        shape=(size, size),
-    )
-    P = P + sparse.triu(P, 1).T
-    flat = np.arange(size).reshape(n, columns)
-    A, b = _cones(problem.sites, problem.control, flat[:, :-1], size)
-    rows = dense_rows(problem.rows, n).reshape(-1, size)
-    lower, upper = problem.rows.factor[:, 4:].T
-    stays = flat[~problem.free]
-    hold = _picked(stays, size)
-    return best_value(
-        P,
-        problem.linear.ravel(),
-        [
-            (hold, start[~problem.free], "zero", 1),
-            (np.vstack([rows, -rows]), np.concatenate([upper, lower]), "positive", 1),
-            (A, b, "cone", columns),
-        ],
-    )
+    return best_value(P, np.zeros(n * axes), blocks)
 
 
 def _picked(numbers: Array, size: int) -> FloatArray:

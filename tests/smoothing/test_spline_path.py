@@ -30,7 +30,7 @@ from planner.smoothing.windows import REACH, WIDER, ControlWindow, tighten_windo
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
-AS_IT_IS = OptimalMethod(corner="spline", rounds=0)
+AS_IT_IS = OptimalMethod(corner="spline")
 
 
 def splined(program, machine=MACHINE, tolerance=None):
@@ -204,7 +204,7 @@ def loose_knots(monkeypatch):
     monkeypatch.setattr(lay, "ROOM", 0.3)
 
     def certain(corridor, splines, runs, used, left, goal):  # as if all had certificates
-        return Relaxed(splines.fits, splines.control, used, left, np.zeros(len(used)))
+        return Relaxed(splines.fits, splines.control, used, left)
 
     monkeypatch.setattr(spline_path, "relax", certain)
     return monkeypatch

@@ -11,7 +11,6 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
-from planner.smoothing import combined as combined_module
 from planner.smoothing import initial as initial_module
 from planner.smoothing import relax as relax_module
 from planner.smoothing.basis import DEGREE, derivatives, knots_at
@@ -129,5 +128,4 @@ def test_knots_of_a_run_laid_in_ranges_are_as_dense(long_run, monkeypatch):
 
 
 def test_ranges_are_further_apart_than_their_gaps_are_wide():
-    for module, reach in ((relax_module, REACH), (combined_module, combined_module.WINDOWS)):
-        assert reach.window + 2 * DEGREE < module.RANGE
+    assert REACH.window + 2 * DEGREE < relax_module.RANGE

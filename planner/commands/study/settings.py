@@ -258,7 +258,7 @@ class StudiedJob:
     """A program that is planned many times.
 
     tolerance : contour tolerance that takes precedence over the program's and the machine's [mm], or None
-    how       : method and settings of `planner.plan`: method, geometry, corner, solver, effort, rounds
+    how       : method and settings of `planner.plan`: method, geometry, corner, solver, effort
     """
 
     program: Program

@@ -31,8 +31,8 @@ Not convex, and no certificate of a global optimum; from many starting points bo
 optimum. Every row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed
 duration 1), so that the iterates do not depend on the unit of length or time.
 
-The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices,
-reshaping and sensitivities need not know who solved the problem. Rows of axis limits are the same there; a
+The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices and
+sensitivities need not know who solved the problem. Rows of axis limits are the same there; a
 bound on v is one on x = v^2, with half of its multiplier when both count relative changes. The kernel's only
 equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e in it shifts v_{i+1} by e/(2
 vm), vm = (v_i + v_{i+1})/2, and the length of the interval by h e/(4 vm), so that with the multipliers nu_v

@@ -25,7 +25,7 @@ class Step:
     """One thing that was done or tried."""
 
     at: float  # computing time of this process since the job began, at the end of the step [s]
-    name: str  # what it was: "solve", "reshape", "tighten", ...
+    name: str  # what it was: "solve", "splines", "tighten", ...
     # cycle time of what it found [s]; NaN where nothing was found, None where a step has no time
     found: float | None = None
     # cycle time of the best until then [s], which `found` competes with; None where nothing competes

@@ -34,10 +34,8 @@ class OptimalMethod(Method):
     corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
              settings of your own
     solver : name of the solver, "own", "ipopt" or "fatrop" (feedrate/solvers.py), or a solver
-    effort : "quick", "normal" or "best": grids, rounds of reshaping, and the size up to which path and feed
-             are searched together (planning/optimal/effort.py); that is with corner "auto", the own solver,
-             no shaping, and `rounds` None
-    rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
+    effort : "quick", "normal" or "best": grids, and how finely and up to which size path and feed are searched
+             together (planning/optimal/effort.py); that is with corner "auto", the own solver and no shaping
     smooth : weight of the squares of all jerks, as shares of their limits, against the time [-], 0 or more:
              with more the joint search finds a smoother and slower motion; at 0 jerk is small only where it
              costs no time (joint/numbers.py)
@@ -47,7 +45,6 @@ class OptimalMethod(Method):
     corner: str | CornerShape = AUTO
     solver: str | ThirdOrderSolver = OWN
     effort: str = NORMAL
-    rounds: int | None = None
     smooth: float = 0.0
     shaped: bool = False
 
@@ -59,7 +56,7 @@ class OptimalMethod(Method):
 
     @property
     def _joint(self) -> bool:
-        return self.corner == AUTO and self.solver == OWN and self.rounds is None
+        return self.corner == AUTO and self.solver == OWN
 
     def plan_job(self, job: Job) -> Plan:
         effort = EFFORTS[effort_name(self.effort)]
@@ -70,7 +67,6 @@ class OptimalMethod(Method):
             order=ThirdOrder(third_order_solver(self.solver)),
             bezier=BezierCorner(sigma2=SIGMA2),
             effort=dataclasses.replace(effort, search=search),
-            rounds=self.rounds,
             joint=self._joint,
         )
         made = shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)

@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 from collections.abc import Sequence
 from importlib import import_module
-from numbers import Integral, Real
+from numbers import Real
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
 
@@ -16,7 +16,6 @@ from planner.base.errors import InputError
 from planner.base.names import (
     BEZIER,
     METHODS,
-    SINGLE_CORNERS,
     effort_name,
     method_name,
     smoothing,
@@ -51,10 +50,8 @@ class MethodSettings(TypedDict, total=False):
                (corners/own.py); None for "bezier"
     solver   : "own", "ipopt" or "fatrop" for "optimal", "reachability" or "toppra" for
                "second-order"; None for the first of them
-    effort   : "quick", "normal" or "best": how fine the grids are and how many rounds splines are reshaped;
-               None for "normal"
-    rounds   : of reshaping splines by what limits the motion on them (geometries "auto" and "spline"), 0 or
-               more; None for those of the effort, fewer where they gain nothing
+    effort   : "quick", "normal" or "best": how fine grids and the steps of the joint search are; None for
+               "normal"
     smooth   : weight of the jerk against the time, 0 or more [-]: with more the joint search of "optimal"
                finds a smoother and slower motion; None for 0, where jerk is small as far as it costs no time
     shaped   : deliver setpoints that leave the machine's vibration modes at rest
@@ -64,7 +61,6 @@ class MethodSettings(TypedDict, total=False):
     corner: str | CornerShape | None
     solver: str | None
     effort: str | None
-    rounds: int | None
     smooth: float | None
     shaped: bool | None
 
@@ -86,7 +82,7 @@ def plan(
     program   : a file, or a program read before
     machine   : a machine file, the name of a built-in machine, or a machine; None means "mill"
     method    : a name of `planner.base.names.METHODS`, or a method with settings of your own
-    settings  : geometry, corner, solver, effort, rounds, smooth, shaped: `MethodSettings`
+    settings  : geometry, corner, solver, effort, smooth, shaped: `MethodSettings`
     limits    : of your own, one or several, beside the machine's (docs/extending.md): "optimal" and
                 "second-order" keep them, the verdict judges every method by them
     tolerance : contour error budget [mm]; takes precedence over the program's G64 P and the machine file
@@ -137,15 +133,14 @@ def plan(
 def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
     """The method of that name with these settings.
 
-    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort, and for a
-    negative number of rounds.
+    Raises InputError for an unknown name of a method, geometry, corner shape, solver or effort.
     """
     given = _given(settings)
     entry = METHODS[method_name(name)]
     made: dict[str, Any] = dict(entry.settings)
     if entry.shapes:
         kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
-        made |= {"corner": shape or kind, "rounds": given.get("rounds"), "shaped": bool(given.get("shaped"))}
+        made |= {"corner": shape or kind, "shaped": bool(given.get("shaped"))}
         if (effort := given.get("effort")) is not None:
             made["effort"] = effort_name(effort)
     if (smooth := given.get("smooth")) is not None:
@@ -176,9 +171,7 @@ def _given(settings: MethodSettings) -> MethodSettings:
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise TypeError(f"unexpected keyword argument '{wrong}'; settings are {', '.join(allowed)}{hint}")
     given = {name: value for name, value in settings.items() if value is not None and value is not False}
-    rounds, corner, smooth, shaped = (given.get(name) for name in ("rounds", "corner", "smooth", "shaped"))
-    if "rounds" in given and not (isinstance(rounds, Integral) and int(rounds) >= 0):
-        raise InputError(f"{rounds} rounds; it must be 0 or more, a whole number")
+    corner, smooth, shaped = (given.get(name) for name in ("corner", "smooth", "shaped"))
     if "smooth" in given and not (isinstance(smooth, Real) and 0.0 <= float(smooth) < np.inf):
         raise InputError(f"smooth = {smooth!r}: it is a number, 0 or more")
     if "corner" in given and not (isinstance(corner, str) or hasattr(corner, "at")):
@@ -203,10 +196,6 @@ def _check_used(method: str | Method, given: MethodSettings) -> None:
             raise InputError(
                 f"solver = {value}: method {method} does not use it; it has {', '.join(METHODS[method].solvers)}"
             )
-    if "rounds" in given:
-        kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
-        if kind == SINGLE_CORNERS:
-            raise InputError(f"rounds = {given['rounds']}: they reshape splines; {shape} corners have none")
 
 
 def _smoothing(

@@ -3,8 +3,7 @@ search can.
 
 The search has no row of the jerk; its accelerations rise and fall in steps as short as it finds them best.
 Where it does not run, the feed along a path is found by reachability analysis, accelerations step at grid
-points, and splines are reshaped by the multipliers of that motion (feedrate/costates.py). The verdict reports
-the jerk as not limited.
+points. The verdict reports the jerk as not limited.
 """
 
 from __future__ import annotations
@@ -33,14 +32,12 @@ class SecondOrderMethod(Method):
     solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a
              solver
     effort : "quick", "normal" or "best": as of method `optimal` (planning/optimal/effort.py)
-    rounds : of reshaping splines (planning/optimal/reshape.py); None for those of the effort
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """
 
     corner: str | CornerShape = AUTO
     solver: str | FeedrateSolver = REACHABILITY
     effort: str = NORMAL
-    rounds: int | None = None
     shaped: bool = False
 
     ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
@@ -53,7 +50,6 @@ class SecondOrderMethod(Method):
             corner=self.corner,
             order=order,
             effort=effort,
-            rounds=self.rounds,
-            joint=self.corner == AUTO and self.solver == REACHABILITY and self.rounds is None,
+            joint=self.corner == AUTO and self.solver == REACHABILITY,
         )
         return shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)

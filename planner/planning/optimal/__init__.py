@@ -1,1 +1,1 @@
-"""The time-optimal methods: choose a geometry, solve, reshape, solve, tighten, deliver."""
+"""The time-optimal methods: choose a geometry, solve, tighten, deliver."""

@@ -35,7 +35,7 @@ COMPARED_POINTS = SIZES.corners_compared
 # chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
-# Corners that on the grid of the rounds take so many times as long as splines on the final one are not tried
+# Corners that on the first grid take so many times as long as splines on the final one are not tried
 # there [-]: times on the coarse grid are longer by up to that.
 CLOSE = 1.01
 FASTER = (
@@ -76,7 +76,7 @@ def with_corners(
 
     rounded : the path with the corners that the splines of `best` replace
     corners : bounds on the motion on them
-    grids   : of the rounds, and the final one, of `best`
+    grids   : of corners at first, and the final one, of `best`
     """
     none = np.zeros(0, dtype=np.int64)
     shape = best.shape
@@ -96,7 +96,7 @@ def with_corners(
     chosen[left] = False
     job.tell("bound on corners", found=corners.time.sum(), runs=len(ranked), left=len(left))
     splines = best.stop_to_stop()
-    for resolution, fraction in ((grids.rounds, CLOSE), (grids.final, 1.0)):
+    for resolution, fraction in ((grids.first, CLOSE), (grids.final, 1.0)):
         if not chosen.any():
             return best, left
         planned = order.solve(rounded.part(chosen), job, resolution)

@@ -1,8 +1,6 @@
-"""How much work a plan is worth: grids and rounds of reshaping for `--effort quick`, `normal` and `best`.
+"""How much work a plan is worth: grids and searches for `--effort quick`, `normal` and `best`.
 
-Splines are reshaped on a coarse grid, on which motions take up to 1e-2 longer than on a fine one; which of
-two shapes is faster it tells better than that. The last shape is solved again on the final grid, that of the
-plan. The error of a grid goes with the square of its intervals, and so do its points with the root of its
+The error of a grid goes with the square of its intervals, and so do its points with the root of its
 resolution: 16 times finer are about 4 times as many points.
 """
 
@@ -36,7 +34,7 @@ class Grids(NamedTuple):
     """Resolutions for a job that has `points` points at most on a grid of the resolution `COARSE`."""
 
     points: float
-    rounds: float  # of the grid on which splines are reshaped
+    first: float  # of the grid on which corners are compared with splines at first
     final: float  # of the grid of the plan
 
 
@@ -50,7 +48,7 @@ class Search:
     # how finely what is found is cut once more, and the gap of the search from there, one after the other
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
     smooth: float = 0.0  # weight of the jerk against the time at least [-]
-    again: bool = True  # search from reshaped splines where that has not ended
+    again: bool = True  # search once more where that has not ended
     # steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a
     # step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the
     # time for 2e-3 less motion
@@ -71,9 +69,6 @@ THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST
 class Effort:
     """The effort of a plan."""
 
-    work: int  # grid points, counted over all rounds of reshaping
-    rounds: int  # of reshaping at most
-    left: float  # no more of them where one promises less than this share of the time [-]
     sizes: tuple[Grids, ...]  # grids by the size of the job, ascending
     search: Search  # for geometry and feed together
 
@@ -82,28 +77,19 @@ class Effort:
         return next(size for size in self.sizes if points <= size.points)
 
 
-# The first rounds gain most. Final grids are as fine as the memory allows: a motion on a coarser one is slower.
+# Final grids are as fine as the memory allows: a motion on a coarser one is slower.
 _TINY, _FEW, _MANY = SIZES.small_grids
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
     QUICK: Effort(
-        work=25_000,
-        rounds=2,
-        left=1e-3,
         search=Search(steps_max=SMALL, finer=(), again=False),
         sizes=(_LARGE,),
     ),
     NORMAL: Effort(
-        work=150_000,
-        rounds=40,
-        left=1e-5,
         search=Search(steps_max=STEPS_MAX, small=SMALL),
         sizes=(Grids(_TINY, 2e-3, 2e-4), Grids(_FEW, 8e-3, 5e-4), Grids(_MANY, COARSE, 2e-3), _LARGE),
     ),
     BEST: Effort(
-        work=5_000_000,
-        rounds=100,
-        left=1e-6,
         search=THOROUGH,
         sizes=(Grids(_FEW, 2e-3, 2e-4), Grids(_MANY, 8e-3, 5e-4), Grids(10.0 * _MANY, COARSE, 2e-3), _LARGE),
     ),
@@ -119,8 +105,7 @@ class Settings:
     order: Order  # which limits are kept, and the solver for them
     # the corner of "bezier", and where there is no spline
     bezier: CornerShape = field(default_factory=BezierCorner)
-    effort: Effort = EFFORTS[NORMAL]  # grids and rounds of reshaping
-    rounds: int | None = None  # of reshaping; None for those of the effort
+    effort: Effort = EFFORTS[NORMAL]
     joint: bool = False  # whether path and feed are searched together (planning/joint_search.py)
 
     @property

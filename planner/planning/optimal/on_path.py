@@ -26,7 +26,7 @@ class OnPath:
     samples: PathSamples  # its grid
     problem: FeedrateProblem  # the feedrate problem on the grid
     solution: FeedrateSolution  # the motion, or the status of a failure
-    # what the path's splines are made of, if it has some that may be reshaped
+    # what the path's splines are made of, if it has some
     shape: SplineShape | None = None
     notes: tuple[str, ...] = ()  # sentences on what was given up
 

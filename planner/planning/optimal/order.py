@@ -19,7 +19,6 @@ from planner.corners.smooth import SmoothPath
 from planner.feedrate.changed import Known, solve_changed
 from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.costates import second_order_multipliers
 from planner.feedrate.grid import add_switching_points, refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.sampling.path_samples import PathSamples
@@ -90,7 +89,7 @@ class ThirdOrder:
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """All limits but jerk; multipliers are found from the profile (feedrate/costates.py).
+    """All limits but jerk.
 
     to_tighten : limits will be tightened in places, on straight elements too, which then need points inside
     """
@@ -116,11 +115,7 @@ class SecondOrder:
                 samples = refine_for_jerk(samples, job.machine)
             planned = second_order(path, samples, job.machine, self.solver)
             _tell(job, planned, resolution)
-            if not planned.solution.solved:
-                return planned
-            multipliers = second_order_multipliers(planned.problem, planned.solution)
-            solution = dataclasses.replace(planned.solution, multipliers=multipliers)
-        return dataclasses.replace(planned, solution=solution)
+        return planned
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:

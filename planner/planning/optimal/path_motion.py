@@ -1,9 +1,7 @@
-"""The time-optimal motion on a path: rounded corners, or splines shaped for it.
+"""The time-optimal motion on a path: rounded corners, or splines.
 
   geometry  round the corners; lay splines over the runs between full stops                       corners/, smoothing/
   solve     the time-optimal feed on that path, all limits at grid points                         order.py, feedrate/
-  reshape   path and feed improved together, all limits linearised, inside the
-            tolerance; solve on the new path; in turns                                 rounds.py, reshape.py, smoothing/
   compare   single corners between the full stops, where they may be faster                       compare_corners.py
 
 and then, delivered as a plan,
@@ -22,7 +20,7 @@ from planner.base.names import AUTO, QUICK, SPLINE
 from planner.base.sizes import SIZES
 from planner.base.threads import beside, threads
 from planner.corners.smooth import SmoothPath, round_corners
-from planner.feedrate.sampling.samples import PathSamples, sample_path
+from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
 from planner.motion.timing import Motion
 from planner.planning.job.job import Job
@@ -35,9 +33,8 @@ from planner.planning.optimal.geometry import corner_shape, splined_with_stops
 from planner.planning.optimal.notes import no_spline_note, not_compared_note
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.result import plan_of_solution, priced, prices_of
-from planner.planning.optimal.rounds import reshaped
 from planner.planning.optimal.tighten import within_limits
-from planner.smoothing.spline_path import SplineShape, with_spline
+from planner.smoothing.spline_path import with_spline
 
 PRICED_BESIDE = SIZES.priced_beside
 
@@ -93,33 +90,22 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
 
 
 def time_optimal(job: Job, settings: Settings) -> OnPath:
-    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines shaped for it."""
+    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines."""
     order, machine = settings.order, job.machine
 
     # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
     given = _rounded(job, settings)
     if settings.corner not in (AUTO, SPLINE):
-        return order.solve(given, job, grids_for(given, job, settings)[0].final)
+        return order.solve(given, job, grids_for(given, job, settings).final)
     with job.stage("geometry"):
         rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
     if not splines.splines.fits.any():
-        cornered = order.solve(given, job, grids_for(given, job, settings)[0].final)
+        cornered = order.solve(given, job, grids_for(given, job, settings).final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
-    # Solve and reshape in turns, on a coarse grid; then once on the final one. The coarse motion is let go of
-    # before: 0.5 kB a point. Where not one round is worth its work the final grid is the first one.
-    best, grids, resolution = _first(with_spline(rounded, splines), splines, job, settings)
-    if best.solution.solved and resolution != grids.final:
-        best = reshaped(rounded, best, job, settings, resolution)
-        path, splined, coarse = best.path, best.shape, best.solution.cycle_time
-        del best
-        best = dataclasses.replace(order.solve(path, job, grids.final), shape=splined)
-        job.tell(
-            "final grid",
-            found=best.solution.cycle_time,
-            before=coarse,
-            kept=best.solution.solved,
-        )
+    path = with_spline(rounded, splines)
+    grids = grids_for(path, job, settings)
+    best = dataclasses.replace(order.solve(path, job, grids.final), shape=splines)
     notes: tuple[str, ...] = ()
 
     # Single corners between full stops where they are faster.
@@ -133,7 +119,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
 
 
 def first_motion(job: Job, settings: Settings) -> OnPath | None:
-    """The time-optimal motion on the first splines, on a coarse grid and with its limits kept at grid points
+    """The time-optimal motion on splines, on a coarse grid and with its limits kept at grid points
     only, with a full stop where a run gets none; None where no run has one, where there is no solution, and
     where the splines have more spans than the steps that are searched."""
     given = _rounded(job, settings)
@@ -156,27 +142,12 @@ def _rounded(job: Job, settings: Settings) -> SmoothPath:
         return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
 
 
-def _first(path: SmoothPath, shape: SplineShape, job: Job, settings: Settings) -> tuple[OnPath, Grids, float]:
-    """The motion on the first splines, the grids, and the resolution of the one that it is on."""
-    spans, effort = len(path.spline.spans), settings.effort  # a grid has a point for each span at least
-    if settings.rounds is None and spans > effort.work and effort.grids(spans) is effort.sizes[-1]:
-        grids = effort.sizes[-1]
-        return (
-            dataclasses.replace(settings.order.solve(path, job, grids.final), shape=shape),
-            grids,
-            grids.final,
-        )
-    grids, samples = grids_for(path, job, settings)
-    reshaped_at_all = settings.effort.work >= len(samples) if settings.rounds is None else settings.rounds > 0
-    resolution = grids.rounds if reshaped_at_all else grids.final
-    known = samples if resolution == COARSE else None
-    del samples
-    planned = settings.order.solve(path, job, resolution, samples=known)
-    return dataclasses.replace(planned, shape=shape), grids, resolution
-
-
-def grids_for(path: SmoothPath, job: Job, settings: Settings) -> tuple[Grids, PathSamples]:
-    """The grids that a path of this size is worth, and the coarse one by which that is told."""
+def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
+    """The grids that a path of this size is worth: by its points on a coarse one, which has one for each span
+    at least."""
+    of_spans = settings.effort.grids(len(path.spline.spans))
+    if of_spans is settings.effort.sizes[-1]:
+        return of_spans
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
-    return settings.effort.grids(len(coarse)), coarse
+    return settings.effort.grids(len(coarse))

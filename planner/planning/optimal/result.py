@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-from planner.feedrate.constraints.limits import Limits
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
@@ -14,9 +13,8 @@ from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.reshape import corridor_prices
 from planner.sensitivity.activity import history
-from planner.sensitivity.path_prices import SitePrices, path_prices
+from planner.sensitivity.path_prices import path_prices
 from planner.sensitivity.records import PriceList
 
 
@@ -54,11 +52,5 @@ def priced(best: OnPath, machine: Machine) -> bool:
 
 
 def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """The prices of its limits. With limits that are no axis' the tolerance of splines has no price: the
-    machine alone pulls at their shapes."""
-    by_site = None
-    along = Limits.of(machine, best.path.toolpath.axes).along
-    # what the corridor of the splines costs
-    if best.shape is not None and len(best.path.spline) and not along:
-        by_site = SitePrices(place=best.shape.splines.sites.place, price=corridor_prices(best))
-    return path_prices(best.samples, best.problem, best.solution, machine, by_site)
+    """The prices of its limits."""
+    return path_prices(best.samples, best.problem, best.solution, machine)

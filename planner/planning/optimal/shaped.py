@@ -179,8 +179,6 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
             "and damping"
         )
-    # reshaping makes paths for the motion as it is planned, not for the one behind the shaper
-    settings = dataclasses.replace(settings, rounds=settings.rounds or 0)
     plan = _plan_of(job, settings, shaped(job, settings))
     if plan.verdict is None or counted_time(plan) < np.inf:
         return plan

@@ -95,7 +95,7 @@ def test_a_limit_is_reached_and_not_exceeded(job, method, limit):
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [Soft(), Turntable()], ids=lambda limit: limit.name)
 def test_splines_keep_it_too(job, limit):
-    made = planner.plan(job, method="second-order", corner="spline", rounds=1, limits=[limit])
+    made = planner.plan(job, method="second-order", corner="spline", limits=[limit])
     assert made.verdict.passed, made.verdict.faults
     assert max(_ratios(made, limit.name)[q] for q in ("velocity", "acceleration")) > 0.999
 

@@ -85,7 +85,7 @@ def test_the_speed_changes_within_the_quiet_way():
 @pytest.mark.parametrize("corner", ["bezier", "spline"])
 def test_short_a_over_j_needs_no_more_points_and_no_more_time(corner, monkeypatch):
     program = parse_program("G21 G90 G17 F900\nG1 X10\nG3 X30 Y20 R20\nG2 X34 Y24 R4\nG1 X60 Y30\nM2\n")
-    method = OptimalMethod(corner=corner, rounds=0)
+    method = OptimalMethod(corner=corner)
     few = method.plan(program, SHORT)
 
     def nowhere(path, table, limits):

@@ -22,20 +22,19 @@ from planner.planning.methods.stop import StopMethod
 def told():
     program, machine = job(3)
     trace = Trace()
-    return OptimalMethod(rounds=4).plan(program, machine, log=trace), trace
+    return OptimalMethod(corner="spline").plan(program, machine, log=trace), trace
 
 
 def test_a_trace_changes_nothing(told):
     plan, _ = told
-    silent = OptimalMethod(rounds=4).plan(*job(3))
+    silent = OptimalMethod(corner="spline").plan(*job(3))
     assert (silent.trajectory.position == plan.trajectory.position).all()
 
 
-def test_every_round_is_told_and_what_was_kept_is_the_fastest_so_far(told):
+def test_every_step_is_told_and_what_was_kept_is_the_fastest_so_far(told):
     plan, trace = told
     names = [step.name for step in trace.steps]
-    assert [f"reshape {n}" in names for n in range(1, 6)] == [True] * 4 + [False]
-    assert {"splines", "solve", "final grid", "between points", "bound on corners", "plan"} <= set(names)
+    assert {"splines", "solve", "between points", "plan"} <= set(names)
     for step in trace.steps:
         if step.kept is not None:
             assert step.kept == (step.found < step.before)
@@ -56,8 +55,8 @@ def test_the_solver_s_windows_and_points_are_told(told):
 def test_second_order_is_told_likewise_and_other_methods_in_a_line():
     program, machine = job(3)
     second, stop = Trace(), Trace()
-    SecondOrderMethod(rounds=1).plan(program, machine, log=second)
-    assert {"splines", "solve", "reshape 1", "plan"} <= {step.name for step in second.steps}
+    SecondOrderMethod(corner="spline").plan(program, machine, log=second)
+    assert {"splines", "solve", "plan"} <= {step.name for step in second.steps}
     StopMethod().plan(program, machine, log=stop)
     assert [(step.name, step.facts.get("method")) for step in stop.steps] == [
         ("programmed feed", None),

@@ -138,25 +138,6 @@ def test_a_dwell_at_the_end_is_stood_through():
     )
 
 
-@pytest.mark.slow
-def test_where_the_path_doubles_back_within_the_tolerance_it_is_not_slower_than_reshaped_splines():
-    """Both ends of the block of 0.07 mm are within 0.05 mm of one place: the search alone does not find the way without the detour."""
-    points = [[0, 0], [-1.7, 0.77], [-1.66, 0.71], [-1.84, 0.78], [-1.83, -0.29]]
-    job = problems.polyline(points, feed=173.0)
-    reshaped = planner.plan(job, MACHINE, rounds=40).cycle_time
-    assert planner.plan(job, MACHINE).cycle_time <= reshaped * (1 + 1e-9)
-    assert planner.plan(job, MACHINE, effort="quick").cycle_time > reshaped * (1 + 1e-2)
-
-
-@pytest.mark.slow
-def test_a_curve_that_bends_within_the_tolerance_is_not_slower_than_reshaped_splines():
-    """Its bend has a radius below the tolerance, which a way beside the curve need not follow: the search alone took 21 % longer."""
-    text = "G21 G90 G64 P0.03\nG5 X0.19 Y0.26 I0.23 J-0.1 P-0.07 Q0.08 F6000\nG1 X0.5 Y0.75\nM2\n"
-    job = planner.read_program(text=text, machine=MACHINE)
-    reshaped = planner.plan(job, MACHINE, geometry="spline").cycle_time
-    assert planner.plan(job, MACHINE).cycle_time <= reshaped * (1 + 1e-9)
-
-
 @pytest.mark.usual_sizes
 def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_delivered(monkeypatch):
     """A zig-zag counts as large: it is searched in long steps only, and not at all with an interpolation period longer than them."""

@@ -12,9 +12,6 @@ from planner.planning.methods.registry import plan
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"rounds": "a"}, "a rounds; it must be 0 or more, a whole number"),
-        ({"rounds": 1.5}, "1.5 rounds; it must be 0 or more"),
-        ({"rounds": -1}, "-1 rounds; it must be 0 or more"),
         ({"effort": 3}, "no effort '3'; there are quick, normal, best"),
         ({"geometry": 2}, "no geometry '2'; there are auto, spline, corners"),
         ({"solver": 3}, "solver = 3: method optimal does not use it; it has own"),

@@ -1,4 +1,4 @@
-"""Reshaping: the prices are the derivatives of the cycle time by the shape, and rounds only ever gain."""
+"""Single corners between full stops instead of splines, where they are faster."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ from planner.geometry.toolpath import Joint
 from planner.nc.reader import parse_program
 from planner.planning.job.trace import tell_nobody
 from planner.planning.methods.optimal import OptimalMethod
-from planner.planning.optimal import compare_corners, reshape
+from planner.planning.optimal import compare_corners
 from planner.planning.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
 from planner.planning.optimal.corner_times import CornerBounds, corner_times
 from planner.planning.optimal.effort import COARSE, Grids
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import second_order
-from planner.planning.optimal.reshape import price_bands
 from planner.smoothing.spline_path import spline_shape, with_spline
 
 MACHINE = problems.machine()
@@ -62,50 +61,6 @@ def shaped(program):
     toolpath = toolpath_from_program(program, MACHINE)
     rounded = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     return rounded, spline_shape(rounded, MACHINE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["pentagon", "zigzag"])
-def test_prices_are_the_derivatives_of_the_time(name):
-    """dT = c' H dc for changes of the control points, against plans made again on the changed shape."""
-    rounded, shape = shaped(JOBS[name])
-    before = planned_on(with_spline(rounded, shape), shape=shape)
-    H, _ = price_bands(before)
-    control, rng = shape.splines.control, np.random.default_rng(1)
-    gradient = np.zeros_like(control)
-    for k in range(control.shape[1]):
-        for d in range(6):
-            h = H[k, d:, 5 - d]
-            gradient[d:, k] += h * control[: len(control) - d, k]
-            if d:
-                gradient[: len(control) - d, k] += h * control[d:, k]
-    places = np.arange(len(control))
-    for _ in range(6):
-        bump = np.exp(-(((places - rng.uniform(8, len(control) - 8)) / 4.0) ** 2))
-        bump[:6] = bump[-6:] = 0.0
-        change = bump[:, None] * rng.normal(size=control.shape[1])
-        change *= 2e-3 / np.abs(change).max()
-        times = []
-        for sign in (1.0, -1.0):
-            splines = shape.splines._replace(control=control + sign * change)
-            times.append(
-                planned_on(
-                    with_spline(rounded, dataclasses.replace(shape, splines=splines))
-                ).solution.cycle_time
-            )
-        expected = float((gradient * change).sum())
-        slack = 2e-2 * float(np.abs(gradient * change).sum()) + 2e-5 * times[0]
-        assert (times[0] - times[1]) / 2.0 == pytest.approx(expected, abs=slack)
-
-
-@pytest.mark.parametrize("name", slow_but(("pentagon", "five points"), JOBS))
-def test_rounds_gain_and_stay_inside(name):
-    times = []
-    for rounds in (0, 3):
-        plan = OptimalMethod(corner="spline", rounds=rounds).plan(JOBS[name], MACHINE)
-        assert plan.verdict.passed, plan.verdict.faults
-        times.append(plan.trajectory.cycle_time)
-    assert times[1] <= times[0] * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("name", slow_but("five points", JOBS))
@@ -191,15 +146,6 @@ def test_corners_that_need_too_large_a_grid_are_left_and_named():
     assert not order.paths
     assert list(left) == [0]
     assert best is splines
-
-
-def test_bands_are_the_same_in_parts_of_any_size(monkeypatch):
-    rounded, shape = shaped(JOBS["pentagon"])
-    planned = planned_on(with_spline(rounded, shape), shape=shape)
-    whole = price_bands(planned)
-    monkeypatch.setattr(reshape, "PRICED", 17)
-    for one, other in zip(price_bands(planned), whole, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
 @pytest.mark.usual_sizes

@@ -12,7 +12,7 @@ How far its arc length is off is measured in the middle and at the quarters, by 
 polynomial q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what
 is left is measured between these places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step
 from there by the slope of the polynomial, and where that is not enough, steps by the curve itself
-(`_refine`). The samples themselves are in at_times.py.
+(`_refine`).
 """
 
 from typing import NamedTuple
@@ -21,17 +21,16 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
+from planner.base.search import last_not_after
 from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
 from planner.corners.elements import (
-    GAUSS_NODES,
-    GAUSS_WEIGHTS,
     ElementTable,
     element_length,
     element_point,
     is_straight,
+    to_arc_length,
 )
-from planner.geometry.spline import DEGREE
 
 # Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of
 # coordinates, so that accelerations by differences of nearby positions are as good as the columns.
@@ -70,97 +69,38 @@ class _Interval(NamedTuple):
     w0: float
     w1: float
     h: float
-    span: bool
-
-
-class _Room(NamedTuple):
-    """Room to evaluate an interval in: coefficients of its span (6, A) and of the derivatives (5, A), (4, A),
-    (3, A) of that; work (2, 4, A), speed (8,)."""
-
-    coef: FloatArray
-    first: FloatArray
-    second: FloatArray
-    third: FloatArray
-    work: FloatArray
-    speed: FloatArray
-
-
-@njit(cache=True, error_model="numpy")
-def room_for(axes):
-    """Arrays for one lot of samples over so many axes."""
-    return _Room(
-        np.empty((DEGREE + 1, axes)),
-        np.empty((DEGREE, axes)),
-        np.empty((DEGREE - 1, axes)),
-        np.empty((DEGREE - 2, axes)),
-        np.empty((2, 4, axes)),
-        np.empty(len(GAUSS_NODES)),
-    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def interval_of(table, grid, i, room):
-    """Interval i of the grid, with the coefficients of its span in `room`."""
-    legs, _, spans = table
-    span = grid.element[i] - len(legs)
-    if span >= 0:
-        given, p, d, b, t = spans[span].coef, room.coef, room.first, room.second, room.third
-        for k in range(p.shape[1]):
-            c1, c2, c3, c4, c5 = given[1, k], given[2, k], given[3, k], given[4, k], given[5, k]
-            p[0, k], p[1, k], p[2, k], p[3, k], p[4, k], p[5, k] = given[0, k], c1, c2, c3, c4, c5
-            d[0, k], d[1, k], d[2, k], d[3, k], d[4, k] = c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5
-            b[0, k], b[1, k], b[2, k], b[3, k] = 2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5
-            t[0, k], t[1, k], t[2, k] = 6.0 * c3, 24.0 * c4, 60.0 * c5
-    return _Interval(grid.element[i], grid.w0[i], grid.w1[i], grid.s[i + 1] - grid.s[i], span >= 0)
+def interval_of(grid, i):
+    """Interval i of the grid."""
+    return _Interval(grid.element[i], grid.w0[i], grid.w1[i], grid.s[i + 1] - grid.s[i])
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _length(table, on, room, w, out):
+def _length(table, on, w, out):
     """Arc length of the interval's element from its start to w [mm]; out (4, A) is scratch."""
-    if not on.span:
-        return element_length(table[0], table[1], table[2], on.element, on.w0, w, 0.5 * (on.w0 + on.w1), out)
-    first, speed, step = room.first, room.speed, w - on.w0
-    for g in range(len(GAUSS_NODES)):
-        speed[g] = 0.0
-    for k in range(first.shape[1]):
-        d0, d1, d2, d3, d4 = first[0, k], first[1, k], first[2, k], first[3, k], first[4, k]
-        for g in range(len(GAUSS_NODES)):
-            tau = on.w0 + step * GAUSS_NODES[g]
-            rate = (((d4 * tau + d3) * tau + d2) * tau + d1) * tau + d0
-            speed[g] += rate * rate
-    for g in range(len(GAUSS_NODES)):
-        speed[g] = np.sqrt(speed[g])
-    total = 0.0
-    for g in range(len(GAUSS_NODES)):
-        total += GAUSS_WEIGHTS[g] * speed[g]
-    return total * step
+    return element_length(table[0], table[1], table[2], on.element, on.w0, w, 0.5 * (on.w0 + on.w1), out)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _point(table, on, room, w, out):
-    """Point and three w-derivatives of the interval's element at w, into out (4, A)."""
-    if not on.span:
-        element_point(table[0], table[1], table[2], on.element, w, 0.5 * (on.w0 + on.w1), room.work, out)
-        return
-    p, d, b, t = room.coef, room.first, room.second, room.third
-    for k in range(out.shape[1]):
-        out[0, k] = ((((p[5, k] * w + p[4, k]) * w + p[3, k]) * w + p[2, k]) * w + p[1, k]) * w + p[0, k]
-        out[1, k] = (((d[4, k] * w + d[3, k]) * w + d[2, k]) * w + d[1, k]) * w + d[0, k]
-        out[2, k] = ((b[3, k] * w + b[2, k]) * w + b[1, k]) * w + b[0, k]
-        out[3, k] = (t[2, k] * w + t[1, k]) * w + t[0, k]
+def _point(table, on, work, w, out):
+    """Point and three w-derivatives of the interval's element at w, into out (4, A); work (2, 4, A) is
+    scratch."""
+    element_point(table[0], table[1], table[2], on.element, w, 0.5 * (on.w0 + on.w1), work, out)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _inverses(table, grid, axes, first, beyond, found):
     """The rows first .. beyond - 1 of `inverses`, where they are all 0."""
-    room, out = room_for(axes), np.empty((4, axes))
+    work, out = np.empty((2, 4, axes)), np.empty((4, axes))
     for g in range(len(grid.piece) - 1):
         for i in range(max(grid.piece[g], first), min(grid.piece[g + 1] - 1, beyond)):
-            on = interval_of(table, grid, i, room)
+            on = interval_of(grid, i)
             if is_straight(table[0], on.element):
                 found[i, 1] = 1.0
             else:
-                _invert(table, on, room, out, found[i])
+                _invert(table, on, work, out, found[i])
                 found[i, 0] = max(found[i, 0] - S_ROUNDING * grid.s[i + 1] / on.h, 0.0)
 
 
@@ -180,12 +120,12 @@ def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def _invert(table, on, room, out, c):
+def _invert(table, on, work, out, c):
     """The polynomial of an interval on a curve, into c (`COEFFICIENTS`,) as `inverses` has it."""
     w0, dw, h = on.w0, on.w1 - on.w0, on.h
     slope, bend, third = np.empty(2), np.empty(2), np.empty(2)  # derivatives of W by q at both ends
     for e in range(2):
-        _point(table, on, room, on.w1 if e else w0, out)
+        _point(table, on, work, on.w1 if e else w0, out)
         speed_sq, along, bend_sq, along3 = 0.0, 0.0, 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
@@ -204,7 +144,7 @@ def _invert(table, on, room, out, c):
     c[6], c[7] = 70.0 * p - 34.0 * v + 6.5 * a - 0.5 * j, -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
     for n in range(8, COEFFICIENTS):
         c[n] = 0.0
-    off = _off(table, on, room, out, c, (0.25, 0.5, 0.75))
+    off = _off(table, on, out, c, (0.25, 0.5, 0.75))
     c[0] = max(abs(off[0]), abs(off[1]), abs(off[2]))
     if not c[0] > LENGTH_ROUNDING or c[0] == np.inf:
         return
@@ -212,7 +152,7 @@ def _invert(table, on, room, out, c):
     same = -off[1] * _slope_at(c, 0.5) / _hump(0.5)
     more = -off[2] * _slope_at(c, 0.75) / _hump(0.75)
     c[8], c[9], c[10] = same, 2.0 * (more - less), 8.0 * (more - 2.0 * same + less)
-    off = _off(table, on, room, out, c, (0.375, 0.625, 0.5))
+    off = _off(table, on, out, c, (0.375, 0.625, 0.5))
     left = max(abs(off[0]), abs(off[1]), abs(off[2]))
     if left < c[0]:
         c[0] = left
@@ -221,7 +161,7 @@ def _invert(table, on, room, out, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _off(table, on, room, out, c, shares):
+def _off(table, on, out, c, shares):
     """How far the polynomial's arc length is off at three shares of the interval [share of it]; inf where it
     leaves the interval."""
     first, second, third = np.inf, np.inf, np.inf
@@ -229,7 +169,7 @@ def _off(table, on, room, out, c, shares):
         q = shares[n]
         w, off = on.w0 + (on.w1 - on.w0) * _at(c, q), np.inf
         if on.w0 <= w <= on.w1:
-            off = _length(table, on, room, w, out) / on.h - q
+            off = _length(table, on, w, out) / on.h - q
         if n == 0:
             first = off
         elif n == 1:
@@ -261,20 +201,20 @@ def _slope_at(c, q):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _parameter(table, on, room, c, ds, out):
+def _parameter(table, on, work, c, ds, out):
     """The parameter w at the arc length ds into the interval, from its polynomial c."""
     dw, q = on.w1 - on.w0, ds / on.h
     w = on.w0 + dw * _at(c, q)
     if c[0] <= LENGTH_ROUNDING:
         return w
     if c[0] > ONE_STEP:
-        return _refine(table, on, room, w, ds, out)
-    miss = _length(table, on, room, w, out) / on.h - q
+        return _refine(table, on, work, w, ds, out)
+    miss = _length(table, on, w, out) / on.h - q
     return min(max(w - miss * dw * _slope_at(c, q), on.w0), on.w1)
 
 
 @njit(cache=True, error_model="numpy")
-def _refine(table, on, room, w, ds, out):
+def _refine(table, on, work, w, ds, out):
     """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order,
     and halves of what encloses the solution where that leads outside it (where an interval is a whole span it
     may)."""
@@ -282,14 +222,14 @@ def _refine(table, on, room, w, ds, out):
     low, high = w0, w1
     w = min(max(w, w0), w1)
     for _ in range(REFINE_STEPS):
-        miss = _length(table, on, room, w, out) - ds
+        miss = _length(table, on, w, out) - ds
         if abs(miss) <= LENGTH_ROUNDING * h:
             break
         if miss > 0.0:
             high = w
         else:
             low = w
-        _point(table, on, room, w, out)
+        _point(table, on, work, w, out)
         speed_sq, along = 0.0, 0.0
         for k in range(out.shape[1]):
             speed_sq += out[1, k] * out[1, k]
@@ -305,9 +245,68 @@ def _refine(table, on, room, w, ds, out):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def place_of(table, on, room, c, ds, out):
+def place_of(table, on, work, c, ds, out):
     """Place and w-derivatives at the arc length ds into an interval, into out (4, A), from its polynomial c;
     returns the parameter w there."""
-    w = _parameter(table, on, room, c, ds, out)
-    _point(table, on, room, w, out)
+    w = _parameter(table, on, work, c, ds, out)
+    _point(table, on, work, w, out)
     return w
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def sample(table, law, grid, inverse, times, axes):
+    """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that
+    each lies at; an interval of a span may cover several.
+
+    table, grid : `ElementTable` (corners/elements.py), `Grid` (sampling.py)
+    law         : `TimeLaw.columns`
+    inverse     : (P, `COEFFICIENTS`), from `inverses` (sampling.py)
+    """
+    legs, _, spans = table
+    t, s_law, feed, acc_s, jerk_s, run, end = law
+    piece, s, element, _, _, of_interval, passed = grid
+    count = len(times)
+    out_position, out_velocity = np.empty((count, axes)), np.empty((count, axes))
+    out_acceleration, out_jerk = np.empty((count, axes)), np.empty((count, axes))
+    out_s, out_feed, segment = np.empty(count), np.empty(count), np.empty(count, np.int64)
+    work, here = np.empty((2, 4, axes)), np.empty((4, axes))
+    m = last_not_after(t, times[0], 0, len(t) - 1) if count else 0
+    i, at, joint = -1, 0, 0
+    on = interval_of(grid, at)
+    for n in range(count):
+        while m + 1 < len(t) and t[m + 1] <= times[n]:
+            m += 1
+        tau = max(times[n] - t[m], 0.0)
+        u, j = acc_s[m] + jerk_s[m] * tau, jerk_s[m]
+        v = max(feed[m] + tau * (acc_s[m] + 0.5 * jerk_s[m] * tau), 0.0)
+        s_here = s_law[m] + tau * (feed[m] + tau * (acc_s[m] / 2.0 + jerk_s[m] * tau / 6.0))
+        if m + 1 < len(t):
+            s_here = min(s_here, s_law[m + 1])
+        if times[n] >= end:
+            s_here, v, u, j = s[-1], 0.0, 0.0, 0.0
+        elif times[n] < t[m]:  # a dwell before the first move
+            v, u, j = 0.0, 0.0, 0.0
+        first, last = piece[run[m]], piece[run[m] + 1] - 2  # the intervals of this run
+        if i < first:
+            i = last_not_after(s, s_here, first, last)
+        while i < last and s[i + 1] <= s_here:
+            i += 1
+        if i != at:
+            on, at = interval_of(grid, i), i
+        ds = min(max(s_here - s[i], 0.0), on.h)
+        w = place_of(table, on, work, inverse[i], ds, here)
+        to_arc_length(here)
+        out_s[n], out_feed[n] = s[i] + ds, v
+        segment[n] = of_interval[i]
+        if element[i] >= len(legs):
+            span = element[i] - len(legs)
+            place = spans[span].begin + spans[span].width * w
+            if joint + 1 >= len(passed) or passed[joint + 1] <= place or passed[joint] > place:
+                joint = last_not_after(passed, place, 0, len(passed) - 2)
+            segment[n] = joint
+        for k in range(axes):
+            tangent, bend, twist = here[1, k], here[2, k], here[3, k]
+            out_position[n, k], out_velocity[n, k] = here[0, k], tangent * v
+            out_acceleration[n, k] = tangent * u + bend * (v * v)
+            out_jerk[n, k] = tangent * j + 3.0 * bend * (v * u) + twist * (v * v * v)
+    return out_position, out_velocity, out_acceleration, out_jerk, out_s, out_feed, segment

@@ -32,9 +32,8 @@ from planner.base.search import nearest
 from planner.base.sizes import SIZES
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
-from planner.motion.at_times import sample
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.motion.sampling import Grid, inverses
+from planner.motion.sampling import Grid, inverses, sample
 from planner.motion.trajectory import Trajectory
 
 

@@ -12,8 +12,7 @@ from planner.corners.elements import ElementTable, element_length, element_point
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.spline import span_dtype
-from planner.motion.at_times import sample
-from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses
+from planner.motion.sampling import LENGTH_ROUNDING, ONE_STEP, Grid, inverses, sample
 from planner.nc.reader import parse_program
 from planner.smoothing.spline_path import spline_shape, with_spline
 

@@ -81,9 +81,10 @@ def _known_on_paths(job: Job) -> bool:
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether the joint search of a small job has not ended."""
+    """Whether the joint search of a small job has not ended; behind filters the motion on the path is planned
+    anyway, and is no slower."""
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
-    return small and tried.best is None
+    return small and tried.best is None and not filters_count(*job.real)
 
 
 def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:

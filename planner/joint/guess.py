@@ -118,7 +118,7 @@ def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: C
 def unit_of(run: TubeRun) -> float:
     """The unit of time in which a corner is shaped (module text) [s]."""
     jerk = run.jerk_scale
-    return float(min((run.acceleration / jerk).min(), np.cbrt(run.budget.min() / jerk.max())))
+    return float(min((run.acceleration / jerk).min(), np.cbrt(run.scale.min() / jerk.max())))
 
 
 def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:

@@ -19,19 +19,22 @@ from planner.joint.checks import normal_shares
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn, keeps_of
-from planner.joint.run import TubeRun
+from planner.joint.price import LAWS, NORMAL, ROOM, VERTEX
+from planner.joint.run import HALF, TubeRun
 
 # Of the normal acceleration that a motion was found to have, what budgets leave room for [-]: with less the
 # search has to hold it down in more places and takes longer, with more the path gets less of the tolerance.
 # And at least, of the largest that the axes give [-].
 HEADROOM, LEAST = 1.05, 0.05
+MOST = 0.95  # of the tolerance that chords get where the path is worth nothing [-]
 TINY = 1e-30  # keeps quotients finite
 
 
-def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, reach: float) -> FloatArray:
+def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, reach: float) -> tuple[FloatArray, FloatArray]:
     """(R,) normal acceleration that the budget of each leg has to leave room for [mm/s2]: `HEADROOM` times
     its own there and beside it, as far as chords and filters reach; where it turns back, the largest
-    acceleration with which it may.
+    acceleration with which it may. And (R,) the share of the tolerance that this takes at most [-]: where the
+    motion is held by what there was room for, as much as it is worth.
 
     leg   : (N,) of the steps that were found
     reach : of chords and filters, to both sides [s]
@@ -46,9 +49,23 @@ def reserve_for(run: TubeRun, leg: Array, found: TubeSolution, reach: float) -> 
     begin = end - steps.h
     within = np.stack([np.searchsorted(end, begin - reach), np.searchsorted(begin, end + reach)], axis=1)
     wanted = np.maximum(HEADROOM * across, _turning_back(run, leg, state, within, reach))
-    most = LEAST * run.reserved
+    most = LEAST * np.minimum(run.reserved, run.across_max)
     np.maximum.at(most, leg, np.maximum.reduceat(np.append(wanted, 0.0), within.ravel())[::2])
-    return most
+    held = (most >= run.across_max) & ~_beside_reversal(run)
+    return np.where(held, np.inf, most), np.where(held, _worth(run, leg, found), run.share)
+
+
+def _worth(run: TubeRun, leg: Array, found: TubeSolution) -> FloatArray:
+    """(R,) the share of the tolerance that chords and filters are worth on each leg [-], half of it or more: with p and
+    q the prices of chords and path, dT/d(ln) as they are, p ln(share) + q ln(1 - share) is least at p/(p + q). On curves
+    the path is worth next to nothing, at corners as much as chords."""
+    if found.price is None:
+        return run.share
+    own = np.zeros((len(run), LAWS))
+    np.subtract.at(own, leg, found.price[:, 3 * len(run.axis) :][:, :LAWS])
+    path = own[:, ROOM] + own[:, VERTEX] + np.append(own[1:, VERTEX], 0.0)
+    share = own[:, NORMAL] / np.maximum(own[:, NORMAL] + path, TINY)
+    return np.clip(share, HALF, MOST)
 
 
 def _turning_back(run: TubeRun, leg: Array, state: FloatArray, within: Array, reach: float) -> FloatArray:

@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.budget import allocate, error_rate, normal_anywhere, normal_within_budget
+from planner.corners.budget import error_rate, normal_anywhere
 from planner.feedrate.constraints.limits import JERK, Limits
 from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
@@ -54,6 +54,9 @@ ARC_FRACTION, TURN_MAX = 0.005, 0.5
 SHARP = 0.25
 # An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`).
 PASSED = 2.0
+# Of the tolerance that chords and filters take at most, as long as nothing tells better: where a corner is as fast as
+# can be, eq. (20) [-].
+HALF = 0.5
 
 
 class Budgets(NamedTuple):
@@ -63,7 +66,7 @@ class Budgets(NamedTuple):
     leg: FloatArray  # (R,) [mm]
     vertex: FloatArray  # (R+1,) 0 at both ends [mm]
     across: FloatArray  # (R,) normal acceleration [mm/s2]
-    reserved: FloatArray  # (R,) that chords and filters have room for [mm/s2]
+    reserved: FloatArray  # (R,) that is asked for [mm/s2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,12 +82,14 @@ class TubeRun:
     curve                        : (R,) row in `curves`, or -1
     curves                       : over the A axes
     budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
+    scale                        : (R,) the largest budget so far, by which steps are as long as they are [mm]
     across_max                   : (R,) largest normal acceleration that the rest of the budget and the
                                    machine allow [mm/s2]; inf where the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
     velocity, acceleration, jerk : (A,) limits of the axes; the jerk is inf where nothing limits it
     laws                         : other limits (own_laws.py)
-    reserved                     : (R,) normal acceleration that the budgets leave room for [mm/s2]
+    reserved, share              : (R,) normal acceleration that the budgets leave room for [mm/s2], as far as
+                                   that takes no more than this share of the tolerance [-]
     word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with
                                    them, else 0
     counts                       : (A,) 1 for those axes, else 0
@@ -104,6 +109,7 @@ class TubeRun:
     curve: Array
     curves: Curves
     budget: FloatArray
+    scale: FloatArray
     feed: FloatArray
     across_max: FloatArray
     vertex: FloatArray
@@ -113,6 +119,7 @@ class TubeRun:
     jerk: FloatArray
     laws: RunLaws
     reserved: FloatArray
+    share: FloatArray
     word: FloatArray
     counts: FloatArray
     left: str = ""
@@ -122,7 +129,7 @@ class TubeRun:
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
         freeze(self, "curve", np.int64, (legs,))
-        for name in ("length", "radius", "rate", "curvature", "budget", "reserved"):
+        for name in ("length", "radius", "rate", "curvature", "budget", "scale", "reserved", "share"):
             freeze(self, name, np.float64, (legs,))
         for name in ("feed", "across_max"):
             freeze(self, name, np.float64, (legs,), finite=False)
@@ -144,22 +151,22 @@ class TubeRun:
         time in which that moves it by the least budget [mm/s3]."""
         pushed = min((law.bound for law in self.laws.laws if law.kind == PUSH), default=np.inf)
         acceleration = np.minimum(self.acceleration, pushed)
-        shaped = SHARP * np.sqrt(self.budget.min() / acceleration.max())
+        shaped = SHARP * np.sqrt(self.scale.min() / acceleration.max())
         return np.where(np.isfinite(self.jerk), self.jerk, acceleration / shaped)
 
     @property
     def step_max(self) -> FloatArray:
         """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by
-        `ARC_FRACTION` of the budget (module text); inf on lines."""
+        `ARC_FRACTION` of the scale (module text); inf on lines."""
         with np.errstate(divide="ignore"):
-            fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
+            fourth = 384.0 * ARC_FRACTION * self.scale / (self.curvature * self.rate**2)
             turning = np.where(self.curve < 0, np.abs(self.rate), self.curvature)
             return np.minimum(fourth**0.25, TURN_MAX / turning)
 
     @property
     def room(self) -> FloatArray:
         """(R,) how far control points of a step may be from their places on the leg [mm]."""
-        return np.where(self.curvature > 0, 1.0 - ARC_FRACTION, 1.0) * self.budget
+        return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.scale, self.budget)
 
     @property
     def switch(self) -> FloatArray:
@@ -247,6 +254,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             curve=np.where(curved, np.cumsum(curved) - 1, -1),
             curves=replace(curves, points=curves.points[:, :, moves]),
             budget=budgets.leg,
+            scale=budgets.leg,
             feed=toolpath.feed[row],
             across_max=np.where(held, budgets.across, np.inf),
             vertex=vertex[:, moves],
@@ -256,6 +264,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),
             laws=_laws(toolpath, limits, moves, first, (word, counts), jerk_limited),
             reserved=budgets.reserved,
+            share=np.full(len(row), HALF),
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
 
@@ -294,36 +303,46 @@ def _laws(
 
 
 def budgets_of(
-    toolpath: Toolpath, machine: Machine, first: Array, reserved: FloatArray | None = None
+    toolpath: Toolpath,
+    machine: Machine,
+    first: Array,
+    reserved: FloatArray | None = None,
+    share: FloatArray | float = HALF,
 ) -> Budgets:
     """The budgets by eq. (18)-(20) for the legs that hold the segments first[r] : first[r+1], first (R+1,).
 
     reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest
                that the axes can give
+    share    : (R,) of the tolerance that they take at most [-]
     """
     reachable = normal_anywhere(machine, toolpath.axes)
     rate = error_rate(machine)
     row = first[:-1]  # the segment that stands for its leg
     tol_leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
     most = np.full(len(tol_leg), reachable) if reserved is None else np.minimum(reserved, reachable)
-    tol_ap = allocate(tol_leg, most, rate)
+    share = np.broadcast_to(share, len(row))
+    chords = np.minimum(rate * most, share * tol_leg)
     at_vertex = np.minimum(
         toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
     )
-    beside = np.maximum(np.append(most, 0.0), np.append(0.0, most))
-    vertex_ap = allocate(at_vertex, beside, rate)
+    beside, at_most = (np.maximum(np.append(one, 0.0), np.append(0.0, one)) for one in (chords, share))
+    vertex_ap = at_vertex - np.minimum(beside, at_most * at_vertex)
     vertex_ap[[0, -1]] = 0.0
-    return Budgets(tol_ap, vertex_ap, normal_within_budget(tol_leg, tol_ap, most, rate), most)
+    return Budgets(tol_leg - chords, vertex_ap, chords / rate, most)
 
 
-def with_reserve(run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: FloatArray) -> TubeRun:
-    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg,
-    and no more than that."""
-    budgets = budgets_of(toolpath, machine, run.first, reserved)
+def with_reserve(
+    run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: FloatArray, share: FloatArray
+) -> TubeRun:
+    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg, as
+    far as that takes no more than a `share` (R,) [-] of the tolerance, and no more than that."""
+    budgets = budgets_of(toolpath, machine, run.first, reserved, share)
     return replace(
         run,
         budget=budgets.leg,
+        scale=np.maximum(run.scale, budgets.leg),
         vertex_budget=budgets.vertex,
         reserved=budgets.reserved,
-        across_max=np.minimum(run.across_max, budgets.across),
+        share=share,
+        across_max=budgets.across,
     )

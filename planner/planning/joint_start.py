@@ -42,7 +42,7 @@ class Start(RunsInTime):
         filters behind them, and no more; leg (N,) of its steps."""
         toolpath, machine = self._job.toolpath, self._job.machine
         reach = machine.dt + sum(machine.fir.time_constants if machine.fir else ()) / 2.0
-        return with_reserve(run, toolpath, machine, reserve_for(run, leg, found, reach))
+        return with_reserve(run, toolpath, machine, *reserve_for(run, leg, found, reach))
 
     def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
         """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts

@@ -163,8 +163,10 @@ def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], cha
     """dT/d(ln limit) through eq. (20), from a machine with `STEP` more of a limit [s]."""
     total = 0.0
     for run in runs:
-        first, reserved = run.found.run.first, run.found.run.reserved
-        before, after = (budgets_of(toolpath, one, first, reserved) for one in (machine, changed))
+        one = run.found.run
+        before, after = (
+            budgets_of(toolpath, of, one.first, one.reserved, one.share) for of in (machine, changed)
+        )
         total += float(run.room @ np.log(after.leg / before.leg))
         total += float(run.normal @ np.log(after.across / before.across))
         total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
@@ -185,10 +187,8 @@ class _OfTolerance:
         vertex, segment = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath))
         wider = dataclasses.replace(toolpath, tolerance=toolpath.tolerance * (1.0 + STEP))
         for run in runs:
-            first = run.found.run.first
-            before, after = (
-                budgets_of(one, machine, first, run.found.run.reserved) for one in (toolpath, wider)
-            )
+            first, reserved, share = run.found.run.first, run.found.run.reserved, run.found.run.share
+            before, after = (budgets_of(one, machine, first, reserved, share) for one in (toolpath, wider))
             room, normal = (
                 np.log(a / b) / STEP for a, b in ((after.leg, before.leg), (after.across, before.across))
             )

@@ -16,6 +16,7 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
 from planner.joint.refine import HEADROOM, LEAST, divided, reserve_for, searched_again
 from planner.joint.run import TubeRun, with_reserve
+from planner.nc.reader import parse_program
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.optimal.effort import EFFORTS
 
@@ -107,7 +108,7 @@ def test_the_reserve_is_for_what_a_motion_has_on_the_leg_and_a_period_beside_it(
     v = steps.velocity[of] + since * (steps.acceleration[of] + since * steps.jerk[of] / 2)
     a = steps.acceleration[of] + since * steps.jerk[of]
     across = np.abs(v[:, 0] * a[:, 1] - v[:, 1] * a[:, 0]) / np.maximum(np.linalg.norm(v, axis=1), 1e-12)
-    reserved = reserve_for(run, leg, found, period)
+    reserved, _ = reserve_for(run, leg, found, period)
     for r in range(len(run)):
         on = np.flatnonzero(leg[of] == r)
         begin, finish = t[on[0]] - period, t[on[-1]] + period
@@ -122,7 +123,7 @@ def test_path_and_reserve_are_the_tolerance(name: str):
     run, leg, found = found_in_long_steps(name)
     machine, toolpath = problems.machine(), toolpath_of(name)
     rate, tol = error_rate(machine), toolpath.tolerance
-    wider = with_reserve(run, toolpath, machine, reserve_for(run, leg, found, machine.dt))
+    wider = with_reserve(run, toolpath, machine, *reserve_for(run, leg, found, machine.dt))
     of_leg = np.maximum(tol[run.first[:-1]], tol[run.first[:-1] + 1])
     np.testing.assert_allclose(wider.budget + rate * wider.reserved, of_leg, rtol=1e-12)
     larger = np.maximum(wider.reserved[1:], wider.reserved[:-1])
@@ -130,3 +131,16 @@ def test_path_and_reserve_are_the_tolerance(name: str):
     assert (wider.across_max <= wider.reserved * (1 + 1e-9)).all()
     assert (wider.budget >= run.budget).all()
     assert wider.vertex_budget[0] == wider.vertex_budget[-1] == 0.0
+
+
+def test_on_a_circle_at_a_long_period_chords_get_nearly_all_of_the_tolerance():
+    """As fast as chords allow, v^2 dt^2/8 = eps R, but for `MOST` and the way to that speed and from it; on half of the
+    tolerance it would take 1.41 times as long. The verdict looks at the chords themselves."""
+    radius, tolerance, period = 12.0, 0.008, 0.012
+    machine = problems.machine(dt=period, tolerance=tolerance)
+    lines = "G21 G90 G17 F30000\nG0 X0 Y0\nG2 X0 Y0 I12 J0\nG2 X0 Y0 I12 J0\nM2\n"
+    made = OptimalMethod().plan(parse_program(lines, machine), machine).require()
+    assert made.verdict.passed
+    fastest = np.sqrt(8.0 * tolerance * radius) / period
+    around = 4.0 * np.pi * radius / fastest
+    assert around < made.trajectory.cycle_time < 1.06 * around

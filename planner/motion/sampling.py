@@ -8,11 +8,9 @@ derivatives at both ends: with the speed S = |B'(w)| of the curve
     dw/ds = 1/S,     d2w/ds2 = -S'/S^3,     d3w/ds3 = (3 S'^2 - S S'')/S^5,
     S' = B'.B''/S,     S'' = (B''.B'' + B'.B''' - S'^2)/S.
 
-How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule; where it is, a
-polynomial q^4 (1-q)^4 (c_8 + c_9 (q - 1/2) + c_10 (q - 1/2)^2) is added that makes it right there, and what
-is left is measured between these places. Where that is more than `LENGTH_ROUNDING`, every sample takes a step
-from there by the slope of the polynomial, and where that is not enough, steps by the curve itself
-(`_refine`).
+How far its arc length is off is measured in the middle and at the quarters, by Gauss' rule. Where that is
+more than `LENGTH_ROUNDING`, every sample takes a step from there by the slope of the polynomial, and where
+that is not enough, steps by the curve itself (`_refine`).
 """
 
 from typing import NamedTuple
@@ -36,11 +34,11 @@ from planner.corners.elements import (
 # coordinates, so that accelerations by differences of nearby positions are as good as the columns.
 LENGTH_ROUNDING = 1e-13
 # The polynomial's slope is off by at most 14 times what its values are off by [share of the interval]: the
-# shape of their error, q^4 (1-q)^4 (q - 1/4) (q - 1/2) (q - 3/4), is nowhere steeper. Where they are off by
-# less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
+# shape of their error, q^4 (1-q)^4, is steeper by 4 at most, and what it is multiplied with is smooth. Where
+# they are off by less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
 ONE_STEP = 8e-8
 S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
-COEFFICIENTS = 11  # of an interval's polynomial, with how far it is off
+COEFFICIENTS = 8  # of an interval's polynomial, with how far it is off
 POINTS_SHARED = SIZES.intervals_shared
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
@@ -106,7 +104,7 @@ def _inverses(table, grid, axes, first, beyond, found):
 
 def inverses(table: ElementTable, grid: Grid, axes: int) -> FloatArray:
     """(P, C) for the interval to the right of each point: how far the polynomial is off [share of the
-    interval], c_1 .. c_7 of sum c_n q^n, c_8 .. c_10 of what is added to it; zeros at the ends of pieces.
+    interval], and c_1 .. c_7 of sum c_n q^n; zeros at the ends of pieces.
 
     grid : P points over so many axes; C = `COEFFICIENTS`
     """
@@ -142,22 +140,8 @@ def _invert(table, on, work, out, c):
     a, j = bend[1] - 2.0 * c[2] - 6.0 * c[3], third[1] - 6.0 * c[3]
     c[4], c[5] = 35.0 * p - 15.0 * v + 2.5 * a - j / 6.0, -84.0 * p + 39.0 * v - 7.0 * a + 0.5 * j
     c[6], c[7] = 70.0 * p - 34.0 * v + 6.5 * a - 0.5 * j, -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
-    for n in range(8, COEFFICIENTS):
-        c[n] = 0.0
     off = _off(table, on, out, c, (0.25, 0.5, 0.75))
     c[0] = max(abs(off[0]), abs(off[1]), abs(off[2]))
-    if not c[0] > LENGTH_ROUNDING or c[0] == np.inf:
-        return
-    less = -off[0] * _slope_at(c, 0.25) / _hump(0.25)
-    same = -off[1] * _slope_at(c, 0.5) / _hump(0.5)
-    more = -off[2] * _slope_at(c, 0.75) / _hump(0.75)
-    c[8], c[9], c[10] = same, 2.0 * (more - less), 8.0 * (more - 2.0 * same + less)
-    off = _off(table, on, out, c, (0.375, 0.625, 0.5))
-    left = max(abs(off[0]), abs(off[1]), abs(off[2]))
-    if left < c[0]:
-        c[0] = left
-    else:
-        c[8] = c[9] = c[10] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,24 +164,14 @@ def _off(table, on, out, c, shares):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _hump(q):
-    p = q * (1.0 - q)
-    return p * p * p * p
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
 def _at(c, q):
-    d = q - 0.5
-    more = _hump(q) * (c[8] + d * (c[9] + d * c[10]))
-    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * (c[5] + q * (c[6] + q * c[7])))))) + more
+    return q * (c[1] + q * (c[2] + q * (c[3] + q * (c[4] + q * (c[5] + q * (c[6] + q * c[7]))))))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _slope_at(c, q):
-    d, p = q - 0.5, q * (1.0 - q)
     high = 4.0 * c[4] + q * (5.0 * c[5] + q * (6.0 * c[6] + q * 7.0 * c[7]))
-    more = -8.0 * d * p * p * p * (c[8] + d * (c[9] + d * c[10])) + _hump(q) * (c[9] + 2.0 * d * c[10])
-    return c[1] + q * (2.0 * c[2] + q * (3.0 * c[3] + q * high)) + more
+    return c[1] + q * (2.0 * c[2] + q * (3.0 * c[3] + q * high))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -261,8 +261,8 @@ _PLANNING: dict[str, tuple[Any, Any]] = {
         _choice(
             "--geometry",
             names.geometry_name,
-            f"how {SHAPING} smooth the path: spline (one spline from stop to stop), corners (each corner by itself), or "
-            "auto (splines, or corners where they take less time; the default)",
+            f"how {SHAPING} smooth the path: spline (the smoothest curve from stop to stop, then the feed on it), corners (each "
+            "corner by itself), or auto (path and feed together, where that runs; the default)",
             "|".join(names.GEOMETRIES),
         ),
     ),

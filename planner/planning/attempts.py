@@ -174,7 +174,7 @@ RETRIES = (
         ("search, once more",),
         "the search has not ended: from a motion that stays where it fails",
         "1",
-        "5e-4, 8e-3",
+        "2e-3, 8e-3",
     ),
     Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "3e-3, 4e-2"),
     Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "1e-4, 9e-3"),

@@ -24,7 +24,7 @@ def on_corners(request):
 
 @pytest.fixture(scope="module")
 def on_splines():
-    among = ("feed", "acceleration.x", "tolerance")
+    among = ("feed", "acceleration.x")
     return compared("pentagon", problems.pentagon(), MACHINE, "spline", among)
 
 
@@ -48,7 +48,6 @@ def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_s
     rows = {row["limit"]: row for row in on_splines["rows"]}
     assert rows["feed"]["least_s"] > 0.0
     assert rows["feed"]["found_s"] > 0.01 * cycle_time
-    assert rows["tolerance"]["found_s"] > 1e-3 * cycle_time
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ from planner.joint.run import HALF, TubeRun
 # search has to hold it down in more places and takes longer, with more the path gets less of the tolerance.
 # And at least, of the largest that the axes give [-].
 HEADROOM, LEAST = 1.05, 0.05
-MOST = 0.95  # of the tolerance that chords get where the path is worth nothing [-]
+MOST = 0.98  # of the tolerance that chords get where the path is worth nothing [-]
 TINY = 1e-30  # keeps quotients finite
 
 

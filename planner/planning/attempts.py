@@ -69,15 +69,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings))
-    # half of the tolerance is left to chords, which may need more
-    if found.slower and not settings.effort.search.smooth and _known_on_paths(job):
-        return Tried(steps=found.steps)
     return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps)
-
-
-def _known_on_paths(job: Job) -> bool:
-    """Whether a motion on splines has all limits: it has neither the drives' power nor filters."""
-    return job.real[0].fir is None and bool(np.isinf(Limits.of(job.machine, job.toolpath.axes).power).all())
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:

@@ -51,7 +51,6 @@ from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
 LONG = SIZES.searched_shared
-SLOWER = 1e-2  # what a start on a coarse grid may promise too much [-]
 # What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
 # other [-].
 SEARCHES = (1.0, 1.2, 2.3)
@@ -75,13 +74,11 @@ class Others(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, the steps
-    of the motion, and whether it takes longer than the one that it began with, which keeps limits at grid
-    points."""
+    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the
+    steps of the motion."""
 
     plan: Plan | None
     steps: int
-    slower: bool = False
 
 
 def searchable(job: Job, *, jerk_limited: bool) -> bool:
@@ -167,7 +164,7 @@ def joint_plan(
         tables=tables,
         notes=(*made.notes, *path_notes(job.toolpath, planned), *notes),
     )
-    return Joint(plan, steps, slower=bool(made.begin[-1] > (1.0 + SLOWER) * start.motion.end))
+    return Joint(plan, steps)
 
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:
@@ -178,8 +175,8 @@ def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list
 
 
 class InTwo(NamedTuple):
-    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones;
-    else in the first of those from the start."""
+    """A search in long steps, where chords need more of the tolerance once more, and from what it finds, if that is all
+    of a run, in shorter and shorter ones; else in the first of the shorter ones from the start."""
 
     first: TubeOwn
     finer: tuple[tuple[Cut, TubeOwn], ...]
@@ -187,8 +184,8 @@ class InTwo(NamedTuple):
 
 def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
     """The solver as the effort has it; where the start `stays`, windows that fail are divided."""
-    if not search.finer:
-        return TubeOwn(search.gap, divide=stays, progress=report, smooth=search.smooth)
+    if stays and not search.finer:
+        return TubeOwn(search.gap, progress=report, smooth=search.smooth)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
     shares = [partial(_of_whole, report, *part) for part in pairwise((ends / ends[-1]).tolist())]
     return InTwo(
@@ -266,10 +263,19 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun,
     guess = start.guess(k, run)
     found = solver.first.solve(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
+        if not solver.finer:
+            return run, guess, found
         cut, own = solver.finer[0]
         guess = start.guess_in(k, run, cut)
         return run, guess, own.solve(run, guess)
-    for cut, own in solver.finer:
+    rounds = solver.finer
+    if (start.with_reserve(run, guess.leg, found).budget < run.budget).any():
+        once_more = ((start.cut, solver.first),)
+        rounds = (
+            *once_more,
+            *(rounds or once_more),
+        )  # the last one gives back what the prices promised too much
+    for cut, own in rounds:
         wider = start.with_reserve(run, guess.leg, found)
         finer = divided(wider, guess.leg, found, cut)
         again = searched_again(wider, found, finer, own)

@@ -133,13 +133,14 @@ def test_path_and_reserve_are_the_tolerance(name: str):
     assert wider.vertex_budget[0] == wider.vertex_budget[-1] == 0.0
 
 
-def test_on_a_circle_at_a_long_period_chords_get_nearly_all_of_the_tolerance():
+@pytest.mark.parametrize("effort", ["quick", "normal"])
+def test_on_a_circle_at_a_long_period_chords_get_nearly_all_of_the_tolerance(effort: str):
     """As fast as chords allow, v^2 dt^2/8 = eps R, but for `MOST` and the way to that speed and from it; on half of the
     tolerance it would take 1.41 times as long. The verdict looks at the chords themselves."""
     radius, tolerance, period = 12.0, 0.008, 0.012
     machine = problems.machine(dt=period, tolerance=tolerance)
     lines = "G21 G90 G17 F30000\nG0 X0 Y0\nG2 X0 Y0 I12 J0\nG2 X0 Y0 I12 J0\nM2\n"
-    made = OptimalMethod().plan(parse_program(lines, machine), machine).require()
+    made = OptimalMethod(effort=effort).plan(parse_program(lines, machine), machine).require()
     assert made.verdict.passed
     fastest = np.sqrt(8.0 * tolerance * radius) / period
     around = 4.0 * np.pi * radius / fastest

@@ -73,8 +73,8 @@ def words_of(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, st
 
 
 def word_change(word: FloatArray) -> FloatArray:
-    """(R,) 1 where the feed in the axes that F goes by (R, W) rises with a leg, -1 where it falls; 0 but for
-    rounding of it."""
+    """(R,) 1 where the feed in the axes that F goes by, `word` (R, W), rises with a leg, -1 where it falls; 0
+    but for rounding of it."""
     if not word.shape[1]:
         return np.zeros(len(word))
     known = np.where(np.isfinite(word[:, 0]), word[:, 0], np.finfo(np.float64).max)

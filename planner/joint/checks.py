@@ -21,7 +21,7 @@ from planner.joint.run import TubeRun
 
 PLACES = 33  # where a step is looked at first [-]
 NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
-AWAY = 1e-12  # rounding of (p - V).v, in tolerances and largest speeds [-]
+AWAY = 1e-12  # rounding of distances to a vertex, and of (p - V).v, in tolerances and largest speeds [-]
 # Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
 PIECES = 4
 
@@ -234,27 +234,28 @@ def worst_shares(keeps, leg, h, state, jerk, place):
     return limit, tube
 
 
-def switches_kept(run: TubeRun, leg: Array, state: FloatArray) -> bool:
-    """Whether N steps are within the feed of each leg as far as they are nearest to the vertex at its end:
-    where the feed falls the way to the vertex comes nearer up to its node, where it rises the way from there
-    on goes away. That is looked at next to the node, on the nodes within the budget of the vertex: what is
-    farther than that from the vertex is not nearest to it, and on an arc of more than half a turn the way to
-    its end goes away from there at first.
+def switches_missed(run: TubeRun, leg: Array, state: FloatArray) -> Array:
+    """(N,) where N steps run at the larger of two feeds and are nearer to the vertex between them than the
+    node at which they go over: of the nodes of the faster leg that are nearer, and of those within the budget
+    of the vertex on which the way to it is the wrong one, the leg that begins there; -1 of all others.
 
     leg (N,), state (N+1, 3, A)
     """
+    missed = np.full(len(leg), -1)
     begins = np.flatnonzero(np.diff(leg)) + 1  # the nodes at vertices
     edges = np.concatenate([[0], begins, [len(leg)]])
     for k, node in enumerate(begins):
         way, budget = run.switch[leg[node]], run.vertex_budget[leg[node]]
         if way == 0.0:
             continue
-        # from the vertex on, backwards where the feed falls
+        # of the faster leg, from the vertex on: backwards where the feed falls
         part = np.arange(node, edges[k] - 1, -1) if way > 0 else np.arange(node, edges[k + 2] + 1)
         off = state[part, 0] - run.vertex[leg[node]]
-        far = np.linalg.norm(off[1:], axis=1) > budget
-        beside = 1 + (int(np.argmax(far)) if far.any() else len(far))
-        away = (off * state[part, 1]).sum(axis=1)[:beside]
-        if (way * away > AWAY * budget * np.linalg.norm(run.velocity)).any():
-            return False
-    return True
+        far, nearing = np.linalg.norm(off, axis=1), way * (off * state[part, 1]).sum(axis=1)
+        wrong = nearing > AWAY * budget * np.linalg.norm(run.velocity)
+        nearer = far < far[0] - AWAY * budget
+        nearer[0] = wrong[0]
+        if nearer.any():
+            at = part[nearer | (wrong & (far <= budget))]
+            missed[np.minimum(at, len(leg) - 1)] = leg[node]
+    return missed

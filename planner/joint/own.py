@@ -19,11 +19,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, switches_kept, worst_shares
+from planner.joint.checks import Keeps, switches_missed, worst_shares
 from planner.joint.guess import Guess
 from planner.joint.interior_point import Tuning, solve_window
 from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
@@ -266,12 +266,21 @@ class _Search:
         for prox, missed in tries:
             pull, taken = PULL, False
             tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
-            needed = near(run.laws, begun)
+            needed, beside = near(run.laws, begun), np.full(hi - lo, -1)
             for number in range(TOLD if len(run.laws) else TIGHTENED):
                 if self._stopped:
                     return False
-                which = np.flatnonzero(needed)
-                window = window_of(run, begun, begun.lo, begun.hi, missed, tight, self.settings.smooth, which)
+                window = window_of(
+                    run,
+                    begun,
+                    begun.lo,
+                    begun.hi,
+                    missed,
+                    tight,
+                    self.settings.smooth,
+                    np.flatnonzero(needed),
+                    beside,
+                )
                 tuning = Tuning(pull, prox, self.settings.gap, missed, self.settings.least, *START)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
@@ -279,13 +288,16 @@ class _Search:
                 count.iterations += iterations
                 if not done:
                     break
-                over = self._taken(lo, hi, window, begun)
+                rows_of_switch = int((beside >= 0).sum())
+                over = self._taken(lo, hi, window, begun, beside)
                 if over is None:
                     self.price[lo:hi] = step_prices(run, window, z)
                     taken, begun = True, Window(self.guess, lo, hi)
                     shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
                     if shorter <= SHORTENED * window.u[:, -1].sum():
                         return True
+                    continue
+                if (beside >= 0).sum() > rows_of_switch:
                     continue
                 if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                     break
@@ -300,10 +312,11 @@ class _Search:
                 return True
         return False
 
-    def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window) -> FloatArray | None:
+    def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Array) -> FloatArray | None:
         """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are
         faster they take their place. Else the shares (hi - lo, 1 + M) that they use of what rows watch in places, or
-        about other places, only: the tolerance along curves, the laws; then `begun` becomes what was found."""
+        about other places, only: the tolerance along curves, the laws; then `begun` becomes what was found. In `beside`
+        (hi - lo,) comes where rows of a change of feed are missing."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -324,7 +337,9 @@ class _Search:
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
             return np.column_stack([of_leg[leg], of_laws])
-        if not switches_kept(run, leg, found):
+        missed = switches_missed(run, leg, found)
+        if (missed >= 0).any():
+            beside[:] = np.where(beside >= 0, beside, missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))
         if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = along

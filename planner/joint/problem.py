@@ -55,6 +55,7 @@ def window_of(
     tight: FloatArray | None = None,
     smooth: float = 0.0,
     which: Array | None = None,
+    beside: Array | None = None,
 ) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
@@ -62,6 +63,7 @@ def window_of(
     tight  : (hi - lo, 1 + M) by what the room of control points and the laws are divided [-], >= 1; None for 1
     smooth : weight of the jerk against the time at least [-] (numbers.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
+    beside : (hi - lo,) of nodes beside a vertex where the feed changes, the leg that begins there; else -1
     """
     cut = Window(guess, lo, hi)
     part, leg = slice(cut.lo, cut.hi), cut.leg[cut.lo : cut.hi]
@@ -94,7 +96,7 @@ def window_of(
     place = (cut.place[part, :3] - run.offset[leg][:, None]) / length
     return StepWindow(
         legs=legs,
-        limits=_limits(run, cut, units, (missed, tight), laws, smooth),
+        limits=_limits(run, cut, units, (missed, tight), laws, smooth, beside),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -112,8 +114,9 @@ def _limits(
     narrow: tuple[float, FloatArray],
     laws: tuple[LawRows, Array],
     smooth: float,
+    beside: Array | None,
 ) -> StepLimits:
-    """The limits of the steps of a window, narrowed and smooth as in `window_of`; `laws`: their rows, and which there
+    """The limits of the steps of a window, narrowed, smooth and beside as in `window_of`; `laws`: their rows, and which there
     are."""
     second, length = units.second, units.length
     speed, acc, jerk = length / second, length / second**2, length / second**3
@@ -124,8 +127,8 @@ def _limits(
     room = run.room[leg] * (1.0 - ROUNDING)
     room_node = room.copy()
     vertex = leg[at_vertex & (leg > 0)]
-    beside = np.minimum(run.room[vertex - 1], run.room[vertex])
-    room_node[at_vertex & (leg > 0)] = np.minimum(run.vertex_budget[vertex], beside) * (1.0 - ROUNDING)
+    at_both = np.minimum(run.room[vertex - 1], run.room[vertex])
+    room_node[at_vertex & (leg > 0)] = np.minimum(run.vertex_budget[vertex], at_both) * (1.0 - ROUNDING)
     fastest, strongest = np.linalg.norm(run.velocity), np.linalg.norm(run.acceleration)
     feed = np.minimum(run.feed[leg], fastest)
     inside = 1.0 - NARROWED * narrow[0]
@@ -147,14 +150,17 @@ def _limits(
     passed = run.passed[leg]
     on[np.ix_(passed, 8 * len(run.axis) + np.array([rows.ORDER_NODE, rows.ORDER_MID, rows.ARC]))] = False
     turns = turns_far(cut.state[lo : hi + 1, 1]) & np.isfinite(run.across_max[leg])
-    beside = np.minimum(np.append(normal[0], normal[:-1]), np.append(normal[1:], normal[-1]))
-    normal[turns] = np.minimum(normal, beside)[turns]  # of both its nodes
+    at_both = np.minimum(np.append(normal[0], normal[:-1]), np.append(normal[1:], normal[-1]))
+    normal[turns] = np.minimum(normal, at_both)[turns]  # of both its nodes
     turns[[0, -1]] &= np.linalg.norm(cut.state[[lo, hi], 2], axis=1) <= normal[[0, -1]]  # those nodes stay
     more = on[:, 8 * len(run.axis) :]
     more[turns, rows.NORMAL_ROWS : rows.LAW_ROWS] = True
     more[0, rows.NORMAL_ROWS] &= ~turns[0]
     more[-1, rows.NORMAL_ROWS + 1] &= ~turns[-1]
     more[turns | np.append(False, turns[:-1]), rows.NORMAL_NODE] = False
+    of_switch = np.where(at_vertex & (run.switch[leg] != 0.0), leg, -1 if beside is None else beside)
+    more[:, rows.SWITCH] = of_switch >= 0
+    more[0, rows.SWITCH] = False
     return StepLimits(
         leg=leg,
         passed=passed,
@@ -175,7 +181,8 @@ def _limits(
         h=h,
         h_max=h * LONGER,
         h_min=h / LONGER,
-        switch=np.where(at_vertex, run.switch[leg], 0.0),
+        switch=np.where(of_switch >= 0, run.switch[of_switch], 0.0),
+        switch_leg=np.maximum(of_switch, 0),
         smooth=jerk_weights(run, leg, cut.state[lo : hi + 1, 1], smooth),
         centre=np.full(hi - lo, CENTRE),
         aside=NARROWED * narrow[0],
@@ -210,7 +217,6 @@ def _present(run: TubeRun, leg: Array, at_vertex: Array) -> Array:
     more[~limited, rows.NORMAL_NODE] = False
     more[~limited, rows.NORMAL_ROWS : rows.LAW_ROWS] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
-    more[:, rows.SWITCH] = at_vertex & (run.switch[leg] != 0.0)
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False
-    more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE, rows.SWITCH]] = False
+    more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE]] = False
     return on

@@ -37,7 +37,8 @@ others where a window needs them.
 
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
-on p and, through `lin.node`, on v; its own curvature is left out, as that of the kinematics is.
+on p and, through `lin.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
+comes nearer to V once more on the other side, nodes there have the row too (checks.py).
 """
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ class StepLimits(NamedTuple):
     h: FloatArray  # (N,) duration that it is pulled to
     h_max: FloatArray  # (N,)
     h_min: FloatArray  # (N,)
-    switch: FloatArray  # (N,) at a vertex 1 where the feed falls, -1 where it rises; else 0
+    switch: FloatArray  # (N,) 1 at the vertex where the feed falls and before it, -1 where it rises and behind it; else 0
+    switch_leg: Array  # (N,) the leg that begins at that vertex
     smooth: FloatArray  # (N,) weight of (jerk/limit)^2 of every axis, against the step's time
     centre: FloatArray  # (N,) weight of the row of the node's tolerance, against the step's time
     aside: float  # how far inside its bound the row of that has to be [-]
@@ -178,13 +180,14 @@ def _ball(y, vector, limit, row, g, n):
 
 
 @njit(cache=True, error_model="numpy")
-def _put_switch(limits, i, y, vertex, lin):
-    """The row of the node at a vertex (A,) where the feed changes (module text)."""
+def _put_switch(legs, limits, i, y, lin):
+    """The row of a node at a vertex where the feed changes, or beside it (module text)."""
     row, by = 8 * y.shape[1] + SWITCH, limits.switch[i] / (limits.room_node[i] * limits.pace[i])
-    lin.g[i, row] = limits.aside
+    lin.g[i, row], r = limits.aside, limits.switch_leg[i]
     for k in range(y.shape[1]):
-        lin.n[i, row, k], lin.node[i, 2, k] = by * y[V, k], by * (y[P, k] - vertex[k])
-        lin.g[i, row] += lin.n[i, row, k] * (y[P, k] - vertex[k])
+        off = y[P, k] - legs.base[r, k] - legs.radius[r] * legs.e1[r, k]
+        lin.n[i, row, k], lin.node[i, 2, k] = by * y[V, k], by * off
+        lin.g[i, row] += lin.n[i, row, k] * off
 
 
 @njit(cache=True, error_model="numpy")
@@ -235,13 +238,14 @@ def put_rows(legs, limits, x, u, lin):
             if c == 0 and at_vertex:
                 for k in range(axes):
                     point[k] = legs.base[r, k] + legs.radius[r] * legs.e1[r, k]
-                _put_switch(limits, i, y, point, lin)
             lin.place[i, c], square = place, 0.0
             for k in range(axes):
                 off = y[vector, k] - point[k]
                 square += off * off
                 n[row, k] = off / (room * room)
             g[row] = 0.5 * (square / (room * room) - 1.0)
+        if limits.on[i, more + SWITCH]:
+            _put_switch(legs, limits, i, y, lin)
         if curved:
             ends = i < N - 1 and limits.leg[i + 1] != r
             for c in range(1, 3):

@@ -180,7 +180,10 @@ RETRIES = (
     ),
     Retry(("slower in places",), "the verdict finds something", "6", "7e-3, 6e-2"),
     Retry(
-        ("shaped",), "more limits, less tolerance for what is shaped; at last gently", "5, 1", "1e-1, 3e-1"
+        ("shaped",),
+        "a shaper that takes more than the tolerance: more limits, less tolerance; at last gently",
+        "5, 1",
+        "1e-1, 3e-1",
     ),
 )
 

@@ -24,7 +24,7 @@ from planner.planning.page import Method, best_of
 # The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature,
 # is slower.
 SIGMA2 = 0.94
-NOT_SMOOTHER = "geometry and feed were not searched together, and smooth has no effect"
+NOT_SMOOTHER = "smooth has no effect: geometry and feed were not searched together, or setpoints are shaped"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,7 @@ class OptimalMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         effort = EFFORTS[effort_name(self.effort)]
-        search = dataclasses.replace(effort.search, smooth=self.smooth)
+        search = dataclasses.replace(effort.search, smooth=0.0 if self.shaped else self.smooth)
         settings = Settings(
             method="optimal",
             corner=self.corner,

@@ -17,6 +17,10 @@ to keep the limits and the tolerance; p does not. It follows that:
   times of all copies, and is solved again. What remains then is removed by slowing down runs of p
   (settling.py).
 
+A shaper that takes little of the tolerance is for the joint search what filters of its variance are: p keeps
+the limits as they are, so D does, and stops at no corner (`_searched`). Where it may take `SEARCHED` times
+the tolerance p is planned in other ways as well, of which the fastest D is taken:
+
 Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners
 and rests of the whole length, which along straight blocks keeps every limit and the tolerance. Its least time
 is known beforehand; it is planned when another one takes longer than that, and no candidate is pursued that
@@ -32,14 +36,17 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.errors import InputError, NotSolvedError
-from planner.corners.budget import with_less_normal
+from planner.corners.budget import normal_anywhere, with_less_normal
 from planner.feedrate.solution import Status
 from planner.geometry.build import COLLINEAR_ANGLE
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.machine import Machine
-from planner.motion.shaping import ShapedMotion, shaper_of
+from planner.machine import Fir, Machine
+from planner.motion.shaping import ShapedMotion, Shaper, shaper_of
 from planner.motion.timing import Motion
-from planner.planning.job.choice import counted_time
+from planner.planning.attempt import Tried
+from planner.planning.attempts import ATTEMPTS
+from planner.planning.job.by_run import RunsInTime
+from planner.planning.job.choice import counted_time, faster, passed
 from planner.planning.job.job import BOLDER, Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import Settings
@@ -47,9 +54,14 @@ from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.path_motion import time_optimal
 from planner.planning.optimal.result import plan_of_solution
 from planner.planning.optimal.settling import Settling
+from planner.planning.page import tolerant
 
 # Corners that turn by more are stops of p [rad].
 SHARP = float(np.deg2rad(20.0))
+# What the shaper may take of the tolerance at the largest acceleration for p to be searched with it in one,
+# at least for it to be planned in other ways too, at most for it to be searched [-]: of a pentagon, a zig-zag
+# and an arc at 400 to 9 Hz the search was faster in all with less, and in none with more.
+SEARCHED, NOT_SEARCHED = 1.0, 10.0
 
 
 class Candidate(NamedTuple):
@@ -151,10 +163,7 @@ class _Search:
             share=one.share,
             curved=one.curved,
         )
-        said = (
-            f"shaped for {len(job.machine.modes)} vibration modes, {1e3 * self.shaper.length:.4g} ms longer than what was planned with "
-            f"{one.more:g} times the accelerations and {stops - 2} stops"
-        )
+        said = f"{_said(job, self.shaper)} with {one.more:g} times the accelerations and {stops - 2} stops"
         return Shaped(planned=made[0], motion=made[1], delivered=made[2], sentence=said) if made else None
 
 
@@ -179,6 +188,22 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "
             "and damping"
         )
+    shaper = shaper_of(job.machine.modes)
+    takes = (
+        shaper.variance / 2.0 * normal_anywhere(job.machine, job.toolpath.axes) / job.toolpath.tolerance.max()
+    )
+    best = _searched(job, settings) if takes <= NOT_SEARCHED else None
+    if best is None or not passed(best):
+        return _in_other_ways(job, settings)
+    if takes <= SEARCHED:
+        return best
+    rest = job.faster_than(best.cycle_time)
+    other = tolerant(rest, _in_other_ways(rest, settings), lambda less: _in_other_ways(less, settings))
+    return faster(best, other)
+
+
+def _in_other_ways(job: Job, settings: Settings) -> Plan:
+    """The plan of the fastest candidate; of the gentlest where only that passes."""
     plan = _plan_of(job, settings, shaped(job, settings))
     if plan.verdict is None or counted_time(plan) < np.inf:
         return plan
@@ -193,6 +218,40 @@ def shaped_plan(job: Job, settings: Settings) -> Plan:
         kept=kept,
     )
     return gentle if kept else plan
+
+
+def _searched(job: Job, settings: Settings) -> Plan | None:
+    """The plan whose p is found by the joint search, with less of the tolerance where that is left; None
+    where there is no search, or it finds none."""
+    made = _search(job, settings)
+    return made and tolerant(job, made, lambda less: _search(less, settings) or made)
+
+
+def _search(job: Job, settings: Settings) -> Plan | None:
+    """The plan with p of the joint search, to which the shaper is a moving average of the same variance,
+    standing for its length where the program stops."""
+    shaper, fir, search = shaper_of(job.machine.modes), job.machine.fir, ATTEMPTS[0]
+    lengths = (*(fir.time_constants if fir else ()), float(np.sqrt(12.0 * shaper.variance)))
+    filters = Fir(time_constants=lengths, phase_lag_max=fir.phase_lag_max if fir else None)
+    machine = job.machine.model_copy(update={"fir": filters, "modes": ()})
+    planned = dataclasses.replace(job, machine=machine, judged=(machine, job.real[1]))
+    p = search.make(planned, settings, Tried()).best if search.applies(planned, settings, Tried()) else None
+    if p is None or p.making is None:
+        return None
+    motion = p.making.motion
+    stops = RunsInTime(motion, job).arrival[1:-1]
+    if len(stops):
+        motion = motion.waiting(stops, np.full(len(stops), shaper.length))
+    made = job.deliver(ShapedMotion(motion, shaper), settings.not_limited)
+    job.tell("shaped", found=made.trajectory.cycle_time, before=p.cycle_time, kept=made.verdict.passed)
+    return job.plan(
+        made._replace(filtered=True), method=settings.method, corner=settings.corner_name, solver=p.solver, status=p.status,
+        sentence=f"{p.sentence}; {_said(job, shaper)}", grid_points=p.grid_points, notes=p.making.given_up,
+    )  # fmt: skip
+
+
+def _said(job: Job, shaper: Shaper) -> str:
+    return f"shaped for {len(job.machine.modes)} vibration modes, {1e3 * shaper.length:.4g} ms longer than what was planned"
 
 
 def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:

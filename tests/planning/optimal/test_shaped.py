@@ -37,11 +37,21 @@ def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):
     assert "shaped for 1 vibration modes" in made.sentence
 
 
+def test_a_stiff_mode_costs_the_length_of_its_shaper_and_no_stops(pentagon):
+    """400 Hz: the shaper is 1.25 ms long and takes less than the tolerance at full acceleration; without shaping the pentagon rings."""
+    machine = problems.machine(modes=(Mode(frequency=400.0, damping=0.05),))
+    made, plain = plan(pentagon, machine, shaped=True), plan(pentagon, problems.machine())
+    assert made.verdict.passed
+    assert left(made) < 0.1 * left(plan(pentagon, machine))
+    assert plain.cycle_time + shaper_of(machine.modes).length <= made.cycle_time <= 1.01 * plain.cycle_time
+
+
 def test_a_path_that_no_grid_follows_is_a_status(pentagon, monkeypatch):
     def fail(*_):
         raise NotSolvedError("no grid follows the path")
 
     monkeypatch.setattr("planner.planning.optimal.shaped.time_optimal", fail)
+    monkeypatch.setattr("planner.planning.optimal.shaped.NOT_SEARCHED", 0.0)
     made = plan(pentagon, SHAKEN, method="second-order", shaped=True)
     assert not made.solved
     assert "plan without --shaped" in made.sentence
@@ -149,7 +159,7 @@ def test_the_normal_acceleration_is_kept_too():
     text = "G21 G91 F6899\nG1 X0.3525\nG1 Y-4.2252\nG1 X0.4085\nG1 X0.3372 Y-0.1308\nG1 X3.8\nM2\n"
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.verdict.passed, made.verdict.faults
-    assert made.verdict.limits["normal_acceleration"].ratio > 0.5
+    assert made.verdict.limits["normal_acceleration"].ratio > 0.4
 
 
 def test_a_narrow_peak_of_the_normal_acceleration_where_the_motion_nearly_turns_back():
@@ -170,7 +180,7 @@ def test_a_narrow_peak_of_the_normal_acceleration_where_the_motion_nearly_turns_
     )
     made = plan(parse_program(text, machine), machine, effort="quick", shaped=True)
     assert made.verdict.passed, made.verdict.faults
-    assert made.verdict.limits["normal_acceleration"].ratio > 0.5
+    assert made.verdict.limits["normal_acceleration"].ratio > 0.4
 
 
 def test_two_rounds_tell_how_much_slower_a_run_has_to_be():

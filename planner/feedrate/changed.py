@@ -5,8 +5,6 @@ A piece is the same if its rows are, to the last digit. Its place s along the jo
 changes its length; the lengths of its intervals are then the same but for the rounding of s.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -22,8 +22,6 @@ step/distance stays STEP/NEAR. So an element from rest to rest takes some 30 poi
 tenfold length only about 20 more.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

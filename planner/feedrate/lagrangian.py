@@ -15,8 +15,6 @@ determine the motion (equal axes at 45 degrees), the time has a kink; the multip
 slopes between left and right.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -22,8 +22,6 @@ adaptive grid running the path backwards changes the cycle time by 1e-5 at most,
 percents, and there loosening a limit can cost time. toppra does exactly the same.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from typing import NamedTuple

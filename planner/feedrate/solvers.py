@@ -14,8 +14,6 @@ method:
 Sizes up to which each is sensible: docs/methods.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Protocol
 

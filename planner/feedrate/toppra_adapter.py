@@ -28,8 +28,6 @@ cycle times differ by 3e-8, feeds by 2e-7 at worst; with the largest x at 1 inst
 paths 1e-12.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import time

@@ -8,8 +8,6 @@ points within the budget of those of the leg's own cubic, along places that neve
 step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The second-order model of a step's rows, sum of z d2g + (z/s) grad g grad g' (recursion.py)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

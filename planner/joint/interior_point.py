@@ -16,8 +16,6 @@ optima for ever. When the complementarity s.z has reached what is asked for and 
 grows by `FREEZE` in every iteration, until rows and kinematics hold.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A window that is searched once more, as what was found exceeds laws (own_laws.py)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -1,8 +1,6 @@
 """The curvature of the rows of the laws (laws.py), what is positive of it, for the model of a step
 (curvature.py)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

@@ -15,8 +15,6 @@ at the beginning and one at the end.
 Where a bound jumps from one place to the next, a node is laid there, and a row keeps it on its side (`PIN`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

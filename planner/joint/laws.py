@@ -37,8 +37,6 @@ Of the curvature the model has what is positive of that of SPEED, of the product
 and of v.H v: without it windows take many more iterations, or do not converge.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The legs of the free optimum (run.py): where they begin, their coefficients, and their feed in the axes of F."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

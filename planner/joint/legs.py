@@ -1,8 +1,6 @@
 """The legs of a run (run.py) as kernels see them: points, tangents, nearest places, and how far a control
 point is from a tangent."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

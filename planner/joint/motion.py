@@ -5,8 +5,6 @@ smallest change of the jerks that makes the last node meet its end is added (lea
 down by lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and leaves the path as it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

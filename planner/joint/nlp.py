@@ -33,8 +33,6 @@ found is the best near the guess. All quantities are in units in which the mean 
 and duration 1, so that scaling a job scales its plan.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal

@@ -21,8 +21,6 @@ Directions change by as much as they are where a velocity does: a change of v co
 iteration, so that steps stay where the linear model holds.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

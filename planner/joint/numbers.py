@@ -1,7 +1,5 @@
 """The numbers of the free optimum's steps (nlp.py): their legs and limits, and how fast they are about."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

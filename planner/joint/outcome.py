@@ -1,7 +1,5 @@
 """How a search for the free optimum ends: its steps, and what ipopt's messages mean."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from planner.base.arrays import Array, FloatArray

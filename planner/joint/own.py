@@ -9,8 +9,6 @@ not converge, that breaks something when its steps are integrated and looked at 
 divided; what is left of that keeps the motion that the search began with, and is said.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ function q of the position. Its functions are Python, and no kernel calls them: 
 is in law_window.py, and what it finds is looked at here, with the functions themselves.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

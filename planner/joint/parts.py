@@ -1,8 +1,6 @@
 """The solution along a run as parts of a motion: steps of constant jerk, and between them the start's motion
 where it stays."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

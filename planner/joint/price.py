@@ -18,8 +18,6 @@ The tolerance acts through what eq. (20) leaves of it for the path (run.py): pri
 and of every vertex.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

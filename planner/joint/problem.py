@@ -1,8 +1,6 @@
 """The problem of a window of steps in numbers: units in which the mean step has length 1 and duration 1, and
 what every step keeps."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -15,8 +15,6 @@ is missing with every step (a method of multipliers).
 W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is positive.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ parts of the same jerk, which is the same motion. It tells, too, how much of the
 take on each leg, so that the motion may use the rest (`reserve_for`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

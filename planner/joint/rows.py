@@ -41,8 +41,6 @@ on p and, through `lin.node`, on v; its own curvature is left out, as that of th
 comes nearer to V once more on the other side, nodes there have the row too (checks.py).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

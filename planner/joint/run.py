@@ -26,8 +26,6 @@ An arc or a curve that bends with a radius below the tolerance is passed (`TubeR
 places, one after the other, and take as little time as they want to.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise

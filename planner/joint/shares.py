@@ -5,8 +5,6 @@ mere switch from one limit to another is at both for an instant. Of the toleranc
 point of the cubic, at a vertex the vertex.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

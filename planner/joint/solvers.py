@@ -1,7 +1,5 @@
 """The solvers of the free optimum by name: the own one, and ipopt and fatrop on the same problem."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from planner.joint.guess import Guess

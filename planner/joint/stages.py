@@ -6,8 +6,6 @@ step. ipopt does not mind the order. Casadi's interface is told the stages: left
 ones.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An attempt at a motion, and what the attempts before it have left."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

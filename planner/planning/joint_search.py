@@ -9,8 +9,6 @@ searched (G61, threads), is planned by itself in another way (runs_alone.py). Or
 then it stays where the search does not end.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import threading
 from collections.abc import Callable, Mapping

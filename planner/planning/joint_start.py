@@ -1,7 +1,5 @@
 """Where the joint search begins: a motion, and the steps into which it is cut along each run."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

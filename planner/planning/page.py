@@ -11,8 +11,6 @@
 Everything that is tried once more is in one table, `RETRIES` of planning/attempts.py.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable

@@ -8,8 +8,6 @@ A spline over the knots k_0 <= ... <= k_{n+5} with the control points c_0 .. c_{
 The polynomials come from the recursion of Cox and de Boor, carried out on polynomials of tau.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

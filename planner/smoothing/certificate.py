@@ -7,8 +7,6 @@ bounds the deviation of the path from the curve and back; vertices lie on it bec
 their ends.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

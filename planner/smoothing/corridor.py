@@ -6,8 +6,6 @@ has to pass the place where the feed changes. An arc becomes chords whose sagitt
 tolerance. The chain stands for the path only where distances are bounded; no motion follows it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quadratic forms of the control points: third derivatives along the path."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

@@ -21,8 +21,6 @@ into chords. They grow by `GROWTH` of the distance from there, and stay below wh
 its acceleration.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 

@@ -22,8 +22,6 @@ diagonal first: band[i, d] is the entry (i, i + d). Inner loops run along whole 
 a compiler makes vector instructions.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

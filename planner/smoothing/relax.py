@@ -13,8 +13,6 @@ does not matter which one is first. The ranges depend on the run alone: the resu
 of threads.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

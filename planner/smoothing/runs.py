@@ -4,8 +4,6 @@ A run reaches from full stop to full stop, or from and to the middle of long str
 are. A corner influences the motion only within one braking distance, plus the knots of a smooth end.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

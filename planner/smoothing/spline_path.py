@@ -1,7 +1,5 @@
 """From a path with rounded corners to one with splines in their place."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

@@ -1,8 +1,6 @@
 """Windows and ranges of a long spline: which of its control points are relaxed at a time, and how those
 around a site are tightened (relax.py)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise

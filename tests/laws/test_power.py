@@ -36,7 +36,7 @@ def test_a_line_takes_as_long_as_its_drive_needs() -> None:
     per_mass = 1e6 * power  # W/kg in mm2/s3
     least = feed**2 / per_mass + (length - 2.0 * feed**3 / (3.0 * per_mass)) / feed
     assert least < plan.cycle_time < 1.01 * least
-    assert used(plan) == pytest.approx(1.0, abs=1e-3)
+    assert used(plan) == pytest.approx(1.0, abs=2e-3)
 
 
 def test_less_power_takes_longer_and_all_of_it_is_used() -> None:

@@ -5,8 +5,6 @@
 and at a constant speed, u = j = 0, feed <= (j_k / |r'''_k|)^(1/3). Methods of second order do not use them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

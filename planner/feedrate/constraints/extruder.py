@@ -7,8 +7,6 @@ own (own.py), but only where they can matter: the axes keep the acceleration alo
 jerk below |j| but for what the path turns, which is allowed as much again.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

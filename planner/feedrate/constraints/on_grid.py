@@ -7,8 +7,6 @@ sum T^2/24 (docs/papers.md D): on programmed lines and arcs always, elsewhere un
 measured afterwards (planning/optimal/behind_filters.py). There chords have all of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -6,8 +6,6 @@ in, solvers see numbers like those of the machine's axes. Rows are shares of lim
 nothing else.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

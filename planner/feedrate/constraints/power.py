@@ -7,8 +7,6 @@ and its slope: the joint search keeps it (joint/laws.py), and what does not, is 
 An axis cannot exceed what its velocity times its acceleration is: a limit above that is none.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

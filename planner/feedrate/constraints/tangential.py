@@ -14,8 +14,6 @@ than the norm of what x, y and z accelerate with: a limit above that is none, an
 jerk along a path that turns may be more than that of the axes together.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -24,8 +24,6 @@ Multipliers stay those of the solution before: between two states that are fixed
 instead of the limits.
 """
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ one fails.
 See solver.py.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,8 +1,6 @@
 """The rows of a third-order problem as compiled functions take them: the solver (layout.py), and the
 Lagrangian of its solution."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

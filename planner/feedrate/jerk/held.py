@@ -19,8 +19,6 @@ which the bound alone answers,
 so that dT/d(ln X) = -T/2. Rows and kinematics have none.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -19,8 +19,6 @@ its part in it, and finer grids do not change the problem.
 What every number is set to, and why: settings.py.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -12,8 +12,6 @@ several intervals in one instruction. The last block may be shorter.
 A axes have R = 3A + 2 rows, or 4A + 2 where r'' jumps.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ the end. Where the two meet depends on the problem alone, so that a problem has 
 number of cores.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -10,8 +10,6 @@ adds lam/s times the row's square to the Hessian. One pass is a loop over the bl
 the block's intervals, of which the innermost is done several at a time (layout.py).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

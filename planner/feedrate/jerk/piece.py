@@ -5,8 +5,6 @@ The parts are solved side by side, each by itself. If one of them has no solutio
 is solved as one part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

@@ -12,8 +12,6 @@ What belongs to interval i (layout.py): the feedback GAIN, dp_i = K0 dx_i + K1 d
 go from its *end* the second derivatives TO_GO (xx, xu, uu) and the slope TO_GO_X.
 """
 
-from __future__ import annotations
-
 from planner.base.kernels import njit
 from planner.feedrate.jerk.layout import (
     ALONG_P,

@@ -25,8 +25,6 @@ acceleration at the start, jerk at the start, jerk at the end, and where r'' jum
 after those of all axes come the two of the feed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

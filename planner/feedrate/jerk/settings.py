@@ -6,8 +6,6 @@ critical: of 38 other values that were tried only a first barrier of 3 and a def
 without a solution.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Slower by a factor is speeds over it, accelerations over its square and jerks ov
 that stay exact.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

@@ -15,8 +15,6 @@ backwards from the end. Every interval has constant jerk, so that the kinematics
 enough it keeps any limits.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import FloatArray

@@ -1,8 +1,6 @@
 """Profiles on exact kinematics, near one whose kinematics are not: what the interior-point method starts
 from, and its result polished."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.kernels import njit

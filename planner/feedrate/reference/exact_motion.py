@@ -7,8 +7,6 @@ is a speed over lam, an acceleration over lam^2 and a jerk over lam^3, so the la
 how much. The multipliers stay those of the other profile.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

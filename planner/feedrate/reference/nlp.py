@@ -46,8 +46,6 @@ numbers). References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ip
 arXiv 2303.16746 (fatrop).
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """Common to the reference solvers: the jerk-limited problem falls into pieces between prescribed speeds,
 solved one by one."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -18,8 +18,6 @@ bounds say where they are not needed:
   it; beyond, intervals grow with the distance.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ are small enough, `grade` until no interval is much longer than its neighbours; 
 length, derivatives, margins and effective curvatures. All are linear in the number of points.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

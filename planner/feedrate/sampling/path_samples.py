@@ -1,7 +1,5 @@
 """The record of a sampled path."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

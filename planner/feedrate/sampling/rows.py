@@ -6,8 +6,6 @@ that begins there. Free parts and corners are cut at all ends of blocks, spans w
 of the feed. Where a piece ends there is a closing row.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -21,8 +21,6 @@ line meets X/kappa_mid in the middle:
     1/kappa_low = min(1/kappa_low, 2/kappa_mid - 1/kappa_high);     both ends kappa_mid where that is the largest.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

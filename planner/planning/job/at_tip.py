@@ -1,8 +1,6 @@
 """Jobs of the tool's tip: planned through the kinematics, delivered as setpoints of the joints, judged there
 and at the tip."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable

@@ -16,8 +16,6 @@ Not counted at all: the spindle turning faster or slower (S words), T words with
 the control itself takes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

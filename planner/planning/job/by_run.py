@@ -1,8 +1,6 @@
 """A job run by run, from one full stop of the program to the next: where the runs are in a motion, and jobs
 of one run."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

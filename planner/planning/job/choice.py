@@ -1,7 +1,5 @@
 """Which of two plans is taken, and whether one passes."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

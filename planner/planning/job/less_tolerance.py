@@ -1,8 +1,6 @@
 """A job planned again with less of the tolerance where the chords between its samples leave it
 (delivery/periods.py)."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

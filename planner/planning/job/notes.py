@@ -5,8 +5,6 @@ The notes of the reader (`Program.notes`) come first, then those on machine and 
 method.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE

@@ -5,8 +5,6 @@ A machine file in m, mm/min or ms is valid, and its plan passes every check: it 
 written. So a note asks.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.geometry.toolpath import Toolpath

@@ -1,7 +1,5 @@
 """Runs of a motion that are planned each by itself, as jobs of one run, where the others stay as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

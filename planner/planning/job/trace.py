@@ -9,8 +9,6 @@ A log is any callable that takes a `Step`; a `Trace` keeps them. Without one a s
 Times are those of the processor, so that a trace says the same on a machine that is busy with something else.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -14,8 +14,6 @@ at its vertex where that
 nothing.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass, field
 

@@ -20,8 +20,6 @@ as with every method.
 exceeds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -15,8 +15,6 @@ curvature within what the filters cover; where it varies, the verdict shows what
 paper 001: G3).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 

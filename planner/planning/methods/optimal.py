@@ -4,8 +4,6 @@
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 

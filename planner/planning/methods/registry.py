@@ -1,7 +1,5 @@
 """The methods by their names (`planner.base.names`), and `plan`, the one call that does a whole job."""
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 from collections.abc import Sequence

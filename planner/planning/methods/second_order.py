@@ -6,8 +6,6 @@ Where it does not run, the feed along a path is found by reachability analysis, 
 points. The verdict reports the jerk as not limited.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from planner.base.names import AUTO, NORMAL, effort_name

@@ -1,8 +1,6 @@
 """Method `stop`: every block from rest to rest, jerk-limited, in closed form. The baseline the papers compare
 with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

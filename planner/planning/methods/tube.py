@@ -9,8 +9,6 @@ Where no search ends faster than the start, its motion stays, run by run and win
 solvers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

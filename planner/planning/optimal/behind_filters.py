@@ -17,8 +17,6 @@ Along arcs, where curvature and feed are constant, a closed form gives the bound
 (constraints/assemble.py).
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -9,8 +9,6 @@ the order of their possible gain per point, up to `COMPARED_POINTS`, and the not
 out.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

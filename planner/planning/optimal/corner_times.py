@@ -21,8 +21,6 @@ to 0.3 mm, 100 mm/s and 2e5 mm/s3 that tells that splines are faster; with long 
 little.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ around them, which may then have no spline elsewhere. The second time such a pla
 stops, and only the corners between them stay single.
 """
 
-from __future__ import annotations
-
 from planner.base.errors import InputError
 from planner.base.names import AUTO, SMOOTHINGS, SPLINE
 from planner.corners.bezier import BezierCorner

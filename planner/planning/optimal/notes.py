@@ -1,7 +1,5 @@
 """The notes of a motion on a smooth path, in short sentences, each with its first line and a count."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray

@@ -6,8 +6,6 @@ where straight legs need points (feedrate/grid.py). Without jerk limits the poin
 on straight legs are added and the problem is solved once more, so that every switch falls on a point.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass

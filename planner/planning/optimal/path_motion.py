@@ -11,8 +11,6 @@ and then, delivered as a plan,
   deliver   setpoints at the interpolation period, judged by the verifier                         planning/job/job.py, verify/
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 from planner.base.errors import NotSolvedError

@@ -1,7 +1,5 @@
 """The plan of a solution: its active limits and what they cost."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from planner.machine import Machine

@@ -4,8 +4,6 @@ limits and tolerance.
 The delivered motion D and what p may do that D must not are in shaped.py.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -27,8 +27,6 @@ is known beforehand; it is planned when another one takes longer than that, and 
 takes longer than what is there.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import NamedTuple

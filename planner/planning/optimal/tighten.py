@@ -10,8 +10,6 @@ motion is slower in these places only. Each run between full stops is then slowe
 that remains, which always ends.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -192,8 +192,7 @@ def mixed(blocks: int) -> str:
 )
 def test_every_method_names_the_block_it_is_at(method: str) -> None:
     program = parse_program(mixed(16), MACHINE)
-    rounds = {"rounds": 0} if method == "optimal" else {}
-    plan = planner.plan(program, MACHINE, method=method, **rounds).require()
+    plan = planner.plan(program, MACHINE, method=method).require()
     toolpath, trajectory = plan.toolpath, plan.trajectory
     assert trajectory is not None
     assert plan.verdict is not None

@@ -260,7 +260,7 @@ class _Search:
     def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
         takes their place."""
-        run = self.run
+        run, smooth = self.run, self.settings.smooth
         for prox, missed in tries:
             pull, taken = PULL, False
             tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
@@ -268,17 +268,8 @@ class _Search:
             for number in range(TOLD if len(run.laws) else TIGHTENED):
                 if self._stopped:
                     return False
-                window = window_of(
-                    run,
-                    begun,
-                    begun.lo,
-                    begun.hi,
-                    missed,
-                    tight,
-                    self.settings.smooth,
-                    np.flatnonzero(needed),
-                    beside,
-                )
+                which = np.flatnonzero(needed)
+                window = window_of(run, begun, begun.lo, begun.hi, missed, tight, smooth, which, beside)
                 tuning = Tuning(pull, prox, self.settings.gap, missed, self.settings.least, *START)
                 done, iterations, z = solve_window(
                     window.legs, window.limits, window.x, window.u, window.place, tuning, count.at

@@ -269,10 +269,8 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun,
     rounds = solver.finer
     if (start.with_reserve(run, guess.leg, found).budget < run.budget).any():
         once_more = ((start.cut, solver.first),)
-        rounds = (
-            *once_more,
-            *(rounds or once_more),
-        )  # the last one gives back what the prices promised too much
+        # the last one gives back what the prices promised too much
+        rounds = (*once_more, *(rounds or once_more))
     for cut, own in rounds:
         wider = start.with_reserve(run, guess.leg, found)
         finer = divided(wider, guess.leg, found, cut)

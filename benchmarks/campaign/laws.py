@@ -63,7 +63,7 @@ def changed(program: Program, machine: Machine, tolerance: float | None, rng: Rn
     if law == "mirror":
         return Changed(law=law, program=mirrored(program), machine=machine, tolerance=tolerance)
     if law == "reverse":
-        if len(np.unique(program.path_control)) > 1 or not (tolerance or _ends_alike(program)):
+        if len(np.unique(program.path_control)) > 1 or not (tolerance or ends_alike(program)):
             return None
         return Changed(law=law, program=reversed_program(program), machine=machine, tolerance=tolerance)
     if law == "split":
@@ -181,7 +181,7 @@ def _moving_before(program: Program) -> Array:
     return np.where(last < 0, moves.argmax(), last)
 
 
-def _ends_alike(program: Program) -> bool:
+def ends_alike(program: Program) -> bool:
     """Whether the last two blocks that move have the same tolerance: the way back has that of the joint between them at its start."""
     said = program.tolerance[np.unique(_moving_before(program))]
     return bool(np.array_equal(said[-2:-1], said[-1:], equal_nan=True)) or len(said) < 2

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
-from planner.machine import Machine
+from planner.machine import Machine, load_machine
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
@@ -27,7 +27,7 @@ _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program be
 
 def read_program(
     path: str | Path | None = None,
-    machine: Machine | None = None,
+    machine: Machine | str | Path | None = None,
     reading: Reading = AS_USUAL,
     *,
     text: str | bytes | None = None,
@@ -37,10 +37,10 @@ def read_program(
     path    : the file; None where `text` is given
     text    : the program itself
     machine : gives tool lengths, G28 and G30 positions, work offsets, the first path control, and what
-              plotter files need; None for zeros and blending
+              plotter files need, as a machine, its file or the name of a built-in one; None for zeros and blending
     reading : what is refused, left out and assumed
 
-    Raises InputError if the file cannot be read, for the first construct that is not supported or not valid,
+    Raises InputError if a file cannot be read, for the first construct that is not supported or not valid,
     and unless one of file and text is given.
 
     >>> import planner
@@ -52,6 +52,8 @@ def read_program(
     if path is not None and not isinstance(path, str | os.PathLike):
         allowed = "a program is a file, or planner.path(points), or planner.read_program(text=...)"
         raise InputError(f"{allowed}; found a {type(path).__name__}")
+    if isinstance(machine, str | os.PathLike):
+        machine = load_machine(machine)
     if text is not None:
         data = text.encode() if isinstance(text, str) else text
         return dataclasses.replace(parse_program(text, machine, reading), text=data)

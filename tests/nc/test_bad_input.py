@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from planner.base.errors import InputError
+from planner.machine import load_machine
 from planner.nc import codes
 from planner.nc.faults import require_none
 from planner.nc.info import inspect_program
@@ -250,3 +251,13 @@ def test_s_beside_g61_is_said_first() -> None:
     assert said.startswith("line 3: G61 with S")
     for plain in ("G61", "G61 S600 M3", "G61 G1 X4 S9", "S9\nG61"):
         assert not parse_program(f"G21 F600\nG1 X10\n{plain}\nX30").assumptions
+
+
+def test_a_machine_is_given_by_name_file_or_itself() -> None:
+    text = "G20 G0 X1\n"
+    mill = load_machine("mill")
+    assert read_program(text=text, machine="mill").end == pytest.approx(
+        read_program(text=text, machine=mill).end
+    )
+    with pytest.raises(InputError, match="nil"):
+        read_program(text=text, machine="nil")

@@ -98,6 +98,7 @@ def joint_plan(
     search: Search,
     others: Others,
     motion: Motion | None = None,
+    start: Start | None = None,
 ) -> Joint:
     """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where
     shorter ones do not pass.
@@ -106,10 +107,11 @@ def joint_plan(
     others : what there is where the search does not end, or the verdict finds something
     motion : that on the path where it keeps its limits between grid points too: it stays where the search
              does not end; else None
+    start  : that of a search before, with what it found in long steps
     """
     stays = motion is not None
     with job.stage("search") as report:
-        start = Start(motion or planned.motion(), job, search.cut)
+        start = start or Start(motion or planned.motion(), job, search.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         most = search.steps_max
@@ -134,7 +136,8 @@ def joint_plan(
     count = len(made.plans) if made else 0
     job.tell("search", found=time, before=start.motion.end, kept=made is not None, steps=steps, alone=count)
     if made is None and search.of(steps).finer and not stays:
-        return joint_plan(job, settings, planned, dataclasses.replace(search, finer=()), others)
+        longer = dataclasses.replace(search, finer=())
+        return joint_plan(job, settings, planned, longer, others, start=start)
     if made is None:
         return Joint(None, steps)
     for k in (*made.plans, *made.stays):
@@ -259,7 +262,8 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun,
     """The run with the budgets that the last of the searches had, the steps from which that began, and its
     solution."""
     guess = start.guess(k, run)
-    found = solver.first.solve(run, guess)
+    found = start.in_long_steps.get(k) or solver.first.solve(run, guess)
+    start.in_long_steps[k] = found
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
             return run, guess, found

@@ -21,13 +21,15 @@ LEAST_APART = 1e-6
 class Start(RunsInTime):
     """A motion from which the search begins, and where in it the runs are.
 
-    cut : how finely it is cut into steps
+    cut           : how finely it is cut into steps
+    in_long_steps : what a first search found along each run, by its number
     """
 
     def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT):
         super().__init__(motion, job)
         self.cut, self._job = cut, job
         self._guesses: dict[int, Guess] = {}
+        self.in_long_steps: dict[int, TubeSolution] = {}
 
     def guess(self, k: int, run: TubeRun) -> Guess:
         """The motion along run k, cut into steps."""

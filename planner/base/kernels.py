@@ -22,6 +22,8 @@ from typing import Any
 
 from planner.base.kernel_files import KernelCacheWarning
 
+# What a compiler may do to the arithmetic of a kernel that says so: multiply and add in one instruction.
+CONTRACT = {"contract"}
 _TOLD_BY_REPR = (bool, int, float, complex, str, bytes, range, type(None), type(...))
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.rows import (
     FEED_NODE,
     FEED_ROWS,
@@ -26,7 +26,7 @@ class Barrier(NamedTuple):
     ratio: FloatArray  # (N, R) z over the slacks
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_vector(W, axes, alpha, e, G):
     """W += J'GJ for one vector y with dy = J d."""
     h = 4 * axes
@@ -46,7 +46,7 @@ def add_vector(W, axes, alpha, e, G):
                         W[a * axes + k, b * axes + m] += both * G[k, m]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _add_row(W, axes, one, other, by):
     """W += by g g' for a row that depends on two vectors; of each alpha, e and the row's derivative (A,)."""
     size = 4 * axes + 1
@@ -62,7 +62,7 @@ def _add_row(W, axes, one, other, by):
             W[s, t] += by * g[s] * g[t]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
     """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i, whose vectors are `of` (R,); G (13, A, A)
     is overwritten."""

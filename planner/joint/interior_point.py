@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.curvature import Barrier
 from planner.joint.normal_rows import BETWEEN
 from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
@@ -72,7 +72,7 @@ class Slacks(NamedTuple):
     dz: FloatArray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _reach(on, s, ds):
     """Share of a step ds (N, R) that keeps s positive, at most 1."""
     most = 0.0
@@ -83,7 +83,7 @@ def _reach(on, s, ds):
     return min(1.0, TO_BOUNDARY / most) if most > 0.0 else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _start(on, g, time, tuning, slacks):
     """Slacks and multipliers of a start."""
     rows = 0
@@ -100,7 +100,7 @@ def _start(on, g, time, tuning, slacks):
     return rows
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _directions(on, slacks, slope, aim, second):
     """Steps of slacks and multipliers towards s z = aim - second, where the rows grow by `slope`."""
     s, z, missing, ds, dz = slacks
@@ -111,7 +111,7 @@ def _directions(on, slacks, slope, aim, second):
                 dz[i, r] = (aim - second[i, r] - z[i, r] * ds[i, r]) / s[i, r] - z[i, r]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _predicted(on, slacks, along, dual, second):
     """Complementarity after a predictor that goes the shares `along` and `dual` of its way; second (N, R) its
     second-order terms."""
@@ -125,7 +125,7 @@ def _predicted(on, slacks, along, dual, second):
     return left
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
 def solve_window(legs, limits, x, u, place, tuning, at):
     """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns
     whether it has been reached, the iterations, and the multipliers (N, R) of the rows, in units of time.

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.curvature import add_vector
 from planner.joint.laws import (
     JOINT_PUSH,
@@ -34,7 +34,7 @@ _SQUARES = np.array(
 SLOW = 0.1  # of a step's pace: below that the time over which power is squared out does not fall [-]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_law_curvature(W, limits, i, x, u, z):
     """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i;
     z: their multipliers."""
@@ -53,7 +53,7 @@ def add_law_curvature(W, limits, i, x, u, z):
             _curve_joint(W, laws, i, m, u, own)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _curve_speed(W, laws, i, m, x, u, z):
     """That of SPEED: squares of sums of ordinates."""
     axes = len(u) - 1
@@ -69,7 +69,7 @@ def _curve_speed(W, laws, i, m, x, u, z):
         add_vector(W, axes, alpha, e, square)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _curve_pushed(W, laws, i, m, x, u, rest, z):
     """That of b.w, which is (|b + w/time|^2 - |b - w/time|^2) time/4: of PUSH across the motion, the first
     square."""
@@ -100,7 +100,7 @@ def _curve_pushed(W, laws, i, m, x, u, rest, z):
             add_vector(W, axes, alpha, e, across)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _curve_jolt(W, laws, i, m, x, u, rest, z):
     """That of |r|^2 with r = (a - (a.t) t)/|v|^(1/2), where it is in the upper rows, as if r were linear."""
     axes = len(u) - 1
@@ -131,7 +131,7 @@ def _curve_jolt(W, laws, i, m, x, u, rest, z):
                     W[a, b] += weight * slope[a] * slope[b]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _curve_joint(W, laws, i, m, u, z):
     """That of v.H v."""
     axes, q = len(u) - 1, laws.joint[m]

@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 
 SPEED, PUSH, JOLT, POWER, JOINT_SPEED, JOINT_PUSH, JOINT_JOLT, PIN = range(8)
 ROWS_OF = (5, 6, 8, 6, 4, 4, 4, 1)  # upper before lower, where there are both
@@ -79,7 +79,7 @@ class LawRows(NamedTuple):
     pinned: FloatArray  # (N,) n.P
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def ordinates(x, u, counts, w, b):
     """w (3, A) and b (2, A) of the axes that count, of a step with the node x (3 A,) and the controls u
     (A+1,)."""
@@ -91,7 +91,7 @@ def ordinates(x, u, counts, w, b):
         b[0, k], b[1, k] = a, a + h * j
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def multiply(table, one, other, value, of_one, of_other):
     """The ordinates of a product into value (R,), by those of its factors, one (.., A) and other (.., A), and
     their derivatives by these into of_one (R, .., A) and of_other (R, .., A)."""
@@ -103,7 +103,7 @@ def multiply(table, one, other, value, of_one, of_other):
             of_other[r, d, k] += share * one[c, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def through(x, u, of_w, of_b, by, out):
     """out (4 A + 1,) += `by` times the derivatives of what has those by w and b, of_w (3, A) and of_b (2, A)."""
     axes = len(u) - 1
@@ -117,7 +117,7 @@ def through(x, u, of_w, of_b, by, out):
         out[4 * axes] += 0.5 * n1 * a + n2 * (a + h * j) + m1 * j
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_along(w, rest, value, of_w):
     """Add the ordinates of v.e but the last, by those of the velocity w (3, A), to value (3,), and their derivatives
     by w to of_w (3, 3, A): the directions e turn with w0 and w2. Returns the speeds at the ends together."""
@@ -134,13 +134,13 @@ def put_along(w, rest, value, of_w):
     return size[0] + size[1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def square_at(begin, end, r):
     """The r-th ordinate of degree 4 of the square of what goes from `begin` to `end`."""
     return FIRST[r] * begin * begin + BOTH[r] * begin * end + FIRST[4 - r] * end * end
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_speed(laws, i, m, x, u, f, by, g, out):
     """The rows of SPEED, as `put_law_rows`; f (2,) are the bound's 1 + tilt.d at both ends of the step, `by`
     (2, 4 A + 1) their derivatives."""
@@ -159,7 +159,7 @@ def _put_speed(laws, i, m, x, u, f, by, g, out):
             out[r, k] -= of_first * by[0, k] + of_last * by[1, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_pushed(laws, i, m, x, u, rest, f, by, g, out):
     """The rows of PUSH and of POWER, as `_put_speed`."""
     axes = len(u) - 1
@@ -195,7 +195,7 @@ def _put_pushed(laws, i, m, x, u, rest, f, by, g, out):
                 out[row, k] -= of_first * by[0, k] + of_last * by[1, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def seen_at(x, u, t, y):
     """y (3, A) = position, velocity and acceleration at the time t of a step."""
     axes = len(u) - 1
@@ -206,7 +206,7 @@ def seen_at(x, u, t, y):
         y[2, k] = a + t * j
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def chained(u, part, y, by, out):
     """out (4 A + 1,) += the derivatives of what has those by position, velocity, acceleration and jerk, `by`
     (4, A), at a part of a step, where its motion is y (3, A)."""
@@ -221,7 +221,7 @@ def chained(u, part, y, by, out):
         out[4 * axes] += part * (p * y[1, k] + v * y[2, k] + a * u[k])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _jolt(y, j, counts, rest, by):
     """j.t + |a - (a.t) t|^2/|v| of y (3, A) and j (A,), and its derivatives into `by` (4, A)."""
     vv, av, aa, jv = rest * rest, 0.0, 0.0, 0.0
@@ -237,7 +237,7 @@ def _jolt(y, j, counts, rest, by):
     return (jv + aa - av * av / vv) / s
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _of_joint(laws, n, other, m, order, y, j, by):
     """The derivative of that order of a function of the position by the time, as nodes n and `other` have it
     on the mean, and its derivatives into `by` (4, A)."""
@@ -265,7 +265,7 @@ def _of_joint(laws, n, other, m, order, y, j, by):
     return value + laws.third[n, q] * along**3 if order == 3 else value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
     """The rows of laws that are watched at places of a step, as `_put_speed`; `of_f` is its `by`."""
     axes, kind = len(u) - 1, laws.kind[m]
@@ -305,7 +305,7 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
         g[2 * place], g[2 * place + 1] = value / bound - high, -value / bound - high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_law_rows(limits, i, x, u, g, out):
     """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g, and their derivatives by p,
     v, a, j and h into out (.., 4 A + 1)."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.geometry.curves import curve_point
 
 NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place of an arc or a curve, from the last one
@@ -27,14 +27,14 @@ class LegFormulas(NamedTuple):
     weight: FloatArray  # (K, 2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _curve_of(legs, r, x, out):
     """Point and three derivatives, out (4, A), of leg r, a curve, at the place x."""
     p, w = legs.points[legs.curve[r]], legs.weight[legs.curve[r]]
     curve_point((p[0], p[1], p[2], p[3]), (w[0], w[1]), legs.length[r], x, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _nearest_on_curve(legs, r, c, x, point, tangent):
     """`nearest_point` on a curve."""
     out = np.empty((4, len(c)))
@@ -50,7 +50,7 @@ def _nearest_on_curve(legs, r, c, x, point, tangent):
     return x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def nearest_point(legs, r, c, x, point, tangent):
     """point (A,) of leg r nearest to c (A,), from the place x on arcs and curves; its tangent (A,), and its
     place."""
@@ -58,10 +58,16 @@ def nearest_point(legs, r, c, x, point, tangent):
         return _nearest_on_curve(legs, r, c, x, point, tangent)
     axes, length = len(c), legs.length[r]
     radius, rate = legs.radius[r], legs.rate[r]
-    steps = NEAREST_STEPS if radius > 0.0 else 1
     if radius == 0.0:
-        x = 0.0
-    for n in range(steps + 1):
+        miss, square = 0.0, 0.0
+        for k in range(axes):
+            miss += (c[k] - legs.base[r, k]) * legs.drift[r, k]
+            square += legs.drift[r, k] * legs.drift[r, k]
+        x = min(max(miss / square, 0.0), length)
+        for k in range(axes):
+            point[k], tangent[k] = legs.base[r, k] + legs.drift[r, k] * x, legs.drift[r, k]
+        return x
+    for n in range(NEAREST_STEPS + 1):
         cos, sin = np.cos(rate * x), np.sin(rate * x)
         miss, square = 0.0, 0.0
         for k in range(axes):
@@ -73,12 +79,12 @@ def nearest_point(legs, r, c, x, point, tangent):
             tangent[k] = legs.drift[r, k] + radius * rate * across
             miss += (c[k] - point[k]) * tangent[k]
             square += tangent[k] * tangent[k]
-        if n < steps:
+        if n < NEAREST_STEPS:
             x = min(max(x + miss / square, 0.0), length)
     return x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _in_order(place, low, high):
     """Make places (n,) of points in turn such that they never go back: halfway between the largest before and the
     smallest behind, so that the farthest of them is moved by as little as can be; from `low` to `high`."""
@@ -91,7 +97,7 @@ def _in_order(place, low, high):
         place[k] = min(max(0.5 * (before + least[k]), low), high)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_places(legs, leg, at_vertex, x, h, place, stays):
     """The places of the nodes and the inner control points of N steps that are on lines into `place` (N, 3), in order:
     a motion may go back along a leg as far as one place is near enough to what it passes twice. `stays` (N, 3):
@@ -132,7 +138,7 @@ def put_places(legs, leg, at_vertex, x, h, place, stays):
     return last
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def formula_point(legs, r, x, point, tangent, bend):
     """point (A,) of leg r at the place x, with its tangent and second derivative (A,)."""
     if legs.curve[r] >= 0:
@@ -149,7 +155,7 @@ def formula_point(legs, r, x, point, tangent, bend):
         bend[k] = -radius * rate * rate * circle
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def along_tangent(length, c, x, ahead, point, tangent):
     """How far along the tangent (A,) at the place x of a leg, from its point (A,), c (A,) is: ahead of it or
     else behind it, and within the leg."""
@@ -178,7 +184,7 @@ class Slopes(NamedTuple):
     tangent: FloatArray  # (A,) of the leg where the control point belongs to
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def off_tangent(legs, r, c, node, foot, room, slopes):
     """The row of an inner control point c (A,) on an arc, (d2/room2 - 1)/2 with its distance d from the
     tangent at a foot, and the place on the leg; its derivatives into `slopes`."""

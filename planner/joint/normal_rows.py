@@ -24,7 +24,7 @@ iteration, so that steps stay where the linear model holds.
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.laws import PRODUCT, REST, multiply, ordinates, put_along, through
 
 BETWEEN = 2  # ordinates between the nodes
@@ -50,7 +50,7 @@ def turns_far(velocity: FloatArray) -> Array:
     return far
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_turning_rows(bound, x, u, g, out):
     """`put_normal_rows` of a step that turns far."""
     axes, per = len(u) - 1, 1.0 / (bound * bound)
@@ -66,7 +66,7 @@ def _put_turning_rows(bound, x, u, g, out):
         out[1, 4 * axes] += per * end * j
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_normal_rows(bound, pace, turns, x, u, g, out):
     """The rows of a step with the node x (3 A,) and the controls u (A+1,), whose normal acceleration is at most
     `bound`, into g (2,), and their derivatives by p, v, a, j and h into out (2, 4 A + 1)."""
@@ -104,7 +104,7 @@ def put_normal_rows(bound, pace, turns, x, u, g, out):
         through(x, u, by_w, by_b, 1.0, out[r])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_normal_curvature(W, bound, pace, turns, x, u, z):
     """W (4 A + 1, 4 A + 1), lower triangle, += what is surely positive of the curvature of the rows: that of
     |c|^2 as if c were linear. z (2,): multipliers."""
@@ -143,7 +143,7 @@ def add_normal_curvature(W, bound, pace, turns, x, u, z):
                         W[index[s], index[t]] += by * slope[index[s]] * slope[index[t]]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def stay_of(bound, x, u, priced):
     """What (dv)^2 of the node x (3 A,) costs in one iteration, half of it; `priced`: the sum of the multipliers of the
     rows that its velocity is in."""

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.curvature import model_of_rows
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import BETWEEN, add_normal_curvature, stay_of
@@ -45,7 +45,7 @@ class Factor(NamedTuple):
     P: FloatArray  # (N+1, S, S)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def step_of_h(x, u, axes, out):
     """out (3 A,) the derivative of the next node by h."""
     h = u[axes]
@@ -56,7 +56,7 @@ def step_of_h(x, u, axes, out):
         out[2 * axes + k] = j
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _times_transposed(M, h, axes, out):
     """out = A'M for M (3 A, ..)."""
     for k in range(axes):
@@ -65,7 +65,7 @@ def _times_transposed(M, h, axes, out):
             out[k, c], out[axes + k, c], out[2 * axes + k, c] = p, h * p + v, h * (0.5 * h * p + v) + a
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     """The recursion into `factor`, with a barrier (curvature.py) and the weight of (dh/limits.h)^2. False
     where it breaks down."""
@@ -172,7 +172,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def forces(limits, lin, q, pull, u, w):
     """w (N, 4 A + 1) = the gradient of time, pull and smoothness, and the sum of q (N, R) grad g."""
     N, axes = len(w), lin.n.shape[2]
@@ -212,7 +212,7 @@ def forces(limits, lin, q, pull, u, w):
         w[i, 4 * axes] = own
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def newton_step(x, u, gap, w, end, factor, step):
     """The step for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last
     node."""
@@ -274,7 +274,7 @@ def newton_step(x, u, gap, w, end, factor, step):
             after[i, s] = total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def gaps(x, u, out):
     """out (N, 3 A) = f(x, u) - the next node."""
     N, axes = len(u), u.shape[1] - 1

@@ -46,7 +46,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.kernels import njit
+from planner.base.kernels import CONTRACT, njit
 from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent, put_places
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
@@ -112,13 +112,13 @@ class Linear(NamedTuple):
     own: FloatArray  # (N, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def count(axes):
     """How many rows a step of so many axes has, without those of the laws."""
     return 8 * axes + MORE_ROWS
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def vectors_of_step(x, u, axes, y, alpha, e):
     """y (13, A), alpha (13, 4) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h = u[axes]
@@ -153,7 +153,7 @@ def vectors_of_step(x, u, axes, y, alpha, e):
     alpha[NEXT, 0], alpha[NEXT, 1], alpha[NEXT, 2], alpha[NEXT, 3] = 1.0, h, 0.5 * h * h, h**3 / 6.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_radii(x, u, axes, feed, radius):
     """radius (3,) of the rows of the feed (module text)."""
     h, first, last, jerk, change = u[axes], 0.0, 0.0, 0.0, 0.0
@@ -167,7 +167,7 @@ def put_radii(x, u, axes, feed, radius):
     radius[1] = np.sqrt(max(feed * feed + change / 12.0 - jerk / 72.0, 0.01 * feed * feed))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _ball(y, vector, limit, row, g, n):
     """The row |y| <= limit."""
     square = 0.0
@@ -177,7 +177,7 @@ def _ball(y, vector, limit, row, g, n):
     g[row] = 0.5 * (square / (limit * limit) - 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def _put_switch(legs, limits, i, y, lin):
     """The row of a node at a vertex where the feed changes, or beside it (module text)."""
     row, by = 8 * y.shape[1] + SWITCH, limits.switch[i] / (limits.room_node[i] * limits.pace[i])
@@ -188,7 +188,7 @@ def _put_switch(legs, limits, i, y, lin):
         lin.g[i, row] += lin.n[i, row, k] * off
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_rows(legs, limits, x, u, lin):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the
     search on arcs begins."""
@@ -283,7 +283,7 @@ def put_rows(legs, limits, x, u, lin):
                 lin.tangent[i, c] = 0.0  # the nearest point stays where it is
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def vector_of(row, axes):
     """The vector y that a row depends on; -1 for those of h alone, -2 for those with derivatives of their own."""
     if row < 8 * axes:
@@ -296,7 +296,7 @@ def vector_of(row, axes):
     return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, LONG, P)[more - FEED_NODE]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def second_of(kind):
     """Which second vector (`VECTOR_OF_NODE`) a row behind those of the axes depends on; -1 for none."""
     if kind == SWITCH:
@@ -304,7 +304,7 @@ def second_of(kind):
     return kind - TUBE_NODE - 1 if TUBE_NODE < kind < ORDER_NODE else -1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def slopes(limits, lin, dx, du, out):
     """out (N, R) = the change of every row in a step dx (N+1, 3 A), du (N, A+1)."""
     N, axes = len(du), du.shape[1] - 1

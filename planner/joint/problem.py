@@ -70,18 +70,8 @@ def window_of(
     speed, acc, jerk = length / second, length / second**2, length / second**3
     # far from it, gaps of the kinematics would not get below the rounding of positions
     units = Units(second, length, cut.state[cut.lo, 0].copy())
-    legs = LegFormulas(
-        length=run.length / length,
-        base=(run.base - units.origin) / length,
-        drift=run.drift,
-        e1=run.e1,
-        e2=run.e2,
-        radius=run.radius / length,
-        rate=run.rate * length,
-        curve=run.curve,
-        points=(run.curves.points - units.origin) / length,
-        weight=run.curves.weight,
-    )
+    near_by = leg if beside is None else np.append(leg, beside[beside >= 0])
+    of = slice(int(near_by.min()), int(near_by.max()) + 1)
     inside = 1.0 - NARROWED * missed
     tight = np.ones((len(leg), 1 + len(run.laws))) if tight is None else tight
     which = np.flatnonzero(near(run.laws, cut)) if which is None else which
@@ -92,9 +82,12 @@ def window_of(
     )
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = (cut.place[part, :3] - run.offset[leg][:, None]) / length
+    limits = _limits(run, cut, units, (missed, tight), laws, smooth, beside)
     return StepWindow(
-        legs=legs,
-        limits=_limits(run, cut, units, (missed, tight), laws, smooth, beside),
+        legs=_legs(run, of, units),
+        limits=limits._replace(
+            leg=limits.leg - of.start, switch_leg=np.maximum(limits.switch_leg - of.start, 0)
+        ),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -102,6 +95,25 @@ def window_of(
         length=length,
         origin=units.origin,
         which=which,
+    )
+
+
+def _legs(run: TubeRun, of: slice, units: Units) -> LegFormulas:
+    """The legs `of` a run alone: what a window takes does not depend on the length of its run."""
+    length, curve = units.length, run.curve[of]
+    curves = curve[curve >= 0]
+    first, end = (int(curves.min()), int(curves.max()) + 1) if len(curves) else (0, 0)
+    return LegFormulas(
+        length=run.length[of] / length,
+        base=(run.base[of] - units.origin) / length,
+        drift=run.drift[of],
+        e1=run.e1[of],
+        e2=run.e2[of],
+        radius=run.radius[of] / length,
+        rate=run.rate[of] * length,
+        curve=np.where(curve >= 0, curve - first, -1),
+        points=(run.curves.points[first:end] - units.origin) / length,
+        weight=run.curves.weight[first:end],
     )
 
 

@@ -72,7 +72,7 @@ VECTOR_OF_BOX = (J, A, MID, V)
 class StepLimits(NamedTuple):
     """The limits of N steps, in the units of the problem."""
 
-    leg: Array  # (N,)
+    leg: Array  # (N,) of the window's legs (problem.py)
     passed: Array  # (N,) whether the step's leg is passed
     target: FloatArray  # (N, 3, A) where the node and the inner control points belong to there
     at_vertex: Array  # (N,) whether the step's node is where its leg begins

@@ -28,6 +28,7 @@ places, one after the other, and take as little time as they want to.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -143,7 +144,7 @@ class TubeRun:
     def __len__(self) -> int:
         return len(self.length)
 
-    @property
+    @cached_property
     def jerk_scale(self) -> FloatArray:
         """(A,) the jerk limits; without them what takes an axis to its full acceleration in `SHARP` of the
         time in which that moves it by the least budget [mm/s3]."""
@@ -152,7 +153,7 @@ class TubeRun:
         shaped = SHARP * np.sqrt(self.scale.min() / acceleration.max())
         return np.where(np.isfinite(self.jerk), self.jerk, acceleration / shaped)
 
-    @property
+    @cached_property
     def step_max(self) -> FloatArray:
         """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by
         `ARC_FRACTION` of the scale (module text); inf on lines."""
@@ -161,12 +162,12 @@ class TubeRun:
             turning = np.where(self.curve < 0, np.abs(self.rate), self.curvature)
             return np.minimum(fourth**0.25, TURN_MAX / turning)
 
-    @property
+    @cached_property
     def room(self) -> FloatArray:
         """(R,) how far control points of a step may be from their places on the leg [mm]."""
         return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.scale, self.budget)
 
-    @property
+    @cached_property
     def switch(self) -> FloatArray:
         """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no
         motion is so fast."""
@@ -174,7 +175,7 @@ class TubeRun:
         change = np.sign(np.diff(feed, prepend=feed[0]))
         return -np.where(change != 0.0, change, word_change(self.word))
 
-    @property
+    @cached_property
     def passed(self) -> Array:
         """(R,) legs whose steps have their places by number, not where they are nearest: inside of so narrow a
         bend the nearest place stands still, goes back, or is on another branch while a motion goes on. Not
@@ -192,7 +193,7 @@ class TubeRun:
             return np.zeros(len(leg))
         return np.asarray(np.linalg.norm(velocity * self.counts, axis=1) / self.word[leg, 0])
 
-    @property
+    @cached_property
     def offset(self) -> FloatArray:
         """(R+1,) place of the vertices along the run [mm]."""
         return np.append(0.0, np.cumsum(self.length))

@@ -28,10 +28,9 @@ ALLOWED = 1e-3  # of the time [-]
 LAWS = ("scale", "mirror", "reverse", "split", "looser")
 LOOSER = ("velocity", "acceleration", "jerk", "tolerance", "feed")
 # What a method does not promise. `stop` stops where a line is split; the papers' methods as they are filter by V/A and A/J whatever
-# that costs (fir-plain by twice sqrt(V/J), which is less, where A is large); fir tries speeds in steps, which other limits move.
+# that costs (fir-plain by twice sqrt(V/J), which is less, where A is large).
 BREAKS = {
     "stop": ("split",),
-    "fir": ("looser velocity",),
     "fir-plain": ("looser velocity", "looser feed"),
     "fir-spline-plain": ("looser velocity", "looser feed", "looser acceleration"),
 }

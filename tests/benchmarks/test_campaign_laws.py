@@ -65,11 +65,8 @@ def test_on_the_way_back_every_joint_keeps_its_tolerance() -> None:
 
 @pytest.mark.parametrize("law", ["looser feed", "looser velocity", "looser acceleration", "looser jerk"])
 @pytest.mark.parametrize("method", ["fir-plain", "fir-spline-plain", "fir", "fir-spline"])
-def test_only_filters_as_in_the_papers_and_tried_speeds_get_longer_with_a_limit(
-    method: str, law: str
-) -> None:
-    """Short blocks that reach no limit but that of the filters: what a larger V or A does to V/A and A/J is all that it does, and to
-    the steps in which fir tries its speeds."""
+def test_only_filters_as_in_the_papers_get_longer_with_a_limit(method: str, law: str) -> None:
+    """Short blocks that reach no limit but that of the filters: what a larger V or A does to V/A and A/J is all that it does."""
     feed = 60000 if law == "looser velocity" else 3000
     text = f"G1 X0.3 Y0.1 F{feed}\nG1 X0.6 Y0\nG1 X0.9 Y0.1\nM2\n"
     program, machine = parse_program(text, MACHINE), MACHINE

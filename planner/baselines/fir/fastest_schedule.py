@@ -23,10 +23,12 @@ from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Margins that are tried, each with so many speeds, from the fastest leg's to what the shortest leg is best run at
-# from rest to rest; the most promising speeds of each margin are made into motions.
+# Margins that are tried, each with speeds from the fastest leg's down to what the shortest leg is best run at from
+# rest to rest, the powers of a ratio [-]: with larger limits there are others, and these stay. The most promising
+# speeds of each margin are made into motions.
 MARGINS = (1.0, 1.2, 1.4, 1.6, 2.0)
-SPEEDS, SETTLED = 40, 3
+RATIO, SETTLED = 1.1, 3
+BESIDE = RATIO ** np.array([0.0, -0.5, 0.5])
 # Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
 # they are tried at all corners, as a corner may be so slow that a stop is faster.
 STOPS = (1.0, 0.0)
@@ -89,15 +91,20 @@ def _settled(guide: LegGuide, machine: Machine) -> Schedule:
     """The fastest of the settled schedules, each run with the choices that are most promising for it."""
     margins = MARGINS if guide.profile_filters is None else MARGINS[:1]
     high = guide.largest(guide.feed)
-    low = -guide.largest(-np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), guide.feed))
-    tries = np.array([high * (low / high) ** (k / (SPEEDS - 1)) for k in range(SPEEDS)])
+    from_rest = np.minimum(np.cbrt(guide.j_max * guide.length**2 / 4), np.sqrt(guide.a_max * guide.length))
+    low = -guide.largest(-np.minimum(from_rest, guide.feed))
+    below = np.floor(np.log(high) / np.log(RATIO))
+    count = int(np.ceil(np.log(high / low).max() / np.log(RATIO))) + 1
+    tries = np.array([high, *(RATIO ** (below - k) for k in range(count))])
     plans, times, runs = [], [], np.arange(guide.runs)
     for margin in margins:
         of = np.full(guide.runs, margin)
         promised = np.array([plan_for(guide, machine, speed, of).time() for speed in tries])
         for best in np.argsort(promised, axis=0, kind="stable")[:SETTLED]:
-            plans.append(plan_for(guide, machine, tries[best, runs], of))
-            times.append(promised[best, runs])
+            near = np.minimum(tries[best, runs] * BESIDE[:, None], high)
+            fastest = np.argmin([plan_for(guide, machine, speed, of).time() for speed in near], axis=0)
+            plans.append(plan_for(guide, machine, near[fastest, runs], of))
+            times.append(plans[-1].time())
     return settled_fastest(plans, np.array(times), machine)
 
 

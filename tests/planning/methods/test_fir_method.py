@@ -8,7 +8,7 @@ from oracles import residual_vibration
 
 from benchmarks.jobs import problems
 from planner.base.errors import InputError
-from planner.machine import Mode
+from planner.machine import Axis, Machine, Mode
 from planner.motion.filters import damped_period
 from planner.nc.program import PathControl
 from planner.nc.reader import parse_program
@@ -101,6 +101,18 @@ def test_stops_dwells_rapids_and_feeds():
     text = "G21 F6000\nG4 P0.25\nG1 X10\nG61.1\nX20\nG64\nX30 Y5 F2000\nG4 P0.5\nG1 X40\nG0 X50 Y0\nX0\nG1 X-5 Y3 F6000\n"
     made = fir(parse_program(text))
     assert (~made.trajectory.velocity.any(axis=1)).sum() * MACHINE.dt == pytest.approx(0.75, abs=0.02)
+
+
+def test_a_larger_feed_costs_no_time():
+    """40 and 80 mm at 200 mm/s2 are run best at about sqrt(40 x 200) = 90 mm/s, whatever the feed: a filter of V/A pays for more."""
+    axis = Axis(velocity=200.0, acceleration=200.0, jerk=20000.0)
+    machine = Machine(name="soft", dt=0.001, tolerance=0.05, axes=dict.fromkeys("xy", axis))
+    times = [
+        fir(parse_program(f"G1 X40 F{feed}\nG1 Y80\nM2\n"), machine).cycle_time
+        for feed in (5000, 7000, 11000)
+    ]
+    assert times[2] <= times[1] * (1 + 1e-3)
+    assert times[1] <= times[0] * (1 + 1e-3)
 
 
 def test_it_has_a_name():

@@ -19,6 +19,7 @@ class Tried:
     # the time-optimal motion on a path, and in time with its limits kept between grid points, not delivered
     # yet; None before
     path: tuple[OnPath, Motion] | None = None
+    slower: Plan | None = None  # of a search whose motion passes only when it is run slower in places
     joint: bool = False  # whether the best is of the joint search
     steps: int = 0  # of constant jerk, that the joint search has
     left: bool = True  # whether the joint search has anything to gain

@@ -69,7 +69,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings))
-    return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps)
+    return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps, slower=found.slower)
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -87,7 +87,8 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
     if path is None:
         return tried
     found = joint_plan(job, settings, path[0], settings.effort.search, _others(ON_PATH, settings), path[1])
-    return dataclasses.replace(tried, best=found.plan, path=path, joint=found.plan is not None)
+    slower = min(filter(None, (tried.slower, found.slower)), key=counted_time, default=None)
+    return dataclasses.replace(tried, best=found.plan, path=path, joint=found.plan is not None, slower=slower)
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -103,9 +104,8 @@ def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The motion on the path, delivered."""
     plan = plan_on_path(job, settings, tried.path)
     joint = tried.joint and tried.best is not None and faster(tried.best, plan) is tried.best
-    return Tried(
-        best=plan if tried.best is None else faster(tried.best, plan), joint=joint, steps=tried.steps
-    )
+    best = plan if tried.best is None else faster(tried.best, plan)
+    return dataclasses.replace(tried, best=best, path=None, joint=joint)
 
 
 def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bool:

@@ -34,6 +34,7 @@ from planner.joint.splice import SplicedRun
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.by_run import RunsInTime, full_stops
+from planner.planning.job.choice import counted_time
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
@@ -72,11 +73,16 @@ class Others(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """How the joint search of a job ends: its plan, None where it does not pass or is not searched, and the
-    steps of the motion."""
+    """How the joint search of a job ends.
+
+    plan   : None where it does not pass or is not searched
+    steps  : of the motion
+    slower : where there is no plan, that of the motion which passes when it is run slower in places; else None
+    """
 
     plan: Plan | None
     steps: int
+    slower: Plan | None = None
 
 
 def searchable(job: Job, *, jerk_limited: bool) -> bool:
@@ -132,30 +138,33 @@ def joint_plan(
             settings.not_limited,
             kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
         )
-    time = made.delivered.trajectory.cycle_time if made else np.nan
-    count = len(made.plans) if made else 0
-    job.tell("search", found=time, before=start.motion.end, kept=made is not None, steps=steps, alone=count)
-    if made is None and search.of(steps).finer and not stays:
+    slower = made.delivered.slower if made else None
+    time = made.delivered.trajectory.cycle_time if made and not slower else np.nan
+    count, kept = len(made.plans) if made else 0, made is not None and slower is None
+    job.tell("search", found=time, before=start.motion.end, kept=kept, steps=steps, alone=count)
+    other = Joint(None, steps)
+    if not kept and search.of(steps).finer and not stays:
         longer = dataclasses.replace(search, finer=())
-        return joint_plan(job, settings, planned, longer, others, start=start)
+        other = joint_plan(job, settings, planned, longer, others, start=start)
     if made is None:
-        return Joint(None, steps)
+        return other
+    delivered = slower or made.delivered
     for k in (*made.plans, *made.stays):
         why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
         found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
     left = [k for k, one in enumerate(found) if one.steps is None]
     if len(left) == len(found) and not made.plans:  # the motion is the start's, which others deliver
-        return Joint(None, steps)
+        return other
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
     stayed = others.kept(job) if made.stays else (planned, motion) if motion else None
     held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None
     alone_held = {k: plan.grid for k, plan in made.plans.items()}
-    tables, notes = tabled(job, held, made.delivered, found, left, alone_held)
+    tables, notes = tabled(job, held, delivered, found, left, alone_held)
     if tables.prices is None and stays and priced(planned, job.machine):
         tables = dataclasses.replace(tables, priced=planned)
         notes = (OF_THE_START,)
     plan = job.plan(
-        made.delivered._replace(filtered=filters_count(*job.real)),
+        delivered._replace(filtered=filters_count(*job.real)),
         method=settings.method,
         corner=settings.corner_name,
         solver=planned.solution.solver,
@@ -165,7 +174,11 @@ def joint_plan(
         tables=tables,
         notes=(*made.notes, *path_notes(job.toolpath, planned), *notes),
     )
-    return Joint(plan, steps)
+    if slower is None:
+        return Joint(plan, steps)
+    if counted_time(other.plan or other.slower) <= plan.cycle_time:
+        return other
+    return Joint(plan, steps) if other.plan else Joint(None, steps, slower=plan)
 
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:

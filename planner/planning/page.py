@@ -28,7 +28,7 @@ from planner.motion.timing import require_samples
 from planner.nc.program import Program
 from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
-from planner.planning.job.choice import faster, inside, not_in_step, passed, shown_time
+from planner.planning.job.choice import beside, faster, inside, not_in_step, passed, shown_time
 from planner.planning.job.job import Job
 from planner.planning.job.less_tolerance import with_less_tolerance
 from planner.planning.job.plan import Plan
@@ -152,10 +152,13 @@ def within_tolerance(job: Job, method: Method) -> Plan:
     made = method.plan_job(job)
     if made.verdict is None or (made.verdict.passed and (inside(made) or not method.keeps_tolerance)):
         return made
-    again = None
+    again = made
     if method.keeps_tolerance:
-        again = _runs_alone(job, made, method) or with_less_tolerance(job, made, method.plan_job)
-    return faster(again or made, made.slower_in_places())
+        alone = _runs_alone(job, made, method)
+        again = alone or made
+        if not passed(again):
+            again = faster(with_less_tolerance(job, made, method.plan_job), again.slower_in_places())
+    return faster(again, made.slower_in_places())
 
 
 def tolerant(run: Job, made: Plan, planned: Callable[[Job], Plan]) -> Plan:
@@ -175,12 +178,12 @@ def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan
             job.tell(attempt.name)
             tried = attempt.make(job, settings, tried)
     assert tried.best is not None
-    return tried.best
+    return tried.best if tried.slower is None else beside(tried.best, tried.slower, job)
 
 
 def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
     """The plan with the runs on which its verdict finds something planned each by itself, and all others as
-    they are; None where these are not few, or what comes of it does not pass."""
+    they are; None where these are not few, or what comes of it does not pass, not even slower in places."""
     machine, toolpath = job.real
     making, verdict, stops = made.making, made.verdict, full_stops(job.toolpath)
     if (

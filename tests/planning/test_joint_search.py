@@ -13,9 +13,17 @@ from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.feedrate.solution import Status
 from planner.joint.parts import FoundRun
+from planner.machine import Axis, Machine
+from planner.nc.program import Program
+from planner.nc.reader import parse_program
 from planner.planning import joint_search
+from planner.planning.job.choice import beside
+from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Trace
 from planner.planning.joint_search import LONG
+from planner.planning.methods.optimal import OptimalMethod
+from planner.planning.methods.stop import StopMethod
+from planner.planning.page import job_of
 
 RUNS = 60
 STROKE = "G1 X{0} Y{1}\nG1 X{2} Y{1}\nG1 X{2} Y{0}\nG1 X{0} Y{3}\nG1 X{3} Y{2}\nG1 X{1} Y{0}\nG4 P0.01\n"
@@ -172,3 +180,45 @@ def test_a_job_one_of_whose_runs_gets_no_spline_is_searched():
     assert plan.sentence.startswith("the best motion near its start, geometry and feed together")
     assert "stays on 1 of 3 runs" in plan.sentence
     assert searched(told)["alone"] == 1
+
+
+@pytest.fixture
+def hairpin() -> tuple[Program, Machine]:
+    """Half a millimetre back in periods of 16 ms: chords miss the vertex by more than the tolerance, whatever the path."""
+    axis = Axis(velocity=500.0, acceleration=3000.0, jerk=300000.0)
+    machine = Machine(name="slow cycle", dt=0.016, tolerance=0.1, axes=dict.fromkeys("xy", axis))
+    return parse_program("G1 X5 F6000\nX4.5 Y0.3\nM2\n", machine), machine
+
+
+def test_a_search_that_passes_only_slower_in_places_is_taken_where_nothing_is_faster(
+    hairpin: tuple[Program, Machine],
+) -> None:
+    """The motion on the path has to be slower too, and takes 5 % longer then; with less tolerance there is a full stop."""
+    told = Trace()
+    found = planner.plan(*hairpin, effort="quick", log=told)
+    assert found.verdict is not None
+    assert found.verdict.passed
+    first = next(step for step in told.steps if step.name == "search")
+    mended = next(step for step in told.steps if step.name == "slower in places")
+    assert not first.kept
+    assert found.cycle_time == pytest.approx(mended.found, rel=1e-6)
+    on_path = planner.plan(*hairpin, effort="quick", geometry="spline")
+    assert found.cycle_time < 0.97 * on_path.cycle_time
+
+
+def test_a_plan_that_may_pass_with_less_tolerance_keeps_the_other_beside_it(
+    hairpin: tuple[Program, Machine],
+) -> None:
+    """Of a motion whose chords leave the tolerance it is not known yet what it takes: the slower one that passes waits."""
+    job = job_of(*hairpin, None, Stages())
+    slower = StopMethod().plan_job(job)
+    best = OptimalMethod(corner="spline", effort="quick").plan_job(job)
+    assert best.verdict is not None
+    assert not best.verdict.passed
+    mended = best.slower_in_places()
+    assert best.cycle_time < mended.cycle_time < slower.cycle_time
+    kept = beside(best, slower, job)
+    assert kept.trajectory is best.trajectory
+    assert kept.slower_in_places().cycle_time == mended.cycle_time
+    assert beside(best, mended, job).slower_in_places().cycle_time == mended.cycle_time
+    assert beside(slower, mended, job) is mended

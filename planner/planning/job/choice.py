@@ -54,6 +54,19 @@ def counted_time(plan: Plan | None) -> float:
     return plan.trajectory.cycle_time if chords else float("inf")
 
 
+def beside(best: Plan, slower: Plan, job: Job) -> Plan:
+    """Of the best plan and one that passes as its motion was run slower in places the faster one; where the best does
+    not pass, and may with less tolerance, it is kept, with the other beside it (`slower_in_places`)."""
+    time, before = slower.cycle_time, counted_time(best)
+    taken = time <= before
+    job.tell(
+        "compare", found=time, before=before, kept=taken, method=slower.method, corner=slower.corner or "none"
+    )
+    if taken or passed(best) or best.making is None:
+        return slower if taken else best
+    return dataclasses.replace(best, making=best.making._replace(instead=slower))
+
+
 def better(best: Plan | None, rival: Plan, why: str, job: Job) -> Plan:
     """The rival if it takes less time, with the sentence `why`, else the best; named as that is."""
     time, before = counted_time(rival), counted_time(best)

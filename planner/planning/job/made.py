@@ -1,5 +1,4 @@
-"""The records between the stages of a plan: a motion that was delivered, and what is known of a plan that may
-not be taken."""
+"""The records between the stages of a plan: a motion that was delivered, and the tables beside it."""
 
 from __future__ import annotations
 
@@ -31,22 +30,6 @@ class Delivered(NamedTuple):
     slower: Delivered | None = None
     filtered: bool = False
     notes: tuple[str, ...] = ()
-
-
-class Making(NamedTuple):
-    """A plan in the making, which may not be the one that is taken.
-
-    motion, slower, filtered : as in `Delivered`
-    priced                   : the solution of which the prices are those of the plan; None where they are
-                               there, or not to be had
-    given_up                 : what the method has noted
-    """
-
-    motion: MotionInTime
-    slower: Delivered | None = None
-    filtered: bool = False
-    priced: OnPath | None = None
-    given_up: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -3,20 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
 from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.planning.job.beside import Beside, beside_motion
-from planner.planning.job.made import Delivered, Making
+from planner.planning.job.made import Delivered
 from planner.planning.job.shown import Shown
+from planner.planning.optimal.on_path import OnPath
 from planner.sensitivity.records import GridHistory, PriceList
 from planner.verifier import CornerCheck, Verdict
+
+
+class Making(NamedTuple):
+    """A plan in the making, which may not be the one that is taken.
+
+    motion, slower, filtered : as in `Delivered`
+    priced                   : the solution of which the prices are those of the plan; None where they are
+                               there, or not to be had
+    given_up                 : what the method has noted
+    instead                  : another plan, which passes, for one that does not; else None
+    """
+
+    motion: MotionInTime
+    slower: Delivered | None = None
+    filtered: bool = False
+    priced: OnPath | None = None
+    given_up: tuple[str, ...] = ()
+    instead: Plan | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -103,10 +123,15 @@ class Plan(Shown):
         return replace(self, **motion | changes)
 
     def slower_in_places(self) -> Plan:
-        """The plan with its motion run slower where the verdict found something, if that mends it; else as it
-        is."""
-        slower = self.making.slower if self.making is not None else None
-        return self if slower is None else self.delivering(slower)
+        """The plan with its motion run slower where the verdict found something, or the one that there is instead, the
+        faster of those that there are; else as it is."""
+        if self.making is None:
+            return self
+        slower, instead = self.making.slower, self.making.instead
+        mended = self if slower is None else self.delivering(slower)
+        if instead is None or (slower is not None and mended.cycle_time <= instead.cycle_time):
+            return mended
+        return instead
 
     def without_motion(self, why: str) -> Plan:
         """The plan without its motion, which is not delivered."""

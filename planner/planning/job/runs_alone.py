@@ -18,7 +18,7 @@ ALONE_MOST, VERDICTS = 100, 3
 
 
 class Alone(NamedTuple):
-    """A motion that passes."""
+    """A motion that passes, or does so when it is run slower in places."""
 
     delivered: Delivered
     # (G+1,) when its runs begin, and its end, as it was delivered without standstills between samples [s]
@@ -38,7 +38,8 @@ def with_runs_alone(
 ) -> Alone | None:
     """The motion with those runs planned by themselves that have no parts, and then those on which the
     verdict finds something. Where these are more than `most` or all, or one of them does not pass, they are
-    of the motion that is `kept`; None without one, and where the whole does not pass.
+    of the motion that is `kept`; None without one, and where the whole does not pass, not even slower in
+    places: what is left at last is the motion with the least time when it is.
 
     parts   : of the motion, run by run between the job's full stops
     planned : plans a job of one run
@@ -47,6 +48,7 @@ def with_runs_alone(
     stops, plans, stays = full_stops(job.toolpath), dict[int, Plan](), set[int]()
     runs = list(parts)
     new = [k for k, part in enumerate(runs) if part is None]
+    least, slowed = np.inf, None
     for _ in range(VERDICTS):
         few = len(plans) + len(new) <= min(most, len(runs) - 1)
         for k in new:
@@ -58,17 +60,20 @@ def with_runs_alone(
                 stays.add(k)
                 runs[k] = [whole.spliced(k)]
             else:
-                return None
+                return slowed
         made = job.deliver(Spliced(runs=tuple(part for of_run in runs for part in of_run or ())), not_limited)
         if plans:
             time, passed = made.trajectory.cycle_time, made.verdict.passed
             job.tell("runs alone", found=time, runs=len(plans), kept=passed)
         begin = np.cumsum([0.0, *(sum(part.lasting for part in of_run or ()) for of_run in runs)])
+        noted = (note for plan in plans.values() if plan.making for note in plan.making.given_up)
+        found = Alone(made, begin, dict(plans), frozenset(stays), tuple(dict.fromkeys(noted)))
         if made.verdict.passed:
-            noted = (note for plan in plans.values() if plan.making for note in plan.making.given_up)
-            return Alone(made, begin, plans, frozenset(stays), tuple(dict.fromkeys(noted)))
+            return found
+        if made.slower is not None and (time := made.slower.trajectory.cycle_time) < least:
+            least, slowed = time, found
         broken = broken_runs(begin, made.verdict)
         new = [k for k in broken if k not in plans and k not in stays]
         if len(new) < len(broken) or not new:
-            return None
-    return None
+            break
+    return slowed

@@ -77,8 +77,6 @@ class Sizes:
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time
-    # in longer parts both ends are solved; the joining window needs six
-    solved_windows: int = _size(ROUTES, 10, 7)
     # steps of a window, which is half as long at least: joins that are searched once more must not touch one
     # another
     searched_window: int = _size(ROUTES, 1_500, 200)
@@ -99,8 +97,8 @@ class Sizes:
     # blocks of a job beside whose motion on a path method kinematic is planned
     rivals_planned: int = _size(EFFORT, 40_000, 100)
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
-    # points: beyond, only where it is worth solving again (planning/optimal/tighten.py)
-    tightened_everywhere: int = _size(EFFORT, 50_000, 10)
+    # points of a motion on a path that is slowed down by 2e-5 before its verdict (planning/optimal/tighten.py)
+    slowed_before: int = _size(EFFORT, 50_000, 10)
     priced: int = _size(EFFORT, 200_000, 60_000)  # points of all problems solved again for prices: a second
 
     # Pages, pictures and tables.

@@ -172,7 +172,7 @@ RETRIES = (
     Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "1e-4, 9e-3"),
     Retry(("splines",), "full stops where a run gets no spline", "2", "3e-5, 6e-4"),
     Retry(("corners",), "single ones between full stops, where they may be faster", "2", "2e-3, 2e-2"),
-    Retry(("tighten",), "limits, where they are exceeded between grid points", "2, long 8", "5e-4, 5e-3"),
+    Retry(("tighten",), "limits, where they are exceeded between grid points", "2", "5e-4, 5e-3"),
     Retry(("filters",), "less feed where the tolerance is left behind filters", "16", "5e-1, 3"),
     Retry(("share of tolerance",), "behind filters that cost time, less for the path", "2", "3e-2, 4e-1"),
     Retry(

@@ -65,7 +65,6 @@ def test_small_sizes_go_together():
         assert found.relaxed_range > found.relaxed_window > 2 * found.relaxed_overlap
         assert found.searched_window / 2 > 2 * (found.searched_overlap + found.searched_join)
         assert found.searched_join < found.searched_overlap
-        assert found.solved_windows > 6
 
 
 def planned(folder: Path, kinds: str) -> Path:

@@ -1,4 +1,4 @@
-"""A part of a piece, solved window by window: where windows end, what of them is kept, and what is done if
+"""A piece between two full stops, solved window by window: where windows end, what of them is kept, and what is done if
 one fails.
 
 See solver.py.
@@ -13,8 +13,9 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.profile import Profile, backward
+from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import WindowSettings
+from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Way, Window
 
@@ -50,12 +51,10 @@ INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Task:
-    """The points first..last of a problem, to be solved from rest, or from a given feed, to rest, or to a
-    given feed.
+    """The points first..last of a problem, to be solved from rest to rest.
 
-    profile    : of all points of the problem; these points are written
-    tell       : called with the number of points that are new; may end the work by an exception
-    start, end : feed^2 at both ends, where the acceleration is 0; 0 at rest [mm2/s2]
+    profile : of all points of the problem; these points are written
+    tell    : called with the number of points that are new; may end the work by an exception
     """
 
     solver: WindowSettings
@@ -64,47 +63,47 @@ class Task:
     first: int
     last: int
     tell: Callable[[int], None]
-    start: float = 0.0
-    end: float = 0.0
 
 
 class Chain:
     """The profile of a task as it grows, window by window, from its first point.
 
-    at      : up to which point there is a profile
-    rest    : what the last window knows of the way ahead, down to its stop
-    stops   : points where the profile rests because nothing better was found
-    failed  : whether there is no solution between given states; from rest to rest there always is one
+    at         : up to which point there is a profile
+    rest       : what the last window knows of the way ahead, down to its stop
+    stops      : points where the profile rests because nothing better was found
+    iterations : of its longest window
+    slower     : by what factor all of it was slowed down to keep every limit at the grid points
     """
 
-    def __init__(self, task: Task, ahead: Way | None = None, back: Way | None = None):
-        """The task, or one with other states at its ends: ways to rest from the first point on, and from the
-        last point on, backward, None from rest; the profile has these states already."""
+    def __init__(self, task: Task):
         self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
         self.at, self.first, self.last = task.first, task.first, task.last
         self.rest: Window | None = None
-        self.failed = False
-        self._start, self._end = task.start, task.end
-        self._ahead, self._back = ahead, back
-        self._given = task.start > 0.0 or task.end > 0.0 or ahead is not None or back is not None
         self.stops: list[int] = []
-        self.iterations = 0
+        self.iterations, self.slower = 0, 1.0
         # windows solved; how often not from the first start, and divided into smaller ones
         self.windows = self.other_starts = self.divided = 0
         self._tell = task.tell
         self._room = Room()
 
-    def run(self, room: Room, until: int) -> None:
-        """Solve in windows up to the point `until`, or a little beyond."""
+    @property
+    def effort(self) -> dict[str, int]:
+        """Counts by their names."""
+        return {
+            "windows": self.windows,
+            "other starts": self.other_starts,
+            "divided": self.divided,
+            "standstills": len(self.stops),
+        }
+
+    def run(self, room: Room) -> None:
+        """Solve in windows up to the last point, and slow the whole down until it keeps every limit."""
         self._room = room
         size, divided = self.solver.window, False
-        while self.at < min(until, self.last) and not self.failed:
+        while self.at < self.last:
             begin = self.at
             end = self._smaller_end(begin, size) if divided else self._window_end(begin, size)
             found = self._solve_window(begin, end)
-            if found is None and self._given:
-                self.failed = True
-                continue
             if found is None:
                 if end - begin > SMALLEST_WINDOW + INTERVALS_MIN and self.profile.x[begin] == 0.0:
                     size, divided = max((end - begin) // DIVISION, SMALLEST_WINDOW), True
@@ -123,6 +122,17 @@ class Chain:
             self._keep(begin, keep, found)
             self.at = keep
             size, divided = self.solver.window, False
+        self.rest = None  # which nobody asks for any more
+        self._slow_down()
+
+    def _slow_down(self) -> None:
+        profile, own, intervals = self.profile, slice(self.first, self.last + 1), slice(self.first, self.last)
+        x, u, jerk = profile.x[own], profile.u[own], profile.jerk[intervals]
+        self.slower = by = float(slower_by(self.columns, self.first, x, u, jerk, 1.0))
+        x /= by**2
+        u /= by**2
+        jerk /= by**3
+        profile.duration[own] *= by
 
     def _window_end(self, begin: int, size: int) -> int:
         """The last point of a window: behind the way to brake from the point up to which it is likely to be
@@ -177,23 +187,12 @@ class Chain:
         return ScaledWindow.of(self.columns, begin, end, self._room, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
-        """Solve the points begin..end, from the state at `begin` to rest at `end`, or to the end of the task;
-        None if that does not converge."""
-        behind, scaled = None, self._scaled(begin, end)
-        if begin == self.first and self._ahead is not None:
-            behind = self._ahead
-        elif begin == self.first and self._start > 0.0:
-            behind = way_to_rest(self.columns, begin, end, self._start)
-        elif self.profile.x[begin] > 0.0 and self.rest is not None:
+        """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not
+        converge."""
+        behind = None
+        if self.profile.x[begin] > 0.0 and self.rest is not None:
             behind = Way(self.rest.x, self.rest.u)
-        tol, iterations = self.solver.tol, self.solver.iterations
-        turned = self._back if end == self.last else None
-        if end == self.last and self._end > 0.0:
-            turned = way_to_rest(backward(self.columns, begin, end), 0, end - begin, self._end)
-        if turned is not None:
-            found, done, starts = scaled.between(behind, turned, tol, iterations)
-        else:
-            found, done, starts = scaled.solve(behind, tol, iterations)
+        found, done, starts = self._scaled(begin, end).solve(behind, self.solver.tol, self.solver.iterations)
         self.iterations = max(self.iterations, done)
         self.windows += 1
         self.other_starts += starts - 1
@@ -222,21 +221,6 @@ class Chain:
         self.profile.put(begin, found, end - begin)
         self._tell(end - begin)
         self.rest = found.after(end - begin)
-
-
-def way_to_rest(columns: ProblemColumns, first: int, last: int, x: float) -> Way:
-    """A way that brakes from feed^2 x and no acceleration at the point `first`, as far as it is not beyond
-    the point `last`, for the solver to start from: X (1 - q^2)^2 over the share q of some ways to brake."""
-    own = slice(first, last + 1)
-    reach = reach_of_end(x, columns.acceleration[own].min(), columns.jerk[own].min())
-    s = columns.s[own] - columns.s[first]
-    q = s[: max(int(np.searchsorted(s, reach)), 1)] / reach
-    return Way(x * (1.0 - q * q) ** 2, -2.0 * q * (1.0 - q * q) * x / reach)
-
-
-def reach_of_end(x: float, acceleration: float, jerk: float) -> float:
-    """How far the end of a window, or of a part, is felt at feed^2 x."""
-    return BRAKING_WAYS * float(way_felt(np.array([x]), acceleration, jerk)[0])
 
 
 def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:

@@ -130,19 +130,8 @@ class ScaledWindow:
     def solve(self, behind: Way | None, tol: float, iterations: int) -> tuple[Window | None, int, int]:
         """The fastest profile to rest, from rest or behind the way ahead of the window before; None if that
         does not converge. Also the iterations of the longest try, and from how many starts it was tried."""
-        return self._from(self._starts(behind), tol, iterations)
-
-    def between(
-        self, left: Way | None, right: Way, tol: float, iterations: int
-    ) -> tuple[Window | None, int, int]:
-        """The fastest profile between two ways to rest, `left` from the window's first point on, None from
-        rest, and `right` from its last point on, backward; as `solve`."""
-        return self._from(self._starts(left, right), tol, iterations)
-
-    def _from(self, profiles: Iterator[Way], tol: float, iterations: int) -> tuple[Window | None, int, int]:
-        """The solution from the first of these starts that converges, as `solve`."""
         most = starts = 0
-        for starts, (x, u) in enumerate(profiles, start=1):
+        for starts, (x, u) in enumerate(self._starts(behind), start=1):
             put(self.blocks, x, u)
             found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
@@ -164,23 +153,17 @@ class ScaledWindow:
             return None
         return self._without_multipliers()
 
-    def _starts(self, left: Way | None, right: Way | None = None) -> Iterator[Way]:
+    def _starts(self, behind: Way | None) -> Iterator[Way]:
         """Profiles to start from, scaled, the best first.
 
-        left  : the way to rest from the first point on, in the problem's units; None from rest
-        right : the same from the last point on, backward
+        behind : the way to rest from the first point on, in the problem's units; None from rest
         """
         for x, u in self._from_rest():
-            if left is None and right is None:
+            if behind is None:
                 yield Way(x, u)
-                continue
-            joined = Way(x, u) if left is None else self._joined(left, x, u)
-            if right is not None:
-                back, rate = self._joined(right, *_mirrored(x, u))
-                faster = back[::-1] > joined.x
-                faster[0], faster[-1] = False, True  # these states are given
-                joined = Way(np.where(faster, back[::-1], joined.x), np.where(faster, -rate[::-1], joined.u))
-            yield self._tracked(*joined) or joined
+            else:
+                joined = self._joined(behind, x, u)
+                yield self._tracked(*joined) or joined
 
     def _from_rest(self) -> Iterator[Way]:
         """The same from rest."""
@@ -241,11 +224,6 @@ class ScaledWindow:
             feed=of_feed * t,
             dynamics=dynamics * t / feed**2,
         )
-
-
-def _mirrored(x: FloatArray, u: FloatArray) -> Way:
-    """A profile passed backward."""
-    return Way(x[::-1].copy(), -u[::-1].copy())
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -109,5 +109,5 @@ def with_corners(
     mixed = dataclasses.replace(
         shape, splines=shape.splines._replace(fits=shape.splines.fits & ~chosen[piece])
     )
-    planned = order.solve(with_spline(rounded, mixed), job, grids.final, [best])
+    planned = order.solve(with_spline(rounded, mixed), job, grids.final)
     return dataclasses.replace(planned, shape=mixed) if planned.faster_than(best) else best, left

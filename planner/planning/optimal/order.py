@@ -7,18 +7,15 @@ on straight legs are added and the problem is solved once more, so that every sw
 """
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from planner.corners.smooth import SmoothPath
-from planner.feedrate.changed import Known, solve_changed
 from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import add_switching_points, refine_for_jerk
-from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import FeedrateSolver
@@ -43,11 +40,10 @@ class Order(Protocol):
         path: SmoothPath,
         job: Job,
         resolution: float,
-        known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
         """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py),
-        which may be given; pieces between full stops that a known motion has too are taken over from it."""
+        which may be given."""
         ...
 
 
@@ -69,7 +65,6 @@ class ThirdOrder:
         path: SmoothPath,
         job: Job,
         resolution: float,
-        known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
         """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as
@@ -79,7 +74,7 @@ class ThirdOrder:
             samples = refine_for_jerk(samples, job.machine)
             problem = feedrate_problem(samples, job.machine, measured=True)
             problem = dataclasses.replace(problem, margin=np.zeros(len(samples)))
-            solution = solve_changed(problem, _known(known), lambda part: self.solver.solve(part, progress))
+            solution = self.solver.solve(problem, progress)
         planned = OnPath(path=path, samples=samples, problem=problem, solution=solution)
         _tell(job, planned, resolution)
         return planned
@@ -102,7 +97,6 @@ class SecondOrder:
         path: SmoothPath,
         job: Job,
         resolution: float,
-        known: Sequence[OnPath] = (),
         samples: PathSamples | None = None,
     ) -> OnPath:
         """The time-optimal motion without jerk limits, on a grid with points where the profile switches;
@@ -117,20 +111,8 @@ class SecondOrder:
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
-    """The motion of another problem on the same grid: where some of its limits are a little tighter, solved
-    again around them only."""
-    if isinstance(solver, JerkLimited) and _tighter_only(planned.problem, problem):
-        found = solver.again(planned.problem, planned.solution, problem)
-        if found is not None:
-            return dataclasses.replace(planned, problem=found[0], solution=found[1])
-    solution = solve_changed(problem, _known([planned]), solver.solve)
-    return dataclasses.replace(planned, problem=problem, solution=solution)
-
-
-def _tighter_only(problem: FeedrateProblem, other: FeedrateProblem) -> bool:
-    """Whether two problems are the same but for the scale of their limits."""
-    names = [field.name for field in dataclasses.fields(problem) if field.name != "limit_scale"]
-    return all(getattr(problem, name) is getattr(other, name) for name in names)
+    """The motion of another problem on the same grid."""
+    return dataclasses.replace(planned, problem=problem, solution=solver.solve(problem))
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
@@ -153,10 +135,6 @@ def _sampled(
         return given
     with job.stage("geometry"):
         return sample_path(path, job.machine, resolution, third_order=order.jerk_limited)
-
-
-def _known(motions: Sequence[OnPath]) -> list[Known]:
-    return [Known(one.problem, one.solution) for one in motions]
 
 
 def _tell(job: Job, planned: OnPath, resolution: float) -> None:

@@ -35,18 +35,12 @@ PEAK_MORE = 1.2
 # Tightening pays while a run is slowed down by more than this [-], and not for long.
 TIGHTENED_EXCESS = 1e-5
 TIGHTENING_ROUNDS = 2
-# Jobs of more grid points, where the time it takes counts, are tightened in places with an excess of more
-# than the first of `WORTH` [-] at first, where nearly all has to be solved again anyway, and then of more
-# than the second, while there is one: few places are left to the later rounds.
-TIGHTENED_POINTS, WORTH, LONG_ROUNDS = SIZES.tightened_everywhere, (2e-5, 1e-4), 8
-SETTLED = 1e-6  # a round that changes the time by less is the last [share of it]: its excess only creeps
 # What is slowed down is slowed down by this much more [-]; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
-# Jobs of more than `TIGHTENED_POINTS` points are slowed down by this factor as a whole before the verdict:
-# the verifier looks at places of its own, and finds a little more; a second verdict takes as long as the
-# first.
-SEEN_BEFORE = 1.0 + 2e-5
+# Jobs of more than so many points are slowed down by this factor as a whole before the verdict: the verifier
+# looks at places of its own, and finds a little more; a second verdict takes as long as the first.
+MANY_POINTS, SEEN_BEFORE = SIZES.slowed_before, 1.0 + 2e-5
 
 
 def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
@@ -172,31 +166,26 @@ def within_limits(
     factor = excess(motion, toolpath, machine)
     best, least = (planned, factor), slowed(motion, toolpath, machine, factor).end
     tell("between points", found=least, excess=float(factor.max() - 1.0))
-    large = len(planned.samples) > TIGHTENED_POINTS
-    tighter, ended = planned, least
+    tighter = planned
     del planned, motion  # half a kilobyte a point, which long jobs need for the next one
-    for number in range(LONG_ROUNDS if large else TIGHTENING_ROUNDS):
-        worth = 1.0 + (WORTH[min(number, 1)] if large else TIGHTENED_EXCESS)
-        if factor.max() <= worth:
+    for _ in range(TIGHTENING_ROUNDS):
+        if factor.max() <= 1.0 + TIGHTENED_EXCESS:
             break
-        problem = tightened(tighter.problem, np.where(factor > worth, factor, 1.0))
+        problem = tightened(tighter.problem, np.where(factor > 1.0 + TIGHTENED_EXCESS, factor, 1.0))
         tighter = solve_again(tighter, problem, order.solver)
         if not tighter.solution.solved:
             break
         motion = tighter.motion()
         factor = excess(motion, toolpath, machine)
         end = slowed(motion, toolpath, machine, factor).end
-        facts = {name: count for name, count in tighter.solution.effort.items() if name.endswith("again")}
-        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0), **facts)
-        settled, ended = abs(end - ended) < SETTLED * end, end
+        tell("tighten", found=end, before=least, kept=end < least, excess=float(factor.max() - 1.0))
         if end < least:
             best, least = (tighter, factor), end
         del motion
-        if settled:
-            break
     planned, factor = best
     motion = slowed(planned.motion(), toolpath, machine, factor)
-    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if large else motion
+    many = len(planned.samples) > MANY_POINTS
+    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if many else motion
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:

@@ -1,7 +1,7 @@
 """Programs that compute: parameters, expressions, loops, branches and subprograms, expanded into rows of
 words.
 
-    tree, expression_reader, spelling    what a program says, in no language's spelling; expressions, and how RS274NGC writes them
+    tree, tokens, spelling               what a program says, in no language's spelling; expressions, and how RS274NGC writes them
     linuxcnc, fanuc, heidenhain, siemens a folder for each dialect: its text to statements and a `tree.Language`
     source, detect                       which lines are plain words, which belong to a language
     expressions, compiled, run, rows     statements to Python source, the running program, the rows that it appends

@@ -10,57 +10,62 @@ left to right; a sign belongs to what follows it, so that -2**2 is 4.
 
 import re
 from collections.abc import Iterator
+from functools import cache
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import ExpressionReader
 from planner.nc.language.source import SourceLine
+from planner.nc.language.tokens import Token, TokenReader
 
-_NUMBER = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?")
-_NAME = re.compile(r"<([^<>#()\n]+)>")
-_LETTERS = re.compile(r"[A-Za-z]+")
-_OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
-_BLANK = re.compile(r"[ \t\r\x1a]")
+_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
+_PIECE = re.compile(r"\((?P<inner>[^()]*)\)|;(?P<rest>.*)|(?P<open>\()|(?P<kept>[^ \t\r\x1a(;]+)", re.DOTALL)
 LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
-_IN_LINES = "; write the expression in several lines"
 
 
-class LineReader(ExpressionReader):
-    """Reads one line from left to right; `at` counts its characters without blanks and comments."""
+@cache
+def _pattern(names: tuple[str, ...]) -> re.Pattern[str]:
+    known = "|".join(sorted(names, key=len, reverse=True))
+    text = rf"(?P<number>{_NUMBER})|(?P<text><[^<>#()\n]+>)|(?P<name>(?i:{known}))|(?P<letter>[A-Za-z])"
+    return re.compile(rf"{text}|(?P<sign>\*\*|.)", re.DOTALL)
+
+
+class LineReader(TokenReader):
+    """Reads one line; `text` are its characters without blanks and comments."""
+
+    opening, closing = "[", "]"
 
     def __init__(self, line: SourceLine, language: tree.Language):
         self.line, self.language = line, language
-        self.at = 0
+        self.pattern = _pattern(
+            (*language.functions, *language.keywords, *filter(str.isalpha, language.ranks))
+        )
         self.comments: list[str] = []
-        self.places: list[int] | None = None  # of the characters that are left, in `text`
-        text = line.text
-        plain = _BLANK.search(text) is None and "(" not in text and ";" not in text
-        self.text = text if plain else self._cleaned(text)
+        self.places: list[int] = []  # of the characters that are left, in the line
+        for piece in _PIECE.finditer(line.text):
+            if piece["kept"]:
+                self.places += range(*piece.span())
+            elif piece["open"]:
+                raise self._comment_fault(piece.start())
+            else:
+                self.comments.append(piece["inner"] or piece["rest"] or "")
+        super().__init__("".join([line.text[k] for k in self.places]))
 
-    def _cleaned(self, text: str) -> str:
-        """The text without blanks and comments; comments are kept."""
-        places: list[int] = []
-        at, end = 0, len(text)
-        while at < end:
-            c = text[at]
-            if c == ";":
-                self.comments.append(text[at + 1 :])
-                break
-            if c == "(":
-                close = text.find(")", at)
-                if close < 0:
-                    raise self._fault(at, "the comment is not closed on its line; write )")
-                inner = text[at + 1 : close]
-                if "(" in inner:
-                    message = "a comment inside a comment is not allowed; remove the inner parenthesis"
-                    raise self._fault(at + 1 + inner.index("("), message)
-                self.comments.append(inner)
-                at = close
-            elif c not in " \t\r\x1a":
-                places.append(at)
-            at += 1
-        self.places = places
-        return "".join([text[k] for k in places])
+    def _comment_fault(self, at: int) -> tree.ProgramFault:
+        inner, closed, _ = self.line.text[at + 1 :].partition(")")
+        if not closed:
+            return self._fault(at, "the comment is not closed on its line; write )")
+        message = "a comment inside a comment is not allowed; remove the inner parenthesis"
+        return self._fault(at + 1 + inner.index("("), message)
+
+    def _fault(self, column: int, message: str) -> tree.ProgramFault:
+        return tree.ProgramFault(self.line.place._replace(at=self.line.start + column), message)
+
+    def fault(self, message: str, at: int | None = None) -> tree.ProgramFault:
+        return self._fault(self.place(self.column() if at is None else at), message)
+
+    def place(self, at: int) -> int:
+        """Where a character of `text` stands in the line."""
+        return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
 
     def messages(self) -> Iterator[tuple[str, str]]:
         """Comments that are messages: DEBUG, PRINT or MSG, and the text."""
@@ -69,151 +74,92 @@ class LineReader(ExpressionReader):
             if comma and kind.strip().upper() in ("DEBUG", "PRINT", "MSG"):
                 yield kind.strip().upper(), text
 
-    def column(self, at: int) -> int:
-        """Where a character stands in the text as it was given."""
-        if self.places is None:
-            return at
-        return self.places[at] if at < len(self.places) else (self.places[-1] + 1 if self.places else 0)
+    def expect(self, text: str, after: str = "") -> None:
+        if not self.take(text):
+            raise self.fault(f"{text} is missing{after and ' after '}{after}; {self._comes()} comes instead")
 
-    def refused(self, message: str, at: int | None = None) -> tree.ProgramFault:
-        return self._fault(self.column(self.at if at is None else at), message)
+    def _comes(self) -> str:
+        return "the end of the line" if self.ended else repr(self.text[self.column()])
 
-    def _fault(self, column: int, message: str) -> tree.ProgramFault:
-        return tree.ProgramFault(self.line.place._replace(at=self.line.start + column), message)
+    def no_value(self) -> tree.ProgramFault:
+        if self.kind() in ("name", "letter"):
+            known = ", ".join(sorted(self.language.functions))
+            return self.fault(f"{self.peek()} is no function; there are {known}")
+        text = "a number, parameter, function or [expression] was expected"
+        return self.fault(f"{text}; {self._comes()} comes")
 
-    @property
-    def ended(self) -> bool:
-        """True if nothing is left on the line."""
-        return self.at >= len(self.text)
-
-    def peek(self) -> str:
-        """The next character, or an empty text."""
-        return self.text[self.at : self.at + 1]
-
-    def take(self, character: str) -> bool:
-        """Go past the character if it comes next."""
-        if self.text[self.at : self.at + 1] != character:
-            return False
-        self.at += 1
-        return True
-
-    def expect(self, character: str, after: str) -> None:
-        """Go past the character. Raises ProgramFault if another one comes."""
-        if not self.take(character):
-            found = f"{self.peek()!r}" if not self.ended else "the end of the line"
-            raise self.refused(f"{character} is missing after {after}; {found} comes instead")
-
-    def keyword(self) -> str:
-        """The letters that come next, in lower case; empty if none."""
-        match = _LETTERS.match(self.text, self.at)
-        if match is None:
-            return ""
-        self.at = match.end()
-        return match.group().lower()
-
-    def name(self) -> str:
-        """A name between < and >."""
-        match = _NAME.match(self.text, self.at)
-        if match is None:
-            raise self.refused("a name is < characters >, such as <depth>")
-        name = match.group(1).lower()
-        if name.startswith(("_hal[", "_ini[")):
-            raise self.refused("a signal or setting that only the control knows; write its value")
-        self.at = match.end()
-        return name
-
-    def number(self) -> float | None:
-        """The number that comes next, without a sign, or None."""
-        match = _NUMBER.match(self.text, self.at)
-        if match is None:
-            return None
-        self.at = match.end()
-        return float(match.group())
-
-    def value(self) -> tree.Expression:
-        c = self.peek()
-        if c == "-" or c == "+":
-            self.at += 1
-            self.deeper(_IN_LINES)
-            operand = self.value()
-            self.nested -= 1
-            return operand if c == "+" else -operand
-        if c == "#":
+    def operand(self, token: Token) -> tree.Expression | None:
+        name = token.text
+        if name == "#":
+            self.next -= 1
             parameter = self.parameter()
             return tree.Number(float(self.line.place.line)) if parameter == LINE else parameter
-        if c == "[":
-            return self.bracket()
-        number = self.number()
-        if number is not None:
-            return tree.Number(number)
-        if c.isalpha():
-            return self._function()
-        found = f"{c!r}" if c else "the end of the line"
-        raise self.refused(f"a number, parameter, function or [expression] was expected; {found} comes")
-
-    def bracket(self) -> tree.Expression:
-        """[expression]"""
-        self.expect("[", "this")
-        self.deeper(_IN_LINES)
-        found = self.expression()
-        self.nested -= 1
-        self.expect("]", "the expression")
-        return found
-
-    def parameter(self) -> tree.Parameter:
-        """#number, #[expression], ##number or #<name>."""
-        at = self.at
-        self.expect("#", "this")
-        if self.peek() == "<":
-            name = self.name()
-            return tree.Named(name, name.startswith("_"))
-        self.deeper(_IN_LINES)
-        index = self.value()
-        self.nested -= 1
-        if isinstance(index, tree.Number) and index.value != int(index.value):
-            raise self.refused("the number of a parameter is a whole number", at)
-        return tree.Numbered(index)
-
-    def _function(self) -> tree.Expression:
-        at = self.at
-        name = self.keyword().upper()
-        if name not in self.language.functions:
-            known = ", ".join(sorted(self.language.functions))
-            raise self.refused(f"{name} is no function; there are {known}", at)
-        if name == "EXISTS":
+        if name == "EXISTS" and name in self.language.functions:
             self.expect("[", name)
             parameter = self.parameter()
             self.expect("]", "the parameter")
             return tree.Exists(parameter)
+        if name not in self.language.functions:
+            return None
         operands = [self.bracket()]
         if name == "ATAN" and self.take("/"):
             operands.append(self.bracket())
         return tree.op(name, *operands)
 
-    def operator(self) -> str:
-        match = None if self.peek() == "]" else _OPERATOR.match(self.text, self.at)
-        return match.group().upper() if match else ""
+    def numbered(self, *letters: str) -> int | None:
+        """The whole number behind one of the letters, which are gone past; None if something else comes."""
+        if self.peek() not in letters or not self.peek(1).isdecimal():
+            return None
+        self.next += 2
+        return int(self.peek(-1))
 
-    def skip(self, operator: str) -> None:
-        self.at += len(operator)
+    def name(self) -> str:
+        """A name between < and >."""
+        if self.kind() != "text":
+            raise self.fault("a name is < characters >, such as <depth>")
+        name = self.peek()[1:-1].lower()
+        if name.startswith(("_hal[", "_ini[")):
+            raise self.fault("a signal or setting that only the control knows; write its value")
+        self.next += 1
+        return name
+
+    def parameter(self) -> tree.Parameter:
+        """#number, #[expression], ##number or #<name>."""
+        at = self.column()
+        self.expect("#")
+        if self.peek()[:1] == "<":
+            name = self.name()
+            return tree.Named(name, name.startswith("_"))
+        index = self.value()
+        if isinstance(index, tree.Number) and index.value != int(index.value):
+            raise self.fault("the number of a parameter is a whole number", at)
+        return tree.Numbered(index)
 
     def words_and_assignments(self, scale: float = 1.0) -> tuple[tree.Words, tree.Assignments]:
         """Words and assignments up to the end of the line; lengths without a point count `scale`."""
         words: list[tree.Word] = []
         assignments: list[tuple[tree.Parameter, tree.Expression]] = []
         while not self.ended:
-            at, c = self.at, self.peek()
-            if c == "#":
+            if self.kind() == "name":  # a letter and what its value begins with: ASIN[30] is A and SIN[30]
+                at = self.column()
+                self.tokens[self.next :] = [Token("letter", self.peek()[0], at), *self.split(at + 1)]
+            at, letter = self.column(), self.peek()
+            if letter == "#":
                 target = self.parameter()
                 self.expect("=", "the parameter")
                 assignments.append((target, self.expression() if self.language.long_values else self.value()))
-            elif c.isalpha() and c.isascii():
-                self.at += 1
-                letter, value = c.upper(), self.value()
-                is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.at]
+            elif self.kind() == "letter":
+                self.next += 1
+                value = self.value()
+                is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.column()]
                 if scale != 1.0 and is_length and isinstance(value, tree.Number):
                     value = tree.Number(value.value * scale)
-                words.append(tree.Word(letter, self.line.start + self.column(at), value))
+                words.append(tree.Word(letter, self.line.start + self.place(at), value))
             else:
-                raise self.refused(f"{c!r} starts neither a word nor an assignment", at)
+                raise self.fault(f"{self._comes()} starts neither a word nor an assignment")
         return tuple(words), tuple(assignments)
+
+    def nothing_left(self, after: str) -> None:
+        """Raises ProgramFault if more comes."""
+        if not self.ended:
+            raise self.fault(f"nothing may follow {after} on its line")

@@ -339,6 +339,8 @@ class Language:
         default_factory=dict
     )  # names of operators in the tree, where they are others
     long_values: bool = False  # an assignment takes an expression without brackets
+    keywords: frozenset[str] = frozenset()  # that statements begin with, or have in them
+    constants: Mapping[str, float] = field(default_factory=dict)  # names of numbers
 
 
 class ProgramFault(Exception):

@@ -4,11 +4,11 @@ M98, M99, G65, G66)."""
 from collections import Counter
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.source import SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
+from planner.nc.language.tokens import names, ranked
 from planner.nc.language.tree import Language
 
 LOCALS = 33  # #1 to #33 are a call's own
@@ -25,6 +25,7 @@ LANGUAGE = Language(
     },
     ranks=ranked("EQ NE GT GE LT LE", "+ - OR XOR", "* / MOD AND"),
     functions=names("ABS ACOS ADP ASIN ATAN BCD BIN COS EXP FIX FUP LN ROUND SIN SQR SQRT TAN"),
+    keywords=names("IF THEN WHILE GOTO DO END POPEN PCLOS DPRNT BPRNT"),
     long_values=True,
     conditions=COMPARISONS,
     locals=LOCALS,
@@ -50,9 +51,8 @@ class FanucControl(tree.Statements):
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
-        at = reader.at
-        if reader.keyword() != "do":
-            raise reader.refused("WHILE [condition] is followed by DO and a number", at)
+        if not reader.take("DO"):
+            raise reader.fault("WHILE [condition] is followed by DO and a number")
         self._do(reader, line, condition)
 
     def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = _ALWAYS) -> None:
@@ -72,11 +72,10 @@ class FanucControl(tree.Statements):
 
 
 def _loop_number(reader: LineReader) -> str:
-    at = reader.at
-    value = reader.number()
-    if value is None or value != int(value):
-        raise reader.refused("DO and END are followed by a whole number", at)
-    return f"{value:.0f}"
+    value = reader.value() if reader.kind() == "number" else None
+    if not isinstance(value, tree.Number) or value.value != int(value.value):
+        raise reader.fault("DO and END are followed by a whole number")
+    return f"{value.value:.0f}"
 
 
 def subprogram(words: tree.Words, line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:

@@ -14,9 +14,7 @@ from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 
-_LINE_NUMBER = re.compile(r"N(\d+)", re.IGNORECASE)
-_PROGRAM = re.compile(r"[O:](\d+)", re.IGNORECASE)
-_KEYWORD = re.compile(r"(IF|WHILE|GOTO|DO|END|POPEN|PCLOS|DPRNT|BPRNT)(?![A-Z])", re.IGNORECASE)
+_PROGRAM = re.compile(r"[O:](\d+)")
 _GOTO = re.compile(r"GOTO(\d+)?")
 _STOP = 3006.0  # parameter: stop with a message
 _CALLS = ("M98", "M97", "M99", "G65", "G66")
@@ -103,24 +101,19 @@ class FanucParser(FanucControl):
 
     def _line(self, line: SourceLine) -> None:
         reader = LineReader(line, LANGUAGE)
-        if reader.take("/"):
-            reader.number() if reader.peek().isdigit() else None
-        program = _PROGRAM.match(reader.text, reader.at)
+        if reader.take("/") and reader.kind() == "number":
+            reader.pop()
+        program = reader.numbered("O", ":")
         if program is not None:
-            self._program(str(int(program.group(1))), line)
-            reader.at = program.end()
-        label = _LINE_NUMBER.match(reader.text, reader.at)
-        if label is not None:
-            reader.at = label.end()
-            if self.targets is None or int(label.group(1)) in self.targets:
-                self.body.append(tree.Label(line.place, int(label.group(1))))
+            self._program(str(program), line)
+        label = reader.numbered("N")
+        if label is not None and (self.targets is None or label in self.targets):
+            self.body.append(tree.Label(line.place, label))
         if reader.ended:
             self._messages(reader, line)
             return
-        keyword = _KEYWORD.match(reader.text, reader.at)
-        if keyword is not None:
-            reader.at = keyword.end()
-            self._flow(keyword.group(1).upper(), reader, line)
+        if reader.peek() in LANGUAGE.keywords - {"THEN"}:
+            self._flow(reader.pop().text, reader, line)
             return
         words, assignments = reader.words_and_assignments(line.scale)
         self._messages(reader, line)
@@ -151,23 +144,18 @@ class FanucParser(FanucControl):
         else:  # output to a file
             self.body.append(tree.Message(line.place, (reader.text,)))
             return
-        if not reader.ended:
-            raise reader.refused(f"nothing may follow {keyword} on its line")
+        reader.nothing_left(keyword)
 
     def _if(self, reader: LineReader, line: SourceLine) -> None:
         condition = reader.bracket()
-        at = reader.at
-        match = _KEYWORD.match(reader.text, reader.at)
-        if match is not None and match.group(1).upper() == "GOTO":
-            reader.at = match.end()
+        if reader.take("GOTO"):
             body: list[tree.Statement] = [tree.Goto(line.place, reader.value())]
-        elif reader.text[at : at + 4].upper() == "THEN":
-            reader.at += 4
+        elif reader.take("THEN"):
             outside, self.body = self.body, []
             self._words(*reader.words_and_assignments(line.scale), line)
             body, self.body = self.body, outside
         else:
-            raise reader.refused("IF [condition] is followed by GOTO or THEN", at)
+            raise reader.fault("IF [condition] is followed by GOTO or THEN")
         self.body.append(tree.If(line.place, ((condition, body),), []))
 
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:

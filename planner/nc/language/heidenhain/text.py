@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import Token, TokenReader, names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
+from planner.nc.language.tokens import Token, TokenReader, names, ranked
 from planner.nc.language.tree import Expression
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
@@ -26,6 +26,7 @@ LANGUAGE = tree.Language(
     ranks=ranked("+ -", "* /", "^"),
     meant={"^": "**"},
     functions=names("SIN COS TAN ASIN ACOS ATAN SQRT ABS INT FRAC LN LOG EXP"),
+    constants={"PI": math.pi},
     conditions=COMPARISONS,
     locals=0,
     largest=FIRST_POSITION + 2,
@@ -152,8 +153,6 @@ class Formula(TokenReader):
     )
     language = LANGUAGE
     pieces = "blocks"
-    ends = "the formula ends too early"
-    no_value = "is no value, Q parameter or function of a formula"
 
     def __init__(self, block: Block):
         self.block = block
@@ -173,20 +172,21 @@ class Formula(TokenReader):
         if not self.take(text):
             raise self.fault(f"{text} is missing")
 
+    def no_value(self) -> tree.ProgramFault:
+        if self.ended:
+            return self.fault("the formula ends too early")
+        return self.fault(f"{self.peek()} is no value, Q parameter or function of a formula")
+
     def operand(self, token: Token) -> tree.Expression | None:
-        text = token.text
-        if token.kind == "number":
-            return tree.Number(float(text))
-        if re.fullmatch(r"Q\d+", text) and int(text[1:]) < PARAMETERS:
-            return parameter(int(text[1:]))
-        if text == "PI":
-            return tree.Number(math.pi)
-        if text == "SQ":
+        name = token.text
+        if re.fullmatch(r"Q\d+", name) and int(name[1:]) < PARAMETERS:
+            return parameter(int(name[1:]))
+        if name == "SQ":
             operand = self.value()
             return operand * operand
-        if text == "NEG":
+        if name == "NEG":
             return -self.value()
-        return tree.op(text, self.value()) if text in LANGUAGE.functions else None
+        return tree.op(name, self.value()) if name in LANGUAGE.functions else None
 
 
 X, Y, Z = own("x"), own("y"), own("z")

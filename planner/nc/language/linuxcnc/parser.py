@@ -9,14 +9,16 @@ then zeros; so are named parameters without an underscore. M98 shares its caller
 import re
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import LinuxcncVariables
+from planner.nc.language.tokens import names, ranked
 from planner.nc.language.tree import Language
 
 ARGUMENTS_MAX = 30  # #1 to #30 are a call's own
+_ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
+KEYWORDS = names("sub call return if elseif else while do repeat break continue") | _ENDS.keys()
 EQUAL = 1e-4  # EQ and NE take numbers this close as equal, as LinuxCNC does
 LANGUAGE = Language(
     operations=ARITHMETIC
@@ -29,16 +31,13 @@ LANGUAGE = Language(
     vacant=0.0,
     system_numbers=LinuxcncVariables.numbers,
     system_names=LinuxcncVariables.names,
+    keywords=frozenset(map(str.upper, KEYWORDS)),
 )
 _NESTED_MAX = 100  # loops and branches in each other
-_ENDS = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}
-KEYWORDS = frozenset(
-    ("sub", "call", "return", "if", "elseif", "else", "while", "do", "repeat", "break", "continue", *_ENDS)
-)
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
+_FLOW = frozenset(("98", "99", *map(str, _MODES)))  # numbers of M codes that are statements
 _PROGRAM = ""
-_FLOW = re.compile(r"[Mm](7[0-3]|9[89])(?![\d.])")
 _NEXT_PROGRAM = re.compile(
     rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
 )
@@ -154,7 +153,7 @@ class LinuxcncParser(tree.Statements):
     def _line(self, line: SourceLine) -> None:
         reader = LineReader(line, LANGUAGE)
         reader.take("/")
-        if reader.peek() in "oO" and not reader.ended:
+        if reader.take("O"):
             self._o_word(reader, line)
         elif self.ended and self.body is self.main:
             return
@@ -172,13 +171,12 @@ class LinuxcncParser(tree.Statements):
             self.body.append(tree.Message(line.place, (text,) if kind == "MSG" else _pieces(text)))
 
     def _code(self, reader: LineReader, line: SourceLine) -> bool:
-        match = _FLOW.match(reader.text, reader.at)
-        if match is None:
+        code = int(reader.peek(1)) if reader.peek() == "M" and reader.peek(1) in _FLOW else 0
+        if not code:
             return False
-        code = int(match.group(1))
-        reader.at = match.end()
+        reader.next += 2
         if code in _MODES:
-            self._nothing_left(reader, f"M{code}")
+            reader.nothing_left(f"M{code}")
             self.body.append(tree.Modes(line.place, _MODES[code]))
         elif code == 98:
             words, _ = reader.words_and_assignments()
@@ -188,7 +186,7 @@ class LinuxcncParser(tree.Statements):
             name = _constant_name(given["P"])
             self.body.append(tree.Call(line.place, name, None, "M98", given.get("L", tree.Number(1.0))))
         else:
-            self._nothing_left(reader, "M99")
+            reader.nothing_left("M99")
             if not self.plain_sub:
                 raise line.fault("M99 ends a subprogram; the main program ends with M2 or M30")
             self.body.append(tree.Return(line.place))
@@ -198,15 +196,14 @@ class LinuxcncParser(tree.Statements):
         return True
 
     def _o_word(self, reader: LineReader, line: SourceLine) -> None:
-        reader.at += 1
         label = self._label(reader)
-        at = reader.at
-        keyword = reader.keyword()
-        if not keyword and reader.ended and isinstance(label, str):
+        if reader.ended and isinstance(label, str):
             self._plain_program(label, line)
             return
+        keyword = reader.peek().lower()
         if keyword not in KEYWORDS:
-            raise reader.refused(f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected", at)
+            raise reader.fault(f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected")
+        reader.next += 1
         if keyword == "call":
             self._call(reader, line, label)
         elif not isinstance(label, str):
@@ -214,10 +211,10 @@ class LinuxcncParser(tree.Statements):
         else:
             condition = reader.bracket() if reader.peek() == "[" else None
             self._control(keyword, label, condition, line)
-        self._nothing_left(reader, f"o... {keyword}")
+        reader.nothing_left(f"o... {keyword}")
 
     def _label(self, reader: LineReader) -> str | tree.Expression:
-        if reader.peek() == "<":
+        if reader.peek()[:1] == "<":
             return reader.name()
         value = reader.value()
         return _constant_name(value) if isinstance(value, tree.Number) else value
@@ -243,10 +240,6 @@ class LinuxcncParser(tree.Statements):
             raise line.fault(f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
         name = "" if not isinstance(label, str) else label if label.isdigit() else f"<{label}>"
         self.body.append(tree.Call(line.place, label, tuple(enumerate(arguments, 1)), f"o{name} call"))
-
-    def _nothing_left(self, reader: LineReader, after: str) -> None:
-        if not reader.ended:
-            raise reader.refused(f"nothing may follow {after} on its line")
 
 
 def _constant_name(value: tree.Expression) -> str | tree.Expression:

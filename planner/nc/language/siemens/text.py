@@ -14,9 +14,9 @@ import re
 from collections.abc import Container
 
 from planner.nc.language import tree
-from planner.nc.language.expression_reader import Token, TokenReader, names, ranked
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
+from planner.nc.language.tokens import Token, TokenReader, names, ranked
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
 LANGUAGE = tree.Language(
@@ -29,10 +29,9 @@ LANGUAGE = tree.Language(
     largest=FIRST_POSITION + 2,
     vacant=0.0,
     system_numbers=PositionVariables.numbers,
+    constants={"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi},
 )
 _TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values, by their names in the tree
-# Names of numbers.
-_CONSTANTS = {"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi}
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
 _NESTED_MAX = 100  # loops and branches in each other
 
@@ -84,23 +83,25 @@ class LineTokens(TokenReader):
         return self.start + self.column()
 
     def value(self) -> tree.Expression:
-        if self.ended or self.tokens[self.next].kind != "word":
-            return super().value()
-        word = self.tokens[self.next]  # is a variable, or one and a sum: A+1
-        split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
-        parts = [Token("name", word.text[:split], word.at)]
-        if split == 1:
-            parts += [Token("sign", word.text[1], word.at + 1), Token("number", word.text[2:], word.at + 2)]
-        self.tokens[self.next : self.next + 1] = parts
+        if self.kind() == "word":  # is a variable, or one and a sum: A+1
+            word = self.tokens[self.next]
+            split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
+            parts = [Token("name", word.text[:split], word.at)]
+            if split == 1:
+                parts += [
+                    Token("sign", word.text[1], word.at + 1),
+                    Token("number", word.text[2:], word.at + 2),
+                ]
+            self.tokens[self.next : self.next + 1] = parts
         return super().value()
+
+    def number(self, text: str) -> float:
+        return float(text.replace("EX", "e"))
 
     def operand(self, token: Token) -> tree.Expression | None:
         name = token.text
         if name == "NOT":
             return tree.op(name, self.value())
-        if token.kind == "number":
-            mantissa, _, exponent = name.partition("EX")
-            return tree.Number(float(f"{mantissa}e{exponent}" if exponent else mantissa))
         if token.kind != "name":
             return None
         if name in LANGUAGE.functions or name in _TWO:
@@ -111,11 +112,8 @@ class LineTokens(TokenReader):
                 operands.append(self.expression())
             self.expect(")")
             return tree.op(_TWO.get(name, name), *operands)
-        if name in _CONSTANTS:
-            return tree.Number(_CONSTANTS[name])
         if _SYSTEM.match(name) and self.take("["):
-            axis = self.peek()
-            self.next += 1
+            axis = self.pop().text if not self.ended else ""
             self.expect("]")
             if axis not in ("X", "Y", "Z"):
                 raise self.fault(f"{name}[{axis}]: the position of X, Y or Z is known", token.at)

@@ -170,7 +170,7 @@ class CornerMove:
         rises = any(move.begin[normal] != move.end[normal] for move in (first, second))
         if rises or first.stands(normal) or second.stands(normal):
             raise ValueError("a rounding or chamfer stands between two moves in the plane")
-        corner, before, after = in_plane(first.end, normal), _leaving(first, normal), second.tangent(normal)
+        corner, before, after = in_plane(first.end, normal), first.leaving(normal), second.tangent(normal)
         turn = cmath.phase(after / before)
         if abs(turn) < _STRAIGHT_ON or self.size == 0.0:
             return [first], second
@@ -205,14 +205,9 @@ class CornerMove:
         return [one, between], two
 
 
-def _leaving(move: Move, normal: int) -> complex:
-    start = move.tangent(normal)
-    return start if move.arc is None else start * cmath.rect(1.0, move.arc.sweep)
-
-
 def _beside(move: Move, distance: float, normal: int) -> OffsetMove:
     """The line or circle of a move, moved to its left."""
-    first, last, end = move.tangent(normal), _leaving(move, normal), in_plane(move.end, normal)
+    first, last, end = move.tangent(normal), move.leaving(normal), in_plane(move.end, normal)
     if move.arc is None:
         return OffsetMove(end + 1j * distance * last, first, last)
     turning, centre = (1 if move.arc.sweep > 0 else -1), in_plane(move.arc.centre, normal)

@@ -17,6 +17,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
+from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import cycles as heidenhain_cycles
@@ -24,7 +25,7 @@ from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
 from planner.nc.language.making import ASSUMED, Maker, Making, Row
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import cycles as siemens_cycles
-from planner.nc.language.travel_rows import turned
+from planner.nc.language.travel_rows import STANDS, turned
 from planner.nc.program import Kind
 
 AXES = "XYZ"
@@ -175,26 +176,29 @@ def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 
 def _direction(making: Making) -> complex:
     """Unit tangent at the end of the last move in the program's plane. Raises ValueError for none."""
-    travel, interpreter = making.travel, making.interpreter
-    if travel.compensated:
-        text = "CT while cutter radius compensation is on is not read; write the arc with CR= or I and J"
-        raise ValueError(text)
-    table, normal = interpreter.table, interpreter.state.normal
-    k = table.blocks - 1
-    if k < 0 or table.block.kind[k] not in (Kind.LINE, Kind.RAPID, Kind.ARC):
-        raise ValueError("CT goes on in the direction of the move before it, and there is none")
-    end, begin = table.block.end[k], table.block.end[k - 1] if k else np.zeros(3)
-    if table.block.kind[k] == Kind.ARC:
-        _, centre, about, sweep = table.arcs[-1]
-        spoke = in_plane(end, normal) - in_plane(centre, normal)
-        way = spoke * (1j if sweep > 0 else -1j) * (1.0 if about == normal else 0.0)
-    else:
-        way = in_plane(end, normal) - in_plane(begin, normal)
+    travel, normal = making.travel, making.interpreter.state.normal
+    last = travel.last if travel.active else None
+    way = _executed(making.interpreter, normal) if last is None else last.leaving(normal)
     back = travel.unmapped(at_place(way, np.zeros(3), normal) + travel.shift)
     found = in_plane(back, normal)
-    if abs(found) == 0.0:
-        raise ValueError("CT goes on in the direction of the move before it, which is not in the plane")
+    if abs(found) == 0.0 or travel.lost:
+        raise ValueError("CT goes on in the direction of the move before it, and there is none in the plane")
     return found / abs(found)
+
+
+def _executed(interpreter: Interpreter, normal: int) -> complex:
+    """Tangent at the end of the last move in the plane that was executed, of any length; 0 for none."""
+    table = interpreter.table
+    arcs = {block: arc for block, *arc in table.arcs}
+    for k in range(table.blocks - 1, -1, -1):
+        end = in_plane(table.block.end[k], normal)
+        way = end - (in_plane(table.block.end[k - 1], normal) if k else 0j)
+        if k in arcs:
+            centre, about, sweep = arcs[k]
+            return (end - in_plane(centre, normal)) * (1j if sweep > 0 else -1j) * (about == normal)
+        if table.block.kind[k] == Kind.SPLINE or abs(way) > STANDS:
+            return way * (table.block.kind[k] != Kind.SPLINE)
+    return 0j
 
 
 def _target(making: Making, given: Mapping[str, float]) -> FloatArray:

@@ -36,6 +36,8 @@ class RowsThrough(travel_rows.Coordinates):
     place  : (3,) the programmed position [mm], while active
     moves  : how many moves have been taken
     absolute, motion : G90 is in force, and the motion code, while active
+    last   : the last move in the plane since rows are looked at, or None
+    lost   : an approach or departure came behind it: its direction is not that of the path
     """
 
     def __init__(self, interpreter: Interpreter):
@@ -52,6 +54,8 @@ class RowsThrough(travel_rows.Coordinates):
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[travel_rows.TravelRow] = []  # rows without a move behind it
         self.absolute, self.motion = True, 0
+        self.last: travel_rows.Move | None = None
+        self.lost = False
         self._ahead: list[travel_rows.TravelRow] = []  # rows that come before the next ones
 
     @property
@@ -70,7 +74,7 @@ class RowsThrough(travel_rows.Coordinates):
             out += self._restored(words)
             if out:
                 yield travel_rows.words_of(out, words.data, words.files)
-            self.active = False
+            self.active = self.lost = False
             yield words
             return
         for one in travel_rows.travel_rows_of(words):
@@ -193,6 +197,8 @@ class RowsThrough(travel_rows.Coordinates):
         )
         self.place, self._mapped = target, mapped
         self.moves += 1
+        if not move.stands(self.normal):
+            self.last, self.lost = move, False
         if self._corner is not None:
             (one, *between), move = self._corner.joined(move, self.normal)
             self._corner, waiting, self._between = None, self._between, []
@@ -232,6 +238,7 @@ class RowsThrough(travel_rows.Coordinates):
             return
         state = self.interpreter.state
         self.active, self.absolute, self.normal = True, state.absolute, state.normal
+        self.last = None
         self.motion = max(state.motion, 0) if state.motion <= 3 else 0
         if state.absolute_centre:
             raise ValueError("frames and compensation with absolute arc centres are not read")

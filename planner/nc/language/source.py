@@ -6,7 +6,7 @@ of rows (`tree.PlainRows`).
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.language.detect import bare, computes, may_compute, row_text
-from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
+from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace, Statements
 from planner.nc.lexer import BOM, Words
 
 _PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
@@ -79,11 +79,12 @@ class Source:
         place = SourcePlace(self.file, int(words.line[row]), self.begin + at)
         return SourceLine(row, place, start + self.begin, text.decode("latin-1"), float(self.scale[row]))
 
-    def in_order(self) -> Iterator[SourceLine | PlainRows]:
-        """The program in its order: lines of the language, and runs of plain rows between them."""
+    def in_order(self, *, messages: bool = True) -> Iterator[SourceLine | PlainRows]:
+        """The program in its order: lines of the language and, with `messages`, those with one in a comment,
+        and runs of plain rows between them."""
         waiting = [(row, self.line(row)) for row in self.lines]
         known = {row for row, _ in waiting}
-        for row, line in self._message_lines():
+        for row, line in self._message_lines() if messages else ():
             if row < len(self.words.line) and self.words.line[row] == line.place.line:
                 if row not in known:
                     waiting.append((row, self.line(row)))
@@ -134,3 +135,30 @@ class Source:
         match = re.match(rb"[^\s(;]{1,20}", self.words.data[at:])
         word = match.group().decode("utf-8", "replace") if match else ""
         return Fault(fault.place.line, self.words.column_at(at), word, fault.message, name)
+
+
+class LineParser(Statements):
+    """Makes statements of one file, line by line. Faults of all its lines are kept in `faults`."""
+
+    def __init__(self, source: Source):
+        super().__init__()
+        self.source = source
+
+    def read(self, items: Iterable[SourceLine | PlainRows]) -> None:
+        """Take the lines and plain rows of a program in its order."""
+        for item in items:
+            try:
+                if isinstance(item, PlainRows):
+                    self.take_plain(item)
+                else:
+                    self.take_line(item)
+            except ProgramFault as fault:
+                self.faults.append(fault)
+
+    def take_plain(self, rows: PlainRows) -> None:
+        """Rows of plain words."""
+        raise NotImplementedError
+
+    def take_line(self, line: SourceLine) -> None:
+        """A line of the language."""
+        raise NotImplementedError

@@ -80,7 +80,7 @@ class Travel(RowsThrough):
         radius = self._known_radius(assume) if approach.compensated else 0.0
         approach.begin(self._mapped, self.mapped(approach.first), self.motion, radius, self.mirrored)
         approach.scale = self.scale()
-        self._approach = approach
+        self._approach, self.lost = approach, True
         self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)
 
     def corner(self, kind: str, size: float, line: int) -> None:
@@ -101,6 +101,6 @@ class Travel(RowsThrough):
         end = None if departure.end is None else self.mapped(departure.end)
         out, there = departure.rows(offset, end)
         self._ahead += [self._in_units(row) for row in (*rows, *out)]
-        self._mapped, self._beside = there, False
+        self._mapped, self._beside, self.lost = there, False, True
         self.place = self.unmapped(there)
         self.motion = 1

@@ -1,6 +1,7 @@
 """Rows of words on their way to the interpreter, the moves that they say, in mm, and the frame that maps
 these and their arcs."""
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -78,6 +79,11 @@ class Move:
             return way / abs(way)
         spoke = in_plane(self.begin, normal) - in_plane(self.arc.centre, normal)
         return spoke / abs(spoke) * (1j if self.arc.sweep > 0 else -1j)
+
+    def leaving(self, normal: int) -> complex:
+        """Unit tangent at its end, in the plane."""
+        start = self.tangent(normal)
+        return start if self.arc is None else start * cmath.rect(1.0, self.arc.sweep)
 
 
 def arc_words(arc: Arc, begin: FloatArray, normal: int, at: int) -> list[tuple[int, float, int]]:

@@ -5,7 +5,7 @@ from collections import Counter
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
-from planner.nc.language.source import SourceLine
+from planner.nc.language.source import LineParser, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tokens import names, ranked
@@ -46,7 +46,7 @@ _TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
 _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
-class FanucControl(tree.Statements):
+class FanucControl(LineParser):
     """The statements so far, and the loops that are open, by their DO numbers."""
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:

@@ -76,7 +76,7 @@ class LatheParser(LatheWords):
             body.insert(int(percent), row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
-    def _line(self, line: SourceLine) -> None:
+    def take_line(self, line: SourceLine) -> None:
         match = _NUMBER.match(line.text.replace(" ", ""))
         number = int(match.group(1)) if match else -1
         begun = [pair for pair in self.pairs if pair[0] == number]
@@ -85,7 +85,7 @@ class LatheParser(LatheWords):
                 self.body.append(Goto(line.place, Number(float(_AFTER + pair[1]))))
         for pair in begun:
             self.profiles.setdefault(pair, (self.body, len(self.body), -1))
-        super()._line(line)
+        super().take_line(line)
         ended = [pair for pair in self.pairs if pair[1] == number]
         for pair in ended:
             body, first, last = self.profiles.get(pair, (None, 0, 0))

@@ -21,11 +21,10 @@ _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
 class FanucParser(FanucControl):
-    """Statements of one file. Faults of all its lines are kept in `faults`."""
+    """Statements of one file."""
 
     def __init__(self, source: Source):
-        super().__init__()
-        self.source = source
+        super().__init__(source)
         self.procedures: list[tree.Procedure] = []
         self.modal: tree.Call | None = None  # G66
         self.local: list[tuple[int, tree.SourcePlace, tree.Procedure]] = []  # M97
@@ -43,14 +42,7 @@ class FanucParser(FanucControl):
         self.targets = _targets(texts)
         self.calls_blocks = any("M97" in text for text in texts)
         self._begin("" if self.source.file == 0 else "file", tree.SourcePlace(self.source.file, 1, 0))
-        for item in items:
-            try:
-                if isinstance(item, tree.PlainRows):
-                    self._plain(item)
-                else:
-                    self._line(item)
-            except tree.ProgramFault as fault:
-                self.faults.append(fault)
+        self.read(items)
         self._end_of_program()
         for number, place, procedure in self.local:
             self._local_call(number, place, procedure)
@@ -76,7 +68,7 @@ class FanucParser(FanucControl):
         elif all(known.name != name for known in self.procedures):
             self.procedures.append(tree.Procedure(name, body[at[0]].place, body[at[0] :]))
 
-    def _plain(self, rows: tree.PlainRows) -> None:
+    def take_plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement, used labels between them, and G66 calls after those that move."""
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
@@ -99,7 +91,7 @@ class FanucParser(FanucControl):
         if begin < rows.last:
             self.body.append(self.source.part(rows, begin, rows.last))
 
-    def _line(self, line: SourceLine) -> None:
+    def take_line(self, line: SourceLine) -> None:
         reader = LineReader(line, LANGUAGE)
         if reader.take("/") and reader.kind() == "number":
             reader.pop()

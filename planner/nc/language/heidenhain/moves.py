@@ -1,16 +1,13 @@
 """Path functions as rows of words: L, C, CR, CT, LP, CP. (Roundings and chamfers: `corner_moves`.)
 
-The position, the pole and the normal of its plane, the last polar coordinates and the direction of the last
-move are variables of the running program, since coordinates may be computed and incremental. Rows carry
-absolute coordinates. PA counts from +X, +Y or +Z to the other axis of the pole's plane; arcs about it lie in
-that plane, DR+ as G3 in G17, G19 and G18 (TNC 640, conversational programming, polar coordinates).
-
-CT's centre lies on the normal n of the direction at the start, at radius = |v|^2 / (2 n v), v from start to
-end; behind CR the direction is that of the moves that were executed (`makers.tangent_arc`).
+The position, the pole and the normal of its plane, and the last polar coordinates are variables of the
+running program, since coordinates may be computed and incremental. Rows carry absolute coordinates. PA counts
+from +X, +Y or +Z to the other axis of the pole's plane; arcs about it lie in that plane, DR+ as G3 in G17,
+G19 and G18 (TNC 640, conversational programming, polar coordinates).
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from planner.nc.arcs import IN_PLANE
@@ -19,15 +16,10 @@ from planner.nc.language.approach import KINDS
 from planner.nc.language.heidenhain import text
 
 Words = list[tuple[str, tree.Expression]]
-Assigned = list[tuple[tree.Parameter, tree.Expression]]
 Ends = dict[str, tree.Expression]  # absolute coordinates by axis
 _AXES = "XYZ"
 _WORKING = 2  # normal of the working plane: the tool axis is Z
 _PLANE_CODES = {0: 19.0, 1: 18.0}
-_NO_DIRECTION = (
-    (text.DIRECTION[0], tree.ZERO),
-    (text.DIRECTION[1], tree.ZERO),
-)  # behind arcs whose end has no direction here
 OUT_OF_PLANE = "out of the pole's plane, or in it beside polar coordinates, belongs to no such move"
 _FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
@@ -60,15 +52,11 @@ class Moves:
     def straight(self, block: text.Block, given: text.Items, ends: Ends, machine: bool = False) -> text.Rows:
         """L and LP: a straight move to absolute coordinates."""
         feed = self.feed_words(block, given)
-        assigned = _assigned(ends)
-        if "X" in ends or "Y" in ends:
-            way = ends.get("X", text.X) - text.X, ends.get("Y", text.Y) - text.Y
-            assigned += zip(text.DIRECTION, way, strict=True)
         if not ends:
             return [tree.row(block.place, *feed)] if feed else []
         codes: Words = [("G", tree.Number(53.0))] if machine else []
         codes.append(("G", tree.ZERO if given.fast else tree.ONE))
-        return [tree.row(block.place, *codes, *feed, *ends.items(), assigned=tuple(assigned))]
+        return [tree.row(block.place, *codes, *feed, *ends.items(), assigned=_assigned(ends))]
 
     def by_plane(self, block: text.Block, rows: Callable[[int], text.Rows | None]) -> text.Rows:
         """The block's rows by the normal of the pole's plane, None for no such plane. Raises ProgramFault."""
@@ -90,7 +78,7 @@ class Moves:
         def rows(normal: int) -> text.Rows | None:
             if _AXES[normal] in ends:
                 return None
-            return self._arc(block, given, ends, code, text.POLE, given.turn, normal=normal)
+            return self._arc(block, given, ends, code, normal)
 
         return self.by_plane(block, rows)
 
@@ -100,27 +88,21 @@ class Moves:
         given: text.Items,
         ends: Ends,
         code: tree.Expression,
-        centre: Sequence[tree.Expression],
-        turn: int | tree.Expression,
+        normal: int,
         turns: tree.Expression | None = None,
-        normal: int = _WORKING,
     ) -> text.Rows:
-        """An arc about centre, which is a place by axis."""
+        """An arc about the pole."""
         if given.fast:
             raise block.fault(_FAST_ARC)
         words: Words = [("G", code), *self.feed_words(block, given), *ends.items()]
-        words += [("IJK"[a], centre[a] - text.POSITION[_AXES[a]]) for a in IN_PLANE[normal]]
+        words += [("IJK"[a], text.POLE[a] - text.POSITION[_AXES[a]]) for a in IN_PLANE[normal]]
         if turns is not None:
             words.append(("P", turns))
-        assigned = _assigned(ends)
-        if normal != _WORKING:
-            assigned += _NO_DIRECTION
-            plane, back = (tree.row(block.place, ("G", g)) for g in (_PLANE_CODES[normal], 17.0))
-            return [plane, tree.row(block.place, *words, assigned=tuple(assigned)), back]
-        out = ends.get("X", text.X) - centre[0], ends.get("Y", text.Y) - centre[1]
-        sign = tree.Number(float(turn)) if isinstance(turn, int) else turn
-        assigned += [(text.DIRECTION[0], -(sign * out[1])), (text.DIRECTION[1], sign * out[0])]
-        return [tree.row(block.place, *words, assigned=tuple(assigned))]
+        arc = tree.row(block.place, *words, assigned=_assigned(ends))
+        if normal == _WORKING:
+            return [arc]
+        plane, back = (tree.row(block.place, ("G", g)) for g in (_PLANE_CODES[normal], 17.0))
+        return [plane, arc, back]
 
     def radius_arc(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
         """CR: an arc of a given radius."""
@@ -130,37 +112,18 @@ class Moves:
             raise block.fault(_FAST_ARC)
         words = [("G", _arc_code(block, given)), *self.feed_words(block, given), *ends.items()]
         words.append(("R", given.radius))
-        return [tree.row(block.place, *words, assigned=(*_assigned(ends), *_NO_DIRECTION))]
+        return [tree.row(block.place, *words, assigned=_assigned(ends))]
 
     def tangent_arc(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
         """CT: the arc that goes on in the direction of the last move."""
-        v = ends.get("X", text.X) - text.X, ends.get("Y", text.Y) - text.Y
-        length = tree.op("LEN", *text.DIRECTION)
-        normal = -text.DIRECTION[1] / length, text.DIRECTION[0] / length
-        radius, centre, turn = text.own("r"), (text.own("tx"), text.own("ty")), text.own("turn")
-        left = tree.op("GT", radius, tree.ZERO)
-        known: text.Rows = [
-            tree.assign(
-                block.place,
-                (radius, (v[0] * v[0] + v[1] * v[1]) / (tree.TWO * (normal[0] * v[0] + normal[1] * v[1]))),
-            ),
-            tree.assign(
-                block.place,
-                (centre[0], text.X + radius * normal[0]),
-                (centre[1], text.Y + radius * normal[1]),
-            ),
-            tree.assign(block.place, (turn, tree.TWO * left - tree.ONE)),
-            *self._arc(block, given, ends, tree.TWO + left, centre, turn),
-        ]
-        looked: text.Rows = [
-            tree.MadeRows(block.place, "tangent arc", (*ends.items(), *self.feed_words(block, given))),
-            tree.assign(block.place, *_assigned(ends)),
-        ]
-        return [tree.If(block.place, ((tree.op("EQ", length, tree.ZERO), looked),), known)]
+        if given.fast:
+            raise block.fault(_FAST_ARC)
+        arc = tree.MadeRows(block.place, "tangent arc", (*ends.items(), *self.feed_words(block, given)))
+        return [arc, tree.assign(block.place, *_assigned(ends))]
 
     def polar(self, block: text.Block, given: text.Items) -> text.Rows:
         """The statement that finds the polar coordinates of LP and CTP."""
-        change: Assigned = []
+        change: list[tuple[tree.Parameter, tree.Expression]] = []
         for name, variable in zip(("PR", "PA"), text.POLAR, strict=True):
             if name in given.polar:
                 change.append((variable, given.polar[name]))
@@ -218,7 +181,7 @@ class Moves:
             ends = self.polar_ends(block, given, normal)
             if ends is None:
                 return None
-            return [before, *self._arc(block, given, ends, code, text.POLE, given.turn, turns, normal)]
+            return [before, *self._arc(block, given, ends, code, normal, turns)]
 
         return self.by_plane(block, rows)
 
@@ -230,8 +193,8 @@ def _arc_code(block: text.Block, given: text.Items) -> tree.Expression:
     return tree.Number(3.0 if given.turn > 0 else 2.0)
 
 
-def _assigned(ends: Ends) -> Assigned:
-    return [(text.POSITION[axis], end) for axis, end in ends.items() if axis in text.POSITION]
+def _assigned(ends: Ends) -> tree.Assignments:
+    return tuple((text.POSITION[axis], end) for axis, end in ends.items() if axis in text.POSITION)
 
 
 def approach_rows(block: text.Block, feed: tree.Expression | None) -> tuple[text.Rows, text.Items]:

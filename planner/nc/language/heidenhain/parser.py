@@ -72,8 +72,7 @@ class HeidenhainParser(Definitions):
         ]
         if not source.file:
             set_up += [(one, tree.ZERO) for one in (text.X, text.Y, text.Z, *text.POLE, *text.POLAR)]
-            set_up += [(text.own(name), tree.ZERO) for name in ("dx", "dy", "cycle")]
-            set_up.append((text.PLANE, tree.TWO))
+            set_up += [(text.own("cycle"), tree.ZERO), (text.PLANE, tree.TWO)]
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 

@@ -193,7 +193,6 @@ X, Y, Z = own("x"), own("y"), own("z")
 POSITION = {"X": X, "Y": Y, "Z": Z}
 POLE = own("cx"), own("cy"), own("cz")
 PLANE = own("plane")  # the normal of the pole's plane, 0 to 2
-DIRECTION = own("dx"), own("dy")
 POLAR = own("pr"), own("pa")
 
 

@@ -10,7 +10,7 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
-from planner.nc.language.source import Source, SourceLine
+from planner.nc.language.source import LineParser, Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import LinuxcncVariables
 from planner.nc.language.tokens import names, ranked
@@ -50,12 +50,11 @@ def _needed(condition: tree.Expression | None, keyword: str, line: SourceLine) -
     return condition
 
 
-class LinuxcncParser(tree.Statements):
-    """Statements of one file. Faults of all its lines are kept in `faults`."""
+class LinuxcncParser(LineParser):
+    """Statements of one file."""
 
     def __init__(self, source: Source):
-        super().__init__()
-        self.source = source
+        super().__init__(source)
         self.procedures: dict[str, tree.Procedure] = {}  # subprograms by their labels
         self.plain_sub = ""  # the subprogram of the O100 ... M99 kind that is being read
         self.ended = False  # the main program has ended; subprograms may follow
@@ -125,14 +124,7 @@ class LinuxcncParser(tree.Statements):
 
     def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
-        for item in self.source.in_order():
-            if isinstance(item, tree.PlainRows):
-                self._plain(item)
-                continue
-            try:
-                self._line(item)
-            except tree.ProgramFault as fault:
-                self.faults.append(fault)
+        self.read(self.source.in_order())
         for left in self.open[:1] if not self.faults else ():
             end = "while [condition]" if left.kind == "do" else f"end{left.kind}"
             text = f"this {left.kind} has no end; write o{left.label} {end}"
@@ -142,7 +134,7 @@ class LinuxcncParser(tree.Statements):
             *self.procedures.values(),
         ]
 
-    def _plain(self, rows: tree.PlainRows) -> None:
+    def take_plain(self, rows: tree.PlainRows) -> None:
         in_main = self.body is self.main
         if not (in_main and self.ended):
             self.body.append(rows)
@@ -150,7 +142,7 @@ class LinuxcncParser(tree.Statements):
         ends = ((letter == ord("M")) & ((value == 2.0) | (value == 30.0))).any()
         self.ended |= in_main and rows.may_end and bool(ends)
 
-    def _line(self, line: SourceLine) -> None:
+    def take_line(self, line: SourceLine) -> None:
         reader = LineReader(line, LANGUAGE)
         reader.take("/")
         if reader.take("O"):

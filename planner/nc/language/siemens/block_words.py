@@ -7,6 +7,8 @@ G40 G41 G42                     radius compensation (NORM, G450)
 """
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.language import tree
@@ -15,114 +17,137 @@ from planner.nc.language.making import assumed_row
 from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.commands import Commands
 from planner.nc.language.siemens.text import LineTokens, position
-from planner.nc.language.source import Source
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": "arc through", "CT": "tangent arc"}
+EACH_LINE = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
 _ANGLES = "choose a post-processor that writes the angles of the rotary axes (A=, B=, C=)"
 
 
-class BlockWords(Commands):
-    """Rows of words. source : the file; circular : CIP or CT was written, and no other motion code since."""
+@dataclass
+class Row:
+    """The words of a line so far."""
 
-    source: Source
+    words: list[tree.Word] = field(default_factory=list)
+    assigned: list[tuple[tree.Parameter, tree.Expression]] = field(default_factory=list)
+    before: list[tree.Statement] = field(default_factory=list)  # corners and compensation, before the row
+    codes: set[float] = field(default_factory=set)  # numbers of its G codes
+    arc: str = ""  # CIP or CT
+    through: dict[str, tree.Expression] = field(default_factory=dict)  # I1 J1 K1 of CIP
+    stops: bool = False  # it ends in a full stop
+
+    def has(self, letters: str) -> bool:
+        """True if there is a word with one of the letters."""
+        return any(word.letter in letters for word in self.words)
+
+
+class BlockWords(Commands):
+    """Rows of words. circular : CIP or CT was written, and no other motion code since."""
+
     circular = False
-    centre_feed = False  # the program has CFTCP
 
     def _words(self, reader: LineTokens) -> None:
-        words: list[tree.Word] = []
-        assigned: list[tuple[tree.Parameter, tree.Expression]] = []
-        found: set[float] = set()
-        stops = moved = False
-        before: list[tree.MadeRows] = []  # corners and compensation, before the row
-        arc, through = "", {}
+        row = Row()
         while not reader.ended:
-            token, at = reader.tokens[reader.next], reader.at()
-            reader.next += 1
-            if token.kind not in ("name", "word"):
-                reader.next -= 1
-                raise reader.fault(f"{token.text} starts neither a word nor a command")
+            if reader.kind() not in ("name", "word"):
+                raise reader.fault(f"{reader.peek()} starts neither a word nor a command")
+            at, token = reader.at(), reader.pop()
             name = token.text
-            if name in _ARCS:
-                arc, self.circular = name, True
-            elif name in CORNERS:
-                reader.expect("=")
-                corner = tree.made(reader.place, "corner", kind=CORNERS.index(name), size=reader.expression())
-                before.append(corner)
-            elif name in ("I1", "J1", "K1") and arc == "CIP":
+            if name in _COMMANDS:
+                _COMMANDS[name](self, reader, row)
+            elif name in ("I1", "J1", "K1") and row.arc == "CIP":
                 axis = "XYZ"["IJK".index(name[0])]
                 value = self._given(reader, axis, at)
                 assert value is not None
-                through[f"{axis}1"] = self._absolute(axis, value)
-            elif name == "SUPA":
-                words.append(tree.word("G", at, 53.0))
-            elif name in cycles.ARGUMENTS or name in ("CYCLE800", "CYCLE832"):
-                self._cycle(reader, name)
-            elif name == "KONT" and self.compensates:
-                raise reader.fault("KONT, another approach to the contour, is not read; write NORM", token.at)
-            elif name == "STOPRE":  # the block before it ends in an exact stop, until the control has read on
-                stops = True
-            elif name in commands.SAID:
-                before.append(assumed_row(reader.place, commands.SAID[name]))
-                _skip(reader)
-            elif name in commands.IDLE or (name in commands.IDLE_CALLS and reader.peek() in ("(", "=", "[")):
+                row.through[f"{axis}1"] = self._absolute(axis, value)
+            elif name in commands.IDLE_CALLS and reader.peek() in ("(", "=", "["):
                 _skip(reader)
             elif reader.peek() == ("[" if name == "R" else "=") and (target := reader.parameter(token)):
                 reader.expect("=")
-                assigned.append((target, reader.expression()))
+                row.assigned.append((target, reader.expression()))
             else:
-                for one in self._word(reader, name, at):
-                    letter, code = one.letter, one.value
-                    if letter == "G" and isinstance(code, tree.Number):
-                        if code.value in _SIDES:
-                            side = _SIDES[int(code.value)]
-                            before.insert(0, tree.made(reader.place, "compensate", side=side))
-                            continue
-                        self.circular &= code.value not in (0.0, 1.0, 2.0, 3.0)
-                        found.add(code.value)
-                        stops |= code.value == 9.0
-                        if code.value == 9.0:
-                            continue
-                    moved |= letter in "XY"
-                    words.append(one)
-        if 4.0 in found:
-            seconds = [one._replace(letter="P") for one in words if one.letter == "F"]
-            words = [one for one in words if one.letter not in "FS"] + seconds
-            if not any(one.letter == "P" for one in words):
+                for word in self._word(reader, name, at):
+                    self._take(reader, row, word)
+        self._append_row(reader, row)
+
+    def _arc(self, reader: LineTokens, row: Row) -> None:
+        row.arc, self.circular = reader.peek(-1), True
+
+    def _corner(self, reader: LineTokens, row: Row) -> None:
+        kind = CORNERS.index(reader.peek(-1))
+        reader.expect("=")
+        row.before.append(tree.made(reader.place, "corner", kind=kind, size=reader.expression()))
+
+    def _machine(self, reader: LineTokens, row: Row) -> None:
+        """SUPA: machine coordinates."""
+        row.words.append(tree.word("G", reader.start + reader.tokens[reader.next - 1].at, 53.0))
+
+    def _soft_approach(self, reader: LineTokens, row: Row) -> None:
+        if self.compensates:
+            text = "KONT, another approach to the contour, is not read; write NORM"
+            raise reader.fault(text, reader.tokens[reader.next - 1].at)
+        _skip(reader)
+
+    def _stop_reading(self, reader: LineTokens, row: Row) -> None:
+        """STOPRE: the block before it ends in an exact stop, until the control has read on."""
+        row.stops = True
+
+    def _assumed(self, reader: LineTokens, row: Row) -> None:
+        row.before.append(assumed_row(reader.place, commands.SAID[reader.peek(-1)]))
+        _skip(reader)
+
+    def _take(self, reader: LineTokens, row: Row, word: tree.Word) -> None:
+        """A word of RS274NGC; G40, G41, G42 and G9 are no words of the row."""
+        if word.letter == "G" and isinstance(word.value, tree.Number):
+            code = word.value.value
+            if code in _SIDES:
+                row.before.insert(0, tree.made(reader.place, "compensate", side=_SIDES[int(code)]))
+                return
+            self.circular &= code not in (0.0, 1.0, 2.0, 3.0)
+            row.codes.add(code)
+            if code == 9.0:
+                row.stops = True
+                return
+        row.words.append(word)
+
+    def _append_row(self, reader: LineTokens, row: Row) -> None:
+        """The statements of the line: what comes before its row, the row, what follows it."""
+        moved = row.has("XY")
+        if 4.0 in row.codes:
+            seconds = [word._replace(letter="P") for word in row.words if word.letter == "F"]
+            row.words = [word for word in row.words if word.letter not in "FS"] + seconds
+            if not row.has("P"):
                 text = "G4 S, a dwell in turns of the spindle, is not read; write G4 F with seconds"
                 raise reader.fault(text, 0)
-        returns = commands.RETURNS if self.source.file else (17,)
-        ended = [one for one in words if one.code in {f"M{number}" for number in returns}]
-        words = [one for one in words if one not in ended]
-        words += [tree.word("M", one.at, 30.0) for one in ended if not self.source.file]
-        self.body += before
-        if self.circular and any(one.letter in "XYZ" for one in words):
-            words = self._circle(reader, arc, words, through)
-        if words or assigned:
-            self.body.append(tree.Line(reader.place, tuple(words), tuple(assigned)))
-        if stops:
+        ends = {f"M{number}" for number in (commands.RETURNS if self.source.file else (17,))}
+        ended = [word for word in row.words if word.code in ends]
+        row.words = [word for word in row.words if word not in ended]
+        row.words += [tree.word("M", word.at, 30.0) for word in ended if not self.source.file]
+        self.body += row.before
+        if self.circular and row.has("XYZ"):
+            self._circle(reader, row)
+        if row.words or row.assigned:
+            self.body.append(tree.Line(reader.place, tuple(row.words), tuple(row.assigned)))
+        if row.stops:
             self.body.append(tree.row(reader.place, ("G", 4.0), ("P", tree.ZERO)))
         if moved and self.cycle is not None:
             self.body += self.cycle
         if ended and self.source.file:
             self._return(reader)
 
-    def _circle(
-        self, reader: LineTokens, arc: str, words: list[tree.Word], through: dict[str, tree.Expression]
-    ) -> list[tree.Word]:
-        if not arc:
-            text = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
-            raise reader.fault(text, 0)
-        given = dict(through)
-        for one in words:
-            letter = one.letter
-            if letter in "XYZ":
-                given[letter] = self._absolute(letter, one.value)
-            elif letter == "F":
-                given["F"] = one.value
-        self.body.append(tree.made(reader.place, _ARCS[arc], **given))
-        return [one for one in words if one.letter not in "XYZF"]
+    def _circle(self, reader: LineTokens, row: Row) -> None:
+        """The arc of CIP or CT, which takes the row's coordinates and feed."""
+        if not row.arc:
+            raise reader.fault(EACH_LINE, 0)
+        given = dict(row.through)
+        for word in row.words:
+            if word.letter in "XYZ":
+                given[word.letter] = self._absolute(word.letter, word.value)
+            elif word.letter == "F":
+                given["F"] = word.value
+        self.body.append(tree.made(reader.place, _ARCS[row.arc], **given))
+        row.words = [word for word in row.words if word.letter not in "XYZF"]
 
     def _absolute(self, axis: str, given: tree.Expression) -> tree.Expression:
         return given if self.absolute else position(axis) + given
@@ -160,7 +185,7 @@ class BlockWords(Commands):
             raise reader.fault(text, at - reader.start)
         if code == 621:
             self.body.append(assumed_row(reader.place, "corner feed"))
-        if code in (41, 42) and not self.centre_feed:
+        if code in (41, 42) and b"CFTCP" not in self.source.words.data:
             self.body.append(assumed_row(reader.place, "tool centre feed"))
         if code == 500:
             origin = (("G", 10.0), ("L", 2.0), ("P", 9.0), ("X", 0.0), ("Y", 0.0), ("Z", 0.0))
@@ -188,3 +213,19 @@ def _skip(reader: LineTokens) -> None:
             raise reader.fault(") is missing")
         depth += (reader.peek() in ("(", "[")) - (reader.peek() in (")", "]"))
         reader.next += 1
+
+
+# What is read by its name. A new command is a line here and a method above.
+_COMMANDS: dict[str, Callable[[BlockWords, LineTokens, Row], None]] = {
+    **dict.fromkeys(commands.IDLE, lambda words, reader, row: _skip(reader)),
+    **dict.fromkeys(commands.SAID, BlockWords._assumed),
+    **dict.fromkeys(_ARCS, BlockWords._arc),
+    **dict.fromkeys(CORNERS, BlockWords._corner),
+    **dict.fromkeys(
+        (*cycles.ARGUMENTS, "CYCLE800", "CYCLE832"),
+        lambda words, reader, row: words._cycle(reader, reader.peek(-1)),
+    ),
+    "SUPA": BlockWords._machine,
+    "KONT": BlockWords._soft_approach,
+    "STOPRE": BlockWords._stop_reading,
+}

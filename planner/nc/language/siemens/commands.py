@@ -11,6 +11,7 @@ from planner.nc.language import tree
 from planner.nc.language.makers import ADDED, SIEMENS
 from planner.nc.language.siemens import cycles
 from planner.nc.language.siemens.text import LineTokens, SiemensControl, handed_over, position, variable
+from planner.nc.language.source import Source
 
 # Letters of words with the same meaning in RS274NGC.
 PLAIN_LETTERS = "NGXYZIJKFSM"
@@ -63,6 +64,7 @@ _OF_THE_CONTROL = re.compile(
     r"CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|RND|RNDM|CHF|CHR|POLY|BSPLINE|ASPLINE|CSPLINE|SPLINEPATH|CIP|CT|INVCW|INVCCW|"
     r"TANG\w*|TRA\w*|COUP\w*|G\d+|DISR|DISCL|ANG|AP|RP|OFFN|FB|FA|SETPIECE|EXTCALL|PCALL|MCALL|STOPRE|ORI\w*|A3|B3|C3|LEAD|TILT|STR\w*"
 )
+_COMPENSATES = re.compile(rb"G4[12]\b")
 _TIMES = re.compile(r"P(\d+)")
 _NAMES_MAX = 32  # parameters of a subprogram
 
@@ -70,14 +72,13 @@ _NAMES_MAX = 32  # parameters of a subprogram
 class Commands(SiemensControl):
     """Settings by commands."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, source: Source):
+        super().__init__(source)
         self.names: set[str] = set()  # of the variables
         self.absolute = True  # G90 is in force
         self.unit = 1.0  # mm per unit of the program
         self.cycle: list[tree.Statement] | None = None  # of MCALL, which follows every row that moves
-        self.compensates = False  # the file has G41 or G42
-        self.at_tip = False  # the machine has kinematics
+        self.compensates = bool(_COMPENSATES.search(source.words.data))  # the file has G41 or G42
 
     def _cycle(self, reader: LineTokens, name: str) -> None:
         place = reader.place
@@ -199,7 +200,7 @@ class Commands(SiemensControl):
         at = reader.tokens[reader.next - 1].at
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
             raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
-        if self.at_tip:
+        if self.source.at_tip:
             self.body.append(tree.row(reader.place, ("M", TOOL_POINT[name])))
         elif name == "TRAORI":
             text = "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file"

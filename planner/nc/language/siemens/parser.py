@@ -11,43 +11,24 @@ import numpy as np
 
 from planner.nc.language.makers import SIEMENS
 from planner.nc.language.siemens import commands, cycles
-from planner.nc.language.siemens.block_words import BlockWords
+from planner.nc.language.siemens.block_words import EACH_LINE, BlockWords
 from planner.nc.language.siemens.text import LineTokens, variable
-from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import ONE, ZERO, Procedure, ProgramFault, SourcePlace, assign
+from planner.nc.language.source import SourceLine
+from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
-_COMPENSATES = re.compile(rb"G4[12]\b")
 _TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
 class SiemensParser(BlockWords):
-    """Statements of one file. Faults of all its lines are kept in `faults`."""
-
-    def __init__(self, source: Source):
-        super().__init__()
-        self.source, self.at_tip = source, source.at_tip
-        self.compensates = bool(_COMPENSATES.search(source.words.data))
-        self.centre_feed = b"CFTCP" in source.words.data
+    """Statements of one file."""
 
     def parse(self) -> list[Procedure]:
         """The main program, under the empty name."""
         start = SourcePlace(self.source.file, 1, self.source.begin)
-        special = self._special()
-        done, rows = 0, len(self.source.words.line)
-        for row in [*special, rows]:
-            if row > done:
-                self._plain(done, row)
-            if row < rows:
-                try:
-                    self._line(self.source.line(row))
-                except ProgramFault as fault:
-                    self.faults.append(fault)
-                except RecursionError:
-                    place = self.source.line(row).place
-                    self.faults.append(ProgramFault(place, "the line is nested too deep"))
-            done = row + 1
+        self.source.lines = self._special()
+        self.read(self.source.in_order(messages=False))
         for left in self.open[:1]:
             self.faults.append(ProgramFault(left.place, f"this {left.kind} has no end"))
         first = assign(start, *((variable(f"_count{k}"), ZERO) for k in range(self.counters)))
@@ -64,38 +45,33 @@ class SiemensParser(BlockWords):
         found = words.rows_with(np.flatnonzero(~same))
         return [row for row in found if letter[words.first[row]] != ord("%")]
 
-    def _plain(self, first: int, last: int) -> None:
+    def take_plain(self, rows: PlainRows) -> None:
         """Rows of plain words; while a cycle is modal, each that moves is followed by it."""
+        one_by_one = range(rows.first - self.source.first_row, rows.last - self.source.first_row)
         if self.circular:
-            self._check_motion(first, last)
-        for run in self.source.plain(first, last):
-            letter, value = self.source.words_of(run)
-            modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
-            self.absolute = bool(modes[-1] == 90) if len(modes) else self.absolute
-            if self.cycle is None:
-                self.body.append(run)
-                continue
-            for row in range(first, last):
-                for one in self.source.plain(row, row + 1):
-                    self.body.append(one)
-                if np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any():
-                    self.body += self.cycle
+            self._check_motion(one_by_one)
+        letter, value = self.source.words_of(rows)
+        modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
+        self.absolute = bool(modes[-1] == 90) if len(modes) else self.absolute
+        if self.cycle is None:
+            self.body.append(rows)
             return
+        for row in one_by_one:
+            self.body += self.source.plain(row, row + 1)
+            if np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any():
+                self.body += self.cycle
 
-    def _check_motion(self, first: int, last: int) -> None:
+    def _check_motion(self, rows: range) -> None:
         """Plain rows behind CIP or CT: a motion code comes before coordinates. Raises ProgramFault."""
-        words = self.source.words
-        for row in range(first, last):
-            letter, value = words.of_rows(row)
+        for row in rows:
+            letter, value = self.source.words.of_rows(row)
             if ((letter == ord("G")) & np.isin(value, (0, 1, 2, 3))).any():
                 self.circular = False
                 return
             if np.isin(letter, (ord("X"), ord("Y"), ord("Z"))).any():
-                found = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
-                self.faults.append(ProgramFault(self.source.line(row).place, found))
-                return
+                raise self.source.line(row).fault(EACH_LINE)
 
-    def _line(self, line: SourceLine) -> None:
+    def take_line(self, line: SourceLine) -> None:
         # without the comment; a semicolon in a text is none
         text = re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", line.text.rstrip("\r\n\x1a"))
         at = 0

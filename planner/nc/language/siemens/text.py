@@ -15,6 +15,7 @@ from collections.abc import Container
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
+from planner.nc.language.source import LineParser, Source
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
 from planner.nc.language.tokens import Token, TokenReader, names, ranked
 
@@ -137,11 +138,11 @@ class LineTokens(TokenReader):
         return variable(token.text) if token.text in self.names else None
 
 
-class SiemensControl(tree.Statements):
+class SiemensControl(LineParser):
     """Control statements."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, source: Source):
+        super().__init__(source)
         self.labels: dict[str, int] = {}  # their numbers in the tree, by name
         self.counters = 0  # how many sections are repeated by their labels
         self.lines: dict[str, list[tree.Statement]] = {}  # the statements of lines with labels

@@ -9,12 +9,11 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import RAD_PER_DEG
-from planner.machine import LINEAR_AXES
 from planner.nc.arcs import Arc
 from planner.nc.faults import Notes
 from planner.nc.program import FEED_MOVES, EventTable, Frame, Kind, Origins, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
-from planner.nc.state import LETTERS, ROTARY, State, rotary_feed
+from planner.nc.state import DEGREES, State, rotary_feed
 
 _COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
 
@@ -23,8 +22,7 @@ class BlockColumns(NamedTuple):
     """The blocks of a program, fields of `Program`, with room to spare."""
 
     kind: Array  # uint8
-    end: FloatArray  # (., 3)
-    further: FloatArray  # (., F) of the further axes that are read, in degrees and mm
+    end: FloatArray  # (., A) of the axes that are read, in mm and degrees
     feed: FloatArray
     line: Array  # int32
     path_control: Array  # uint8
@@ -32,10 +30,10 @@ class BlockColumns(NamedTuple):
     frame: Array  # int32
 
     @classmethod
-    def empty(cls, further: int) -> BlockColumns:
-        """No blocks yet, with so many further axes."""
+    def empty(cls, axes: int) -> BlockColumns:
+        """No blocks yet, with so many axes."""
         kind, feed, line = np.empty(0, dtype=np.uint8), np.empty(0), np.empty(0, dtype=np.int32)
-        return cls(kind, np.empty((0, 3)), np.empty((0, further)), feed, line, kind, feed, line)
+        return cls(kind, np.empty((0, axes)), feed, line, kind, feed, line)
 
 
 class EventColumns(NamedTuple):
@@ -58,12 +56,12 @@ class BlockTable:
     New blocks stand in the call `frame`. The compiled loop over plain rows writes into the columns directly
     and sets the counts."""
 
-    def __init__(self, further: int = 0) -> None:
+    def __init__(self, axes: int = 3) -> None:
         self.blocks = 0
         self.events = 0
         self.refusals = 0
         self.frame = 0
-        self.block = BlockColumns.empty(further)
+        self.block = BlockColumns.empty(axes)
         self.event = EventColumns.empty()
         self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
@@ -90,25 +88,15 @@ class BlockTable:
         block.kind[k] = kind
         block.end[k] = state.place
         block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
-        if block.further.shape[1]:
-            self._add_further(kind, state)
+        if state.others and kind == Kind.LINE:
+            moved = block.end[k] != (block.end[k - 1] if k else 0.0)
+            if moved[state.turns].any() and not moved[~state.turns].any():
+                block.feed[k] = rotary_feed(state.feed, state.feed_unit)
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance
         block.frame[k] = self.frame
         self.blocks += 1
-
-    def _add_further(self, kind: Kind, state: State) -> None:
-        """The further axes of the block, and its feed where no linear axis moves."""
-        block, k, columns = self.block, self.blocks, state.further.columns
-        block.further[k] = state.further.position[columns]
-        if kind != Kind.LINE:
-            return
-        begin = (block.end[k - 1], block.further[k - 1]) if k else (np.zeros(3), np.zeros(len(columns)))
-        linear = np.array(columns) >= ROTARY
-        turned = block.further[k] != begin[1]
-        if turned.any() and not turned[linear].any() and (block.end[k] == begin[0]).all():
-            block.feed[k] = rotary_feed(state.feed, state.feed_unit)
 
     def add_arc(self, arc: Arc, normal: int, line: int, state: State) -> None:
         """Append an arc about a normal axis that ends where the tool is."""
@@ -138,16 +126,8 @@ class BlockTable:
     def keep_origin(self, state: State) -> None:
         """Keep where programmed zero is from here on, if that has changed."""
         last = self.origins[-1] if self.origins else (0, np.zeros(3), False)
-        if state.rotated != last[2] or not np.array_equal(state.offset, last[1]):
-            self.origins.append((self.blocks, state.offset.copy(), state.rotated))
-
-    def _spline_points(self, further: FloatArray) -> FloatArray:
-        """(K, 4, A) control points of the splines, along which the further axes (B, F) stand still."""
-        points = np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3)
-        if not further.shape[1]:
-            return points
-        still = further[np.array([spline[0] for spline in self.splines], dtype=np.int64)]
-        return np.concatenate([points, np.repeat(still[:, None], 4, axis=1)], axis=2)
+        if state.rotated != last[2] or not np.array_equal(state.offset[:3], last[1]):
+            self.origins.append((self.blocks, state.offset[:3].copy(), state.rotated))
 
     def finish(
         self,
@@ -155,37 +135,41 @@ class BlockTable:
         notes: Notes,
         frames: Sequence[Frame] = (),
         reading: Reading = AS_USUAL,
-        further: str = "",
+        letters: str = "XYZ",
     ) -> Program:
         """The program read so far; the arrays are cut to size, so that the spare room is given back.
 
         frames  : the calls that the blocks stand in, for an expanded program
-        further : letters of the further axes that are read; those that move become axes of the program,
-                  rotary ones in rad
+        letters : of the axes that are read; x, y, z and those that move become axes of the program, rotary
+                  ones in rad
         """
         used, seen = slice(0, self.blocks), slice(0, self.events)
         dwell = np.zeros(self.blocks)
         for block, seconds in self.dwells:
             dwell[block] = seconds
-        names = [c for k, c in enumerate(further) if self.block.further[used, k].any()]
-        units = [RAD_PER_DEG if LETTERS.index(c) < ROTARY else 1.0 for c in names]
-        moved = self.block.further[used][:, [further.index(c) for c in names]] * np.array(units)
-        centres = np.array([arc[1] for arc in self.arcs]).reshape(-1, 3)
+        columns = [k for k in range(len(letters)) if k < 3 or self.block.end[used, k].any()]
+        end = self.block.end[used][:, columns]
+        end[:, [letters[k] in DEGREES for k in columns]] *= RAD_PER_DEG
+        others = len(columns) - 3
+        centres = np.array([arc[1][:3] for arc in self.arcs]).reshape(-1, 3)
+        of_spline = np.array([spline[0] for spline in self.splines], dtype=np.int64)
+        points = np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3)
+        still = np.repeat(end[of_spline, None, 3:], 4, axis=1)  # the other axes stand along a spline
         return Program(
             source=source,
-            axes=LINEAR_AXES + tuple(letter.lower() for letter in names),
-            start=np.zeros(3 + len(names)),
-            end=np.hstack([self.block.end[used], moved]) if names else self.block.end[used].copy(),
+            axes=tuple(letters[k].lower() for k in columns),
+            start=np.zeros(len(columns)),
+            end=end,
             dwell=dwell,
             **{name: getattr(self.block, name)[used].copy() for name in _COPIED},
             synchronised=np.array(self.synchronised, dtype=np.int64),
             arc_block=np.array([arc[0] for arc in self.arcs], dtype=np.int64),
-            arc_center=np.pad(centres, ((0, 0), (0, len(names)))),
+            arc_center=np.pad(centres, ((0, 0), (0, others))),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
             splines=SplineTable(
-                block=np.array([spline[0] for spline in self.splines], dtype=np.int64),
-                points=self._spline_points(moved),
+                block=of_spline,
+                points=np.concatenate([points, still], axis=2),
                 weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
             ),
             events=EventTable(**{name: column[seen].copy() for name, column in self.event._asdict().items()}),

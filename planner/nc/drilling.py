@@ -246,10 +246,11 @@ def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
     elif step.kind == Kind.STOP:
         table.add(Kind.STOP, line, state)
     else:
-        point = np.empty(3)
         a, b = IN_PLANE[state.normal]
-        point[[a, b, state.normal]] = step.place
-        end = state.machine(point * state.unit)
+        point = state.programmed()
+        point[[a, b, state.normal]] = np.array(step.place) * state.unit
+        end = state.position.copy()
+        end[:3] = state.machine(point)[:3]
         if step.kind == Kind.LINE or (end != state.place).any():
             state.position[:], state.actual = end, None
             table.add(step.kind, line, state)

@@ -56,16 +56,15 @@ class Interpreter:
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.machine = machine
-        state = state_of(machine)
-        state.further.letters = "".join(c for c in state.further.letters if c not in reading.ignore)
+        state = state_of(machine, reading.ignore)
         self.tool_point = ToolPointSwitch.of(machine)
         self.ignored = IgnoredWords(
             reading,
-            state.further.letters,
+            state.others,
             extruder=machine is not None and EXTRUDER in machine.axes,
             at_tip=self.tool_point.chain is not None,
         )
-        table = BlockTable(len(state.further.letters))
+        table = BlockTable(len(state.letters))
         table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)
         feed_default = None if machine is None else machine.feed_default
@@ -104,7 +103,7 @@ class Interpreter:
                 self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
         auxiliary.assume_rapids(self.table, self.ignored, self.findings)
         limits = self.limits.throughout(self.table, self.machine, self.findings)
-        read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.further.letters)
+        read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.letters)
         read = dataclasses.replace(read, limits=limits)
         return read if self.findings.faults else at_the_tip(read, self.tool_point, self.machine)
 
@@ -221,7 +220,7 @@ class Interpreter:
         if block.g.get("one-shot") == 40:
             auxiliary.dwell(self.state, self.table, block, self.ignored, self.findings)
         self._modes(block)
-        turned = self.state.further.position.copy()
+        before = self.state.position.copy()
         if not block.foreign:
             self._check_parked(block)
             go_to_switches(self.state, self.table, block, self.findings)
@@ -231,7 +230,7 @@ class Interpreter:
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
                 text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
                 self.findings.assume(text, block.line, block.motion_word())
-            self.tool_point.check(self.state, block, turned)
+            self.tool_point.check(self.state, block, before)
         stop = block.m.get("stopping")
         if stop is not None and self.mover.cutter is not None:
             self.mover.cutter.fix()
@@ -288,7 +287,6 @@ class Interpreter:
             go_home(self.state, self.table, block, self.findings)
         elif code in (281, 301):  # where the machine stands becomes the position of G28 or G30
             self.state.homes[code - 1] = self.state.position.copy()
-            self.state.further.homes[code - 1] = self.state.further.position.copy()
         elif code == 100:
             offsets.set_data(self.state, block, self.findings)
         else:
@@ -296,7 +294,7 @@ class Interpreter:
 
     def _check_parked(self, block: Block) -> None:
         for letter in codes.PARKABLE:
-            if letter in self.state.further.letters or letter not in block.value:
+            if letter in self.state.letters or letter not in block.value:
                 continue
             if not self.ignored.may_stand(letter, block.value[letter], absolute=self.state.absolute):
                 self.ignored.moved.add(letter)

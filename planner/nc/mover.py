@@ -24,7 +24,6 @@ _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
 # stand beside them.
 COVET_AXES = (100, 280, 300, 520, 920)
-NOWHERE = np.zeros(0)  # where further axes stand that the machine does not have
 _WHY_NO_MOTION = {
     NO_MOTION: "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it",
     REFUSED_MOTION: "an axis word under a motion code that is not supported",
@@ -109,16 +108,13 @@ def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -
     if state.actual is not None:  # cutter radius compensation ends here
         state.actual = None
         table.add(Kind.RAPID, block.line, state)
-    home = state.homes.get(code, np.zeros(3))
-    everything = not block.has(state.letters)
-    if everything:
+    home = state.homes.get(code, state.zeros())
+    if not block.has(state.letters):
         state.position[:] = home
     else:
         state.position[:] = moves.target(state, block)
-        offsets.move(state, block)
         table.add(Kind.RAPID, block.line, state)
         state.position[:] = _some_axes(state, block, home)
-    offsets.go_home(state, block, code, everything=everything)
     table.add(Kind.RAPID, block.line, state)
 
 
@@ -135,10 +131,10 @@ def go_to_switches(state: State, table: BlockTable, block: Block, findings: Find
 
 
 def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
-    """(3,) the position with the block's axes at home [mm]."""
+    """(A,) the position with the block's axes at home [mm]."""
     system, there = state.work_system(), state.position.copy()
     point, at_home = system.turn(there - system.origin, -1.0), system.turn(home - system.origin, -1.0)
-    for axis, letter in enumerate("XYZ"):
+    for axis, letter in enumerate(state.letters):
         if letter in block.value:
             there[axis], point[axis] = home[axis], at_home[axis]
     if state.rotated and block.has("XY"):
@@ -228,13 +224,10 @@ class Mover:
     def _straight(self, block: Block) -> None:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
-        begin = state.further.position.copy() if state.further.letters else NOWHERE
-        offsets.move(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
         if kind == Kind.LINE:
             auxiliary.check_feed(state, block)
-            length = float(np.linalg.norm(target - state.position))
-            auxiliary.feed_of_time(state, block, offsets.length_moved(state, begin, length), self.findings)
+            auxiliary.feed_of_time(state, block, offsets.length_moved(state, target), self.findings)
         if kind == Kind.LINE and auxiliary.on_surface(state):
             offsets.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
@@ -263,7 +256,6 @@ class Mover:
     def _arc(self, block: Block) -> None:
         state = self.state
         target = moves.target(state, block)
-        offsets.move(state, block)
         auxiliary.check_feed(state, block)
         if self.cutter is None and state.actual is not None:
             raise block.fault("the move after G40 must be straight; write G0 or G1 to where this arc begins")
@@ -309,5 +301,5 @@ class Mover:
         auxiliary.take_default(state, self.feed_default, block, self.findings)
         auxiliary.check_feed(state, block)
         (points, weights), line = found
-        state.position[:] = points[-1, -1]
+        state.position[:3] = points[-1, -1]
         self.table.add_spline(points, weights, line, state)

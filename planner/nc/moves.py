@@ -1,9 +1,11 @@
 """A line of a program, as codes by modal group and words by letter, and where its words lead.
 
 A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate
-(G53). I J K are relative to the start (G91.1), or absolute (G90.1). In diameter mode (G7) X words are halved;
-I, K and R stay radii. An arc in G18 or G19 lies in a plane of two axes only if the rotation of the work
-system is a quarter turn; other angles are refused there.
+(G53); a wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes to the absolute place within a turn, forwards
+unless the number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary). I J K are relative to the
+start (G91.1), or absolute (G90.1). In diameter mode (G7) X words are halved; I, K and R stay radii. An arc in
+G18 or G19 lies in a plane of two axes only if the rotation of the work system is a quarter turn; other angles
+are refused there.
 """
 
 import math
@@ -15,7 +17,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc import arcs, codes
 from planner.nc.settings import Setting
-from planner.nc.state import REFUSED_MOTION, State
+from planner.nc.state import DEGREES, REFUSED_MOTION, State
 
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
@@ -25,6 +27,7 @@ OFFSET_NUMBER = codes.Assumption(
 )
 Report = Callable[[int, str], None]
 _CLOSES_IF = "the arc would close if its centre were"
+_TURN = 360.0  # degrees
 _ROUNDING = {**dict.fromkeys("THDLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
 
 
@@ -100,36 +103,54 @@ def is_move(state: State, block: Block) -> bool:
 
 
 def coordinate(state: State, block: Block, axis: int) -> float:
-    """The length that the word of an axis gives [mm]; of a diameter its half."""
-    length = block.value["XYZ"[axis]] * state.unit
+    """The length that the word of an axis gives [mm; degrees]; of a diameter its half."""
+    letter = state.letters[axis]
+    length = block.value[letter] * (1.0 if letter in DEGREES else state.unit)
     return length / 2.0 if axis == 0 and state.diameters else length
 
 
 def target(state: State, block: Block) -> FloatArray:
-    """Where the block's axis words lead, (3,) in machine coordinates [mm]."""
+    """Where the block's axis words lead, (A,) in machine coordinates [mm]. Raises WordFault for a wrapped axis
+    beyond a turn."""
     in_machine = block.g.get("one-shot") == 530
-    if state.rotated and not in_machine:
-        return _rotated_target(state, block)
     end = state.position.copy()
-    for axis, letter in enumerate("XYZ"):
-        if letter in block.value:
-            length = coordinate(state, block, axis)
-            if in_machine:
-                end[axis] = length
-            else:
-                end[axis] = length + (state.offset[axis] if state.absolute else end[axis])
+    point = state.programmed() if state.rotated and not in_machine else None
+    for axis, letter in enumerate(state.letters):
+        if letter not in block.value:
+            continue
+        length = coordinate(state, block, axis)
+        if point is not None and axis < 3:
+            point[axis] = length + (0.0 if state.absolute else point[axis])
+        elif letter in state.wrapped and (state.absolute or in_machine):
+            end[axis] = _unwrapped(state, block, axis)
+        elif in_machine:
+            end[axis] = length
+        else:
+            end[axis] = length + (state.offset[axis] if state.absolute else end[axis])
+    if point is not None:
+        end[:3] = state.machine(point)[:3]
+        if not block.has("XY"):
+            end[:2] = state.position[:2]
     return end
 
 
-def _rotated_target(state: State, block: Block) -> FloatArray:
-    point = state.programmed()
-    for axis, letter in enumerate("XYZ"):
-        if letter in block.value:
-            point[axis] = coordinate(state, block, axis) + (0.0 if state.absolute else point[axis])
-    end = state.machine(point)
-    if not block.has("XY"):
-        end[:2] = state.position[:2]
-    return end
+def _unwrapped(state: State, block: Block, axis: int) -> float:
+    """Where the word of a wrapped axis leads [degrees]. Raises WordFault for a place beyond a turn."""
+    value, zero = block.value[state.letters[axis]], float(state.offset[axis])
+    if abs(value) >= _TURN:
+        text = f"axis {state.letters[axis]} is wrapped: its places are above -360 and below 360 degrees"
+        raise WordFault(block.at[state.letters[axis]], text)
+    place = abs(value - zero if block.g.get("one-shot") == 530 else value)
+    return _within_turn(math.copysign(place, value), float(state.position[axis]) - zero) + zero
+
+
+def _within_turn(value: float, here: float) -> float:
+    """The place `value` [degrees] within a turn, ahead of `here` in the direction of its sign."""
+    place = abs(value) + math.floor(here / _TURN) * _TURN
+    forwards = math.copysign(1.0, value) > 0
+    if forwards and place < here:
+        return place + _TURN
+    return place - _TURN if not forwards and place > here else place
 
 
 def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:

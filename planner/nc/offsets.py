@@ -1,5 +1,5 @@
 """Codes that set offsets: G10, G43 to G49, G52, G92 to G92.3, G28.1 and G30.1; none of them moves anything.
-And the coordinates of axes beside x, y and z.
+And the length that F counts of a move.
 
 With q the position in a work system before G92 is taken off (state.py), a coordinate x is
 
@@ -12,11 +12,9 @@ P; what would add after G91 is refused: the flat program (language/flat.py) coul
 
 Axes beside x, y and z, rotary A B C in degrees and linear U V W in mm, are joints without rotation of the
 work system and tool offsets. F is the speed of x, y and z together if one of them moves, else of u, v and w,
-else of the rotary axes. A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes to the absolute place within a
-turn, forwards unless the number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary).
+else of the rotary axes.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -28,8 +26,6 @@ from planner.nc.moves import Block, WordFault, coordinate, integer
 from planner.nc.state import (
     FURTHER_MAX,
     FURTHER_SYSTEMS,
-    LETTERS,
-    ROTARY,
     SYSTEMS,
     State,
     System,
@@ -37,109 +33,26 @@ from planner.nc.state import (
     system_name,
 )
 
-_TURN = 360.0  # degrees
 _FIXTURE = 593  # the system of G10 L11
-
-
-def _zeros() -> FloatArray:
-    return np.zeros(len(LETTERS))
 
 
 def refuse(state: State, block: Block, where: str) -> None:
     """Raise WordFault for a further axis in a place that does not know them."""
-    if block.has(state.further.letters):
-        word = block.first_of(state.further.letters)
-        letter = next(c for c in state.further.letters if block.at.get(c) == word)
+    if block.has(state.others):
+        word = block.first_of(state.others)
+        letter = next(c for c in state.others if block.at.get(c) == word)
         text = f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
         raise WordFault(word, text)
 
 
-def move(state: State, block: Block) -> None:
-    """Move the further axes to the block's places. Raises WordFault for a wrapped axis beyond a turn."""
-    further = state.further
-    in_machine = block.g.get("one-shot") == 530
-    offset = _zeros() if in_machine else further.offset(state.system)
-    for column in further.columns:
-        letter = LETTERS[column]
-        if letter not in block.value:
-            continue
-        value, here = block.value[letter] * scale(state, column), float(further.position[column])
-        if not state.absolute and not in_machine:
-            further.position[column] = here + value
-        elif letter in further.wrapped:
-            if abs(value) >= _TURN:
-                text = f"axis {letter} is wrapped: its places are above -360 and below 360 degrees"
-                raise WordFault(block.at[letter], text)
-            zero = further.offset(state.system)[column]
-            place = abs(value - zero if in_machine else value)
-            further.position[column] = _unwrapped(math.copysign(place, value), here - zero) + zero
-        else:
-            further.position[column] = value + offset[column]
-
-
-def _unwrapped(value: float, here: float) -> float:
-    """The place `value` [degrees] within a turn, ahead of `here` in the direction of its sign."""
-    place = abs(value) + math.floor(here / _TURN) * _TURN
-    forwards = math.copysign(1.0, value) > 0
-    if forwards and place < here:
-        return place + _TURN
-    return place - _TURN if not forwards and place > here else place
-
-
-def scale(state: State, column: int) -> float:
-    """Degrees or mm of a programmed unit."""
-    return 1.0 if column < ROTARY else state.unit
-
-
-def shift_extra_axes(state: State, block: Block, code: int) -> None:
-    """G52 and G92 with words of further axes, and G92.1 to G92.3 for all of them."""
-    further = state.further
-    if code not in (520, 920):
-        further.g92 = further.g92_saved.copy() if code == 923 else _zeros()
-        if code == 921:
-            further.g92_saved = _zeros()
-        return
-    origin = further.origins.get(state.system, _zeros())
-    for column in further.columns:
-        letter = LETTERS[column]
-        if letter in block.value:
-            value = block.value[letter] * scale(state, column)
-            further.g92[column] = value if code == 520 else further.position[column] - origin[column] - value
-    further.g92_saved = further.g92.copy()
-
-
-def set_system(state: State, block: Block, code: int, *, from_place: bool) -> None:
-    """G10 L2 (`from_place` False) and L20: the origin of a work system."""
-    further = state.further
-    origin = further.origins.get(code, _zeros()).copy()
-    for column in further.columns:
-        letter = LETTERS[column]
-        if letter in block.value:
-            value = block.value[letter] * scale(state, column)
-            origin[column] = further.position[column] - further.g92[column] - value if from_place else value
-    further.origins[code] = origin
-
-
-def go_home(state: State, block: Block, code: int, *, everything: bool) -> None:
-    """The further axes of the block, or all, go to the position of G28 or G30."""
-    further = state.further
-    home = further.homes.get(code, _zeros())
-    for column in further.columns:
-        if everything or LETTERS[column] in block.value:
-            further.position[column] = home[column]
-
-
-def length_moved(state: State, start: FloatArray, xyz: float) -> float:
-    """The length that F and inverse time go by [mm; where only rotary axes move, degrees times the programmed
-    unit].
-
-    start : (6,) of the further axes before the move;  xyz : length of the path of x, y and z [mm]
-    """
-    if xyz > 0.0 or not state.further.letters:
-        return xyz
-    moved = state.further.position - start
-    parallel = float(np.linalg.norm(moved[ROTARY:]))
-    return parallel if parallel > 0.0 else float(np.linalg.norm(moved[:ROTARY])) * state.unit
+def length_moved(state: State, target: FloatArray) -> float:
+    """The length of a straight move to `target` (A,) that F and inverse time go by [mm; where only rotary axes
+    move, degrees times the programmed unit]."""
+    moved, turns = target - state.position, state.turns
+    for part in (moved[:3], moved[3:][~turns[3:]]):
+        if part.any():
+            return float(np.linalg.norm(part))
+    return float(np.linalg.norm(moved[turns])) * state.unit
 
 
 def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
@@ -148,9 +61,9 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
     if code in (431, 432) and "motion" not in block.g:
         refuse(state, block, "of a tool offset")
     if code == 490:
-        state.tool_offset = np.zeros(3)
+        state.tool_offset = state.zeros()
     elif code == 431:
-        state.tool_offset = _given(state, block, state.tool_offset)
+        state.tool_offset = _given(state, block, state.tool_offset, "XYZ")
     elif code in (430, 434):
         tool = integer(block, "H", 0) if "H" in block.value else state.tool_loaded
         state.tool_offset = _offset_of(state, tool, block, findings)
@@ -159,7 +72,7 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
             raise block.fault("G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines", "H")
         state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, findings)
     elif block.has("XYZ"):
-        state.tool_offset = state.tool_offset + _given(state, block, np.zeros(3))
+        state.tool_offset = state.tool_offset + _given(state, block, state.zeros(), "XYZ")
     else:
         raise block.fault("G43.2 needs a tool as an H word, or lengths as X, Y and Z", "tool length")
 
@@ -195,15 +108,14 @@ def shift_origin(state: State, block: Block) -> None:
             what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
             raise block.fault(f"G{codes.number(code)} needs at least one of X, Y and Z: {what}", "one-shot")
         here = state.in_system()
-        for axis in _axes(block):
+        for axis in _axes(block, state.letters):
             length = coordinate(state, block, axis)
             state.g92[axis] = length if code == 520 else here[axis] - length
         state.g92_saved = state.g92.copy()
     else:
-        state.g92 = state.g92_saved.copy() if code == 923 else np.zeros(3)
+        state.g92 = state.g92_saved.copy() if code == 923 else state.zeros()
         if code == 921:
-            state.g92_saved = np.zeros(3)
-    shift_extra_axes(state, block, code)
+            state.g92_saved = state.zeros()
     state.apply_offsets()
 
 
@@ -245,7 +157,6 @@ def _set_system(state: State, block: Block, kind: int) -> None:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
-    set_system(state, block, code, from_place=kind == 20)
 
 
 def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
@@ -261,7 +172,6 @@ def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]
     system = state.work_system(code)
     state.systems[code] = replace(system, origin=_given(state, block, system.origin))
-    set_system(state, block, code, from_place=False)
 
 
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
@@ -269,7 +179,7 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
     if "P" not in block.value:
         raise block.fault(f"G10 L{kind} needs its tool as a P word", "one-shot")
     number = integer(block, "P", 1)
-    tool = state.tools.get(number) or Tool(np.zeros(3))
+    tool = state.tools.get(number) or Tool(state.zeros())
     for letter in "IJQ":
         if letter in block.value:
             text = f"{letter} of G10 L{kind} is not used: nothing asks for a tool's angles and edge"
@@ -280,13 +190,13 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
 
 
 def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:
-    """(3,) tool offset [mm] for the block's coordinates, in force (L10) or in G59.3 without G92 (L11)."""
+    """(A,) tool offset [mm] for the block's coordinates, in force (L10) or in G59.3 without G92 (L11)."""
     system = state.work_system(_FIXTURE if kind == 11 else 0)
     place = system.turn(state.position - system.origin, -1.0)
     if kind == 10:
         place = place - state.g92
     offset = np.array(system.turn(tool.offset, -1.0))
-    for axis in _axes(block):
+    for axis in _axes(block, "XYZ"):
         offset[axis] = place[axis] - coordinate(state, block, axis)
     return system.turn(offset)
 
@@ -295,16 +205,16 @@ def _offset_of(state: State, number: int, block: Block, findings: Findings) -> F
     if number not in state.tools and number != 0:
         text = f"tool {number} has no length in the machine file: 0"
         findings.assume(text, block.line, block.at["tool length"])
-    return state.tools[number].offset.copy() if number in state.tools else np.zeros(3)
+    return state.tools[number].offset.copy() if number in state.tools else state.zeros()
 
 
-def _axes(block: Block) -> list[int]:
-    return [axis for axis, letter in enumerate("XYZ") if letter in block.value]
+def _axes(block: Block, letters: str) -> list[int]:
+    return [axis for axis, letter in enumerate(letters) if letter in block.value]
 
 
-def _given(state: State, block: Block, others: FloatArray) -> FloatArray:
-    """(3,) the block's lengths [mm], and `others` where it has none."""
+def _given(state: State, block: Block, others: FloatArray, letters: str = "") -> FloatArray:
+    """(A,) the block's coordinates of axes with these letters, or all, and `others` where it has none [mm]."""
     lengths = others.copy()
-    for axis in _axes(block):
+    for axis in _axes(block, letters or state.letters):
         lengths[axis] = coordinate(state, block, axis)
     return lengths

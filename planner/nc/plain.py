@@ -15,14 +15,14 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.nc.block_table import BlockTable
-from planner.nc.faults import AXIS, LEFT_OUT, PARKED, REFUSED, IgnoredWords
+from planner.nc.faults import LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.moves import NUMBER_MAX
 from planner.nc.program import Kind
-from planner.nc.state import LETTERS, ROTARY, State
+from planner.nc.state import State
 
 # Letters by their codes.
-_F, _G, _N, _O, _S, _X, _Z = 70, 71, 78, 79, 83, 88, 90
+_F, _G, _N, _O, _S = 70, 71, 78, 79, 83
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 
 
@@ -44,11 +44,11 @@ class _Fixed(NamedTuple):
     feed_factor: float
     path_control: int
     tolerance: float
-    offset: FloatArray
-    column: Array  # (256,) place of a letter among the F further axes
-    rotary: Array  # (F,) True for rotary ones
-    further_offset: FloatArray  # (F,) in degrees and mm
-    wrapped: Array  # (F,) True for wrapped ones
+    offset: FloatArray  # (A,) in mm and degrees
+    axis: Array  # (256,) index of a letter's axis; -1 for other letters
+    scale: FloatArray  # (A,) mm or degrees per programmed unit
+    turns: Array  # (A,) True for rotary axes
+    wrapped: Array  # (A,) True for wrapped ones, where coordinates are absolute
 
 
 class _Others(NamedTuple):
@@ -75,17 +75,15 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     if not state.is_plain:
         return row
     rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
-    further = state.further
-    columns = further.columns
-    place = further.position[columns]
+    axis = np.full(256, -1)
+    axis[[ord(letter) for letter in state.letters]] = np.arange(len(state.letters))
+    wrapped = np.array([state.absolute and letter in state.wrapped for letter in state.letters])
     path = state.feed_factor, int(state.path_control), state.tolerance, state.offset
-    fixed = _Fixed(state.absolute, state.unit, *path, *_of_further(state))
+    fixed = _Fixed(state.absolute, state.unit, *path, axis, state.scale, state.turns, wrapped)
     stored = table.blocks, table.events, table.refusals
     begin = _Counts(row, *stored, state.motion, state.feed, state.feed_unit)
     others = _Others(ignored.treatment, ignored.parked)
-    columns_of = table.block, table.event, table.refused_word
-    end = _run(rows, begin, fixed, state.position, place, *columns_of, others)
-    further.position[columns] = place
+    end = _run(rows, begin, fixed, state.position, table.block, table.event, table.refused_word, others)
     if end.blocks > begin.blocks:
         state.series = None
     if end.events > begin.events:
@@ -95,51 +93,33 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     return int(end.row)
 
 
-def _of_further(state: State) -> tuple[Array, Array, FloatArray, Array]:
-    further = state.further
-    column = np.zeros(256, dtype=np.int64)
-    for k, letter in enumerate(further.letters):
-        column[ord(letter)] = k
-    columns = further.columns
-    return (
-        column,
-        np.array([k < ROTARY for k in columns], dtype=np.bool_),
-        further.offset(state.system)[columns],
-        np.array([state.absolute and LETTERS[k] in further.wrapped for k in columns], dtype=np.bool_),
-    )
-
-
 @njit(cache=True)
-def _run(rows, begin, fixed, position, place, block, event, refused_word, others):  # pragma: no cover
+def _run(rows, begin, fixed, position, block, event, refused_word, others):  # pragma: no cover
     """Execute rows from `begin` on into the columns, the position and `refused_word`; says how far."""
     letter, value, line, first, frame = rows
-    absolute, unit, feed_factor, path_control, tolerance, offset, column, rotary, further_offset, wrapped = (
-        fixed
-    )
+    absolute, unit, feed_factor, path_control, tolerance, offset, axis_of, scale, turns, wrapped = fixed
     treatment, parked = others
     row, blocks, events, refusals, motion, feed, feed_unit = begin
-    given, turned = np.empty(3), np.empty(len(place))
+    axes = len(position)
+    given = np.empty(axes)
     while row < len(line):
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
-        for axis in range(3):
+        for axis in range(axes):
             given[axis] = np.nan
-        turned[:] = np.nan
         refused = refusals
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]
-            if _X <= c <= _Z and np.isnan(given[c - _X]) and abs(v) <= NUMBER_MAX:
-                given[c - _X] = v
+            axis = axis_of[c]
+            if axis >= 0 and np.isnan(given[axis]) and abs(v) <= NUMBER_MAX:
+                given[axis] = v
                 moves = True
+                is_plain &= not wrapped[axis]
             elif c == _G and code < 0 and (v == 0.0 or v == 1.0):
                 code = int(v)
             elif c == _F and new_feed < 0 and 0 < v <= NUMBER_MAX:
                 new_feed = v
             elif c == _S and speed < 0 and 0 <= v <= NUMBER_MAX:
                 speed = v
-            elif treatment[c] == AXIS and np.isnan(turned[column[c]]) and abs(v) <= NUMBER_MAX:
-                turned[column[c]] = v
-                moves = True
-                is_plain &= not wrapped[column[c]]
             elif treatment[c] == PARKED:
                 if absolute and np.isnan(parked[c]):
                     parked[c] = v
@@ -170,27 +150,19 @@ def _run(rows, begin, fixed, position, place, block, event, refused_word, others
             event.letter[events], event.value[events] = _S, speed
             events += 1
         if moves:
-            rests = len(place) > 0  # all linear axes
-            for axis in range(3):
+            goes = turned = False  # linear axes, rotary axes
+            for axis in range(axes):
                 before = position[axis]
                 if not np.isnan(given[axis]):
-                    step = given[axis] * unit
-                    position[axis] = step + (offset[axis] if absolute else position[axis])
-                rests &= position[axis] == before
-            turns = False
-            for k in range(len(place)):
-                before = place[k]
-                if not np.isnan(turned[k]):
-                    step = turned[k] * (1.0 if rotary[k] else unit)
-                    place[k] = step + (further_offset[k] if absolute else place[k])
-                rests &= rotary[k] or place[k] == before
-                turns |= place[k] != before
-                block.further[blocks, k] = place[k]
-            block.kind[blocks] = _LINE if motion == 1 else _RAPID
-            for axis in range(3):  # a slice assignment costs 3 s of compilation for its error message
+                    step = given[axis] * scale[axis]
+                    position[axis] = step + (offset[axis] if absolute else before)
+                if position[axis] != before:
+                    goes |= not turns[axis]
+                    turned |= turns[axis]
                 block.end[blocks, axis] = position[axis]
+            block.kind[blocks] = _LINE if motion == 1 else _RAPID
             block.feed[blocks] = feed if motion == 1 else np.inf
-            if motion == 1 and rests and turns:
+            if motion == 1 and turned and not goes:
                 block.feed[blocks] = feed / feed_unit * RAD_PER_DEG
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control

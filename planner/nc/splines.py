@@ -113,7 +113,7 @@ class SplineReader:
         elif not ("I" in block.value and "J" in block.value):
             raise block.fault("G5 needs both I and J, or neither")
         self._reflected = blocks + 1, -far
-        start = state.position.copy()
+        start = state.position[:3].copy()
         return np.stack([start, start + near, end + far, end])[None], np.ones((1, 4))
 
     def _nurbs(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
@@ -130,7 +130,7 @@ class SplineReader:
                 text = "control points of a spline after its G5.3; write G5.2, or another motion code"
                 raise _fault(block, text)
             opened = OpenSpline(
-                block.line, block.at["motion"], NURBS, 3, blocks, [state.position.copy()], [1.0]
+                block.line, block.at["motion"], NURBS, 3, blocks, [state.position[:3].copy()], [1.0]
             )
             self.open = opened
             if "P" in block.value and not block.has("XY"):
@@ -189,7 +189,7 @@ def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
     near = _offset(state, block, "IJ")
     if not ("I" in block.value and "J" in block.value) or not near.any():
         raise block.fault("G5.1 needs I and J, its control point from its start, not both 0")
-    start = state.position.copy()
+    start = state.position[:3].copy()
     return _split(raised(homogeneous(np.stack([start, start + near, end])[None], np.ones((1, 3)))))
 
 
@@ -209,7 +209,7 @@ def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
         raise WordFault(
             block.first_of("XY"), "control points of G5.2 with G91 are relative to what? write G90 before it"
         )
-    return target(state, block)
+    return target(state, block)[:3]
 
 
 def _offset(state: State, block: Block, letters: str) -> FloatArray:
@@ -236,18 +236,18 @@ def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray
     if not state.absolute:
         raise _fault(block, "control points of G6.2 with G91 are not read; write G90 before it")
     here = state.position
-    state.position = opened.points[-1] if opened.points else here
-    point = target(state, block)
+    state.position = np.append(opened.points[-1], here[3:]) if opened.points else here
+    point = target(state, block)[:3]
     state.position = here
     if opened.points:
         return point
-    away = float(np.linalg.norm(point - state.position))
+    away = float(np.linalg.norm(point - here[:3]))
     if away > SAME_PLACE:
         raise WordFault(
             block.first_of("XYZ"),
             f"the first control point of G6.2 is {away:.6g} mm from where the machine stands; move there before it",
         )
-    return state.position.copy()
+    return here[:3].copy()
 
 
 def _curve(opened: OpenSpline, knots: FloatArray) -> Pieces:

@@ -2,22 +2,23 @@
 
     machine position = origin of the work system + tool offset + R (programmed coordinate * unit + G92 offset)
 
-R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm and all positions in
-machine coordinates, so that changing an offset moves nothing.
+R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm, angles of rotary
+axes in degrees, and all positions in machine coordinates, so that changing an offset moves nothing. Positions
+and offsets are those of the A axes that are read: x, y, z and those of `LETTERS` that the machine has.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, RAD_PER_DEG
-from planner.machine import LINEAR_AXES, Machine
+from planner.machine import Machine
 from planner.nc.program import PathControl
 
 NO_MOTION = -1  # no motion code in force: at the start, and after G80
@@ -29,47 +30,8 @@ _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)} 
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
 FeedMode = Literal["per minute", "inverse time", "per turn"]
-LETTERS = "ABCUVW"
-ROTARY = 3  # the first so many of them
-
-
-def _zeros() -> FloatArray:
-    return np.zeros(len(LETTERS))
-
-
-@dataclass(slots=True)
-class ExtraAxes:
-    """Axes beside x, y and z (rules: offsets.py): arrays (6,) in degrees and mm, ordered as `LETTERS`."""
-
-    letters: str = ""  # those that the machine has and that are read
-    wrapped: str = ""  # those of them that are wrapped
-    position: FloatArray = field(default_factory=_zeros)  # in machine coordinates
-    origins: dict[int, FloatArray] = field(default_factory=dict)  # of work systems, by code
-    g92: FloatArray = field(default_factory=_zeros)  # the G92 offset
-    g92_saved: FloatArray = field(default_factory=_zeros)  # what G92.3 brings back
-    homes: dict[int, FloatArray] = field(default_factory=dict)  # positions of G28 (280) and G30 (300)
-
-    @property
-    def columns(self) -> list[int]:
-        """Indices of the axes that are read."""
-        return [LETTERS.index(letter) for letter in self.letters]
-
-    def offset(self, system: int) -> FloatArray:
-        """(6,) machine position of the programmed zero in a work system."""
-        return self.g92 + self.origins.get(system, _zeros())
-
-    @classmethod
-    def of(cls, machine: Machine | None) -> ExtraAxes:
-        """The further axes of a machine at their zero; none without a machine."""
-        if machine is None:
-            return cls()
-        letters = "".join(letter for letter in LETTERS if letter.lower() in machine.axes)
-        return cls(
-            letters=letters,
-            wrapped="".join(letter for letter in letters if machine.axes[letter.lower()].wrapped),
-            origins={system_code(name): _vector(p, LETTERS) for name, p in machine.work_offsets.items()},
-            homes={_HOMES[name]: _vector(p, LETTERS) for name, p in machine.positions.items()},
-        )
+LETTERS = "ABCUVW"  # of axes beside x, y and z
+DEGREES = "ABC"  # of rotary axes, whose places are in degrees
 
 
 def rotary_feed(feed: float, unit: float) -> float:
@@ -79,7 +41,7 @@ def rotary_feed(feed: float, unit: float) -> float:
 
 @dataclass(frozen=True)
 class Tool:
-    """A tool: offset (3,) that G43 adds and diameter, both in mm."""
+    """A tool: offset (A,) that G43 adds and diameter, both in mm."""
 
     offset: FloatArray
     diameter: float = 0.0
@@ -87,21 +49,21 @@ class Tool:
 
 @dataclass(frozen=True)
 class System:
-    """A work coordinate system: origin (3,) in machine coordinates [mm] and rotation about z [degrees]."""
+    """A work coordinate system: origin (A,) in machine coordinates [mm] and rotation about z [degrees]."""
 
     origin: FloatArray
     rotation: float = 0.0
 
     def turn(self, vector: FloatArray, sign: float = 1.0) -> FloatArray:
-        """A vector (3,) of the system in the machine's axes; with sign -1 the other way."""
+        """A vector, x and y first, of the system in the machine's axes; with sign -1 the other way."""
         if self.rotation == 0.0:
             return vector
         cosine, sine = _QUARTERS.get(self.rotation % 360.0) or (  # type: ignore[call-overload]
             math.cos(math.radians(self.rotation)),
             math.sin(math.radians(self.rotation)),
         )
-        x, y, z = vector
-        return np.array([cosine * x - sign * sine * y, sign * sine * x + cosine * y, z])
+        x, y, *others = vector
+        return np.array([cosine * x - sign * sine * y, sign * sine * x + cosine * y, *others])
 
 
 @dataclass(slots=True)
@@ -143,8 +105,10 @@ class State:
     spindle: Spindle = field(default_factory=Spindle)
     path_control: PathControl = PathControl.BLEND
     tolerance: float = np.nan  # P of G64 [mm], NaN where none
-    position: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,) machine position [mm]
-    # (3,) machine position of the programmed zero, without rotation [mm]
+    letters: str = "XYZ"  # of the axes
+    wrapped: str = ""  # those of the axes that are wrapped
+    position: FloatArray = field(default_factory=lambda: np.zeros(3))  # (A,) machine position [mm]
+    # (A,) machine position of the programmed zero, without rotation [mm]
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
     rotated: bool = False  # whether the work system in force is rotated
     system: int = 540
@@ -152,10 +116,10 @@ class State:
     systems: dict[int, System] = field(default_factory=dict)
     g92: FloatArray = field(default_factory=lambda: np.zeros(3))
     g92_saved: FloatArray = field(default_factory=lambda: np.zeros(3))  # what G92.3 brings back [mm]
-    # (3,) machine positions of G28 (280) and G30 (300) [mm]
+    # (A,) machine positions of G28 (280) and G30 (300) [mm]
     homes: dict[int, FloatArray] = field(default_factory=dict)
     tools: dict[int, Tool] = field(default_factory=dict)  # by number
-    tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,) in force (G43) [mm]
+    tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))  # (A,) in force (G43) [mm]
     tool_selected: int = 0
     tool_loaded: int = 0
     to_level: bool = False  # canned cycles retract to the level before them (G98), not to R (G99)
@@ -163,7 +127,7 @@ class State:
     series: CycleSeries | None = None  # canned cycles in force
     # the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     cycle_dwell: float = 0.0
-    # (3,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
+    # (A,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     actual: FloatArray | None = None
     change_timed: bool = False  # how long a tool change takes is known
     in_thread: bool = False  # the last block was cut in step with the spindle
@@ -171,16 +135,29 @@ class State:
     fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
     seconds_meant: bool = False  # the unit of dwells is known
     plane_known: bool = True  # G17, G18 or G19 was read, or the control starts with G17
-    further: ExtraAxes = field(default_factory=ExtraAxes)  # axes beside x, y and z
 
     @property
-    def letters(self) -> str:
-        """Letters of the axes."""
-        return "XYZ" + self.further.letters
+    def others(self) -> str:
+        """Letters of the axes beside x, y and z."""
+        return self.letters[3:]
+
+    @property
+    def turns(self) -> Array:
+        """(A,) True for rotary axes."""
+        return np.array([letter in DEGREES for letter in self.letters])
+
+    @property
+    def scale(self) -> FloatArray:
+        """(A,) mm, or degrees of rotary axes, per programmed unit."""
+        return np.where(self.turns, 1.0, self.unit)
+
+    def zeros(self) -> FloatArray:
+        """(A,) zeros."""
+        return np.zeros(len(self.letters))
 
     @property
     def place(self) -> FloatArray:
-        """(3,) where the tool is [mm]."""
+        """(A,) where the tool is [mm]."""
         return self.position if self.actual is None else self.actual
 
     @property
@@ -192,7 +169,7 @@ class State:
 
     def work_system(self, code: int = 0) -> System:
         """A work system by its code, or the one in force."""
-        return self.systems.get(code or self.system) or System(np.zeros(3))
+        return self.systems.get(code or self.system) or System(self.zeros())
 
     def apply_offsets(self) -> None:
         """Sum the offsets in force into `offset`."""
@@ -201,42 +178,49 @@ class State:
         self.offset[:] = self.g92 + system.origin + self.tool_offset
 
     def in_system(self, code: int = 0) -> FloatArray:
-        """(3,) the position in a work system, or the one in force, before G92 is taken off [mm]."""
+        """(A,) the position in a work system, or the one in force, before G92 is taken off [mm]."""
         system = self.work_system(code)
         return system.turn(self.position - system.origin - self.tool_offset, -1.0)
 
     def programmed(self) -> FloatArray:
-        """(3,) the position in programmed coordinates [mm]."""
+        """(A,) the position in programmed coordinates [mm]."""
         if not self.rotated:
             return self.position - self.offset
         return self.in_system() - self.g92
 
     def machine(self, point: FloatArray) -> FloatArray:
-        """(3,) machine position of `point` (3,) in programmed coordinates [mm]."""
+        """(A,) machine position of `point` (A,) in programmed coordinates [mm]."""
         if not self.rotated:
             return point + self.offset
         system = self.work_system()
         return system.origin + self.tool_offset + system.turn(point + self.g92)
 
 
-def state_of(machine: Machine | None) -> State:
-    """The modal state at the start of a program, with the machine's offsets, positions and tools."""
+def state_of(machine: Machine | None, left_out: Container[str] = ()) -> State:
+    """The modal state at the start of a program, with the machine's offsets, positions and tools; axes that
+    are `left_out` are not read."""
     state = State()
     if machine is not None:
         unit = MM_PER_INCH if begins_in_inches(machine) else 1.0
-        origins = {name: _vector(given, LINEAR_AXES) for name, given in machine.work_offsets.items()}
+        others = (c for c in LETTERS if c.lower() in machine.axes and c not in left_out)
+        letters = "XYZ" + "".join(others)
+        origins = {name: _vector(given, letters) for name, given in machine.work_offsets.items()}
+        tools = {number: _vector({"x": t.x, "z": t.length}, letters) for number, t in machine.tools.items()}
         state = State(
+            letters=letters,
+            wrapped="".join(c for c in letters[3:] if machine.axes[c.lower()].wrapped),
             unit=unit,
             feed_unit=unit,
             path_control=PathControl[machine.path_control.upper()],
             systems={system_code(name): System(origin) for name, origin in origins.items()},
-            homes={_HOMES[name]: _vector(p, LINEAR_AXES) for name, p in machine.positions.items()},
-            tools={
-                int(number): Tool(np.array([tool.x, 0.0, tool.length]), tool.diameter)
-                for number, tool in machine.tools.items()
-            },
+            homes={_HOMES[name]: _vector(place, letters) for name, place in machine.positions.items()},
+            tools={int(n): Tool(offset, machine.tools[n].diameter) for n, offset in tools.items()},
             change_timed=machine.times is not None and machine.times.tool_change is not None,
-            further=ExtraAxes.of(machine),
+            position=np.zeros(len(letters)),
+            offset=np.zeros(len(letters)),
+            g92=np.zeros(len(letters)),
+            g92_saved=np.zeros(len(letters)),
+            tool_offset=np.zeros(len(letters)),
         )
     state.apply_offsets()
     return state

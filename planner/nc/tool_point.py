@@ -36,7 +36,7 @@ from planner.nc.program import (
     renumbered,
 )
 from planner.nc.settings import TOOL_POINT_ON
-from planner.nc.state import LETTERS, ROTARY, State
+from planner.nc.state import LETTERS, State
 
 CHORD_SHARE = 0.1  # of the tolerance, that a rapid move of the joints leaves its chords by [-]
 CHORDS_MAX = 2**14  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um
@@ -86,9 +86,9 @@ class ToolPointSwitch:
 
     def check(self, state: State, block: Block, before: FloatArray) -> None:
         """Raise WordFault for a move to a place of the joints while the switch is on, unless both rotary axes
-        stand at 0, where they were `before` (6,), too."""
+        stand at 0, where they were `before` (A,), too."""
         code = block.g.get("one-shot", 0)
-        turned = before[:ROTARY].any() or state.further.position[:ROTARY].any()
+        turned = before[state.turns].any() or state.position[state.turns].any()
         if self._on and code in _JOINT_PLACES and turned:
             raise block.fault(
                 f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
@@ -114,15 +114,14 @@ class ToolPointSwitch:
     def _move(self, state: State, now: str, length: float) -> None:
         """The coordinates of the place where the joints stand, on the other side of the switch."""
         assert self.chain is not None
-        angles = {
-            c.lower(): float(state.further.position[LETTERS.index(c)]) * RAD_PER_DEG for c in LETTERS[:ROTARY]
-        }
-        place = angles | dict(zip(LINEAR, state.position.tolist(), strict=True))
+        scale = np.where(state.turns, RAD_PER_DEG, 1.0)
+        here = zip(state.letters.lower(), (state.position * scale).tolist(), strict=True)
+        place = dict.fromkeys("abc", 0.0) | dict(here)
         if self._on:
             place |= self.chain.with_tool(self.switches[-1].length).joints(place)
         if now:
             place |= self.chain.with_tool(length).point(place)
-        state.position[:] = [place[letter] for letter in LINEAR]
+        state.position[:3] = [place[letter] for letter in LINEAR]
 
 
 def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | None) -> Program:

@@ -247,7 +247,7 @@ class RowsThrough(travel_rows.Coordinates):
             self._ahead.append(travel_rows.TravelRow([(travel_rows.G, 90.0, 0)], 1, 0))
 
     def _look(self) -> None:
-        self._mapped = self.interpreter.state.programmed().copy()
+        self._mapped = self.interpreter.state.programmed()[:3].copy()
         self.place = self.unmapped(self._mapped)
         self._beside = False
 

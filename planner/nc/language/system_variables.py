@@ -107,7 +107,7 @@ class SystemVariables:
             [("G", _FEED_MODES[state.feed_mode])],
         ]
         if state.tool_offset.any():
-            lengths = zip("XYZ", (state.tool_offset / state.unit).tolist(), strict=True)
+            lengths = zip("XYZ", (state.tool_offset[:3] / state.unit).tolist(), strict=True)
             rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])])
         else:
             rows.append([("G", 49.0)])

@@ -19,7 +19,7 @@ class Travel(RowsThrough):
 
     def position(self) -> FloatArray:
         """(3,) the programmed position [mm]."""
-        return self.place.copy() if self.active else self.interpreter.state.programmed()
+        return self.place.copy() if self.active else self.interpreter.state.programmed()[:3]
 
     def radius(self) -> float:
         """Radius of the loaded tool [mm], 0 where none is given. Raises ValueError below 0."""

@@ -66,7 +66,7 @@ class LatheCycles:
         self._place, interpreter = making.place, self.run.interpreter
         state = interpreter.state
         self._aside = copy.deepcopy(state), interpreter.table, self.run.tee
-        interpreter.go_on_with(state, BlockTable())
+        interpreter.go_on_with(state, BlockTable(len(state.letters)))
         self.run.tee = lambda words: None
         # any feed does: moves whose feed depends on the diameter are divided
         state.feed_mode, state.feed = "per minute", 1.0

@@ -25,7 +25,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.turning import PASSES_MAX, SAME, Leg, exchanged
+from planner.nc.turning import PASSES_MAX, SAME, Leg
 
 
 @dataclass(frozen=True)
@@ -124,35 +124,25 @@ class Pecking:
     relief: float = 0.0
 
 
-def single_cut(start: complex, end: complex, taper: float, *, facing: bool) -> Iterator[Leg]:
-    """The moves of G90, or with `facing` of G94 [mm]."""
-    if facing:
-        yield from map(exchanged, single_cut(exchanged(start), exchanged(end), taper, facing=False))
-        return
+def single_cut(start: complex, end: complex, taper: float, pitch: float = 0.0) -> Iterator[Leg]:
+    """The moves of G90, and of G92 with a pitch along the cut [mm]; those of G94 with x and z exchanged."""
     yield Leg(complex(start.real, end.imag + taper), fast=True)
-    yield Leg(end)
-    yield Leg(complex(end.real, start.imag))
+    yield Leg(end, pitch=pitch)
+    yield Leg(complex(end.real, start.imag), fast=pitch > 0.0)
     yield Leg(start, fast=True)
 
 
 def single_thread(start: complex, end: complex, taper: float, lead: float) -> Iterator[Leg]:
     """The moves of G92 [mm]; `lead` is that along the longer of z and x. Raises ValueError."""
-    begin = complex(start.real, end.imag + taper)
-    along = end - begin
+    along = end - complex(start.real, end.imag + taper)
     if not lead > 0.0 or not abs(along.real) > SAME:
         text = "a thread needs a lead above 0 and room in z between where the tool stands and Z"
         raise ValueError(f"G92: {text}")
-    yield Leg(begin, fast=True)
-    yield Leg(end, pitch=lead * abs(along) / max(abs(along.real), abs(along.imag)))
-    yield Leg(complex(end.real, start.imag), fast=True)
-    yield Leg(start, fast=True)
+    return single_cut(start, end, taper, lead * abs(along) / max(abs(along.real), abs(along.imag)))
 
 
-def pecked(given: Pecking, *, grooving: bool) -> Iterator[Leg]:
-    """The moves of G74, or with `grooving` of G75 [mm]. Raises ValueError."""
-    if grooving:
-        yield from map(exchanged, pecked(exchanged(given), grooving=False))
-        return
+def pecked(given: Pecking) -> Iterator[Leg]:
+    """The moves of G74 [mm]; those of G75 with x and z exchanged. Raises ValueError."""
     deep, wide = given.end.real - given.start.real, given.end.imag - given.start.imag
     retract, peck, relief = given.retract, given.peck, given.relief
     if abs(deep) < SAME:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -64,13 +64,6 @@ class Roughing:
     more: complex = 0j
 
 
-def stock_removal(contour: Contour, given: Roughing, *, facing: bool) -> Iterator[Leg]:
-    """The moves of G71, or with `facing` of G72. Raises ValueError."""
-    if facing:
-        return map(exchanged, _removal(exchanged(contour), exchanged(given)))
-    return _removal(contour, given)
-
-
 def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: complex) -> Iterator[Leg]:
     """The moves of G73: `passes` times along the profile, the first off by `shift`. Raises ValueError."""
     if not 1 <= passes <= PASSES_MAX:
@@ -82,8 +75,9 @@ def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: com
     yield Leg(contour.start, fast=True)
 
 
-def _removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
-    """G71 of a profile; levels are imaginary parts."""
+def stock_removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
+    """The moves of G71, whose levels are imaginary parts; those of G72 with x and z exchanged. Raises
+    ValueError."""
     _require_one_way(contour)
     moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
     first, last = moved[0].end, moved[-1].end
@@ -175,6 +169,11 @@ def _directions(start: complex, leg: Leg) -> list[complex]:
     cuts.sort()
     middles = [(a + b) / 2.0 for a, b in pairwise(cuts) if b - a > SAME]
     return [1j * leg.turning * from_centre * cmath.exp(1j * leg.turning * m) for m in middles]
+
+
+def facing(cycle: Callable[..., Iterator[Leg]], *given: Any) -> Iterator[Leg]:
+    """The moves of a cycle with x and z exchanged."""
+    return map(exchanged, cycle(*map(exchanged, given)))
 
 
 def exchanged(one: Any) -> Any:

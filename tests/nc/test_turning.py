@@ -15,6 +15,7 @@ from planner.nc.turning import (
     Leg,
     Roughing,
     exchanged,
+    facing,
     pattern_repeat,
     stock_removal,
 )
@@ -71,7 +72,7 @@ def test_passes_of_g71_end_on_the_moved_profile(inside: bool) -> None:
     contour = mirrored(SHAFT) if inside else SHAFT
     out = -1.0 if inside else 1.0
     allowance = complex(0.1, 0.25 * out)
-    steps = list(stock_removal(contour, Roughing(3.0, 0.5, allowance), facing=False))
+    steps = list(stock_removal(contour, Roughing(3.0, 0.5, allowance)))
     passes = [(a, b) for a, b in cuts(steps, contour.start)[: -len(SHAFT.legs) + 1] if a.imag == b.imag]
     top, first = contour.start.imag + allowance.imag, contour.legs[0].end.imag + allowance.imag
     assert len(passes) == math.ceil(abs(top - first) / 3.0) - 1
@@ -85,10 +86,10 @@ def test_passes_of_g71_end_on_the_moved_profile(inside: bool) -> None:
 
 
 def test_the_last_pass_is_the_profile_with_its_allowance() -> None:
-    for facing in (False, True):
+    for faces in (False, True):
         contour = (
             SHAFT
-            if not facing
+            if not faces
             else Contour(
                 complex(2.0, 32.0),
                 False,
@@ -98,7 +99,8 @@ def test_the_last_pass_is_the_profile_with_its_allowance() -> None:
                 ),
             )
         )
-        steps = list(stock_removal(contour, Roughing(4.0, 1.0, ALLOWANCE), facing=facing))
+        job = contour, Roughing(4.0, 1.0, ALLOWANCE)
+        steps = list(facing(stock_removal, *job) if faces else stock_removal(*job))
         last = [step for step in steps if not step.fast][-len(contour.legs) + 1 :]
         for leg, wanted in zip(last, contour.legs[1:], strict=True):
             assert leg.end == pytest.approx(wanted.end + ALLOWANCE)
@@ -128,9 +130,7 @@ def test_no_pass_cuts_into_the_moved_profile() -> None:
                 z, x = z - size, x + size
                 legs.append(Leg(complex(z, x), -1 if hollow else 1, centre))
         contour = Contour(complex(2.0, x + float(rng.uniform(0, 3))), True, tuple(legs))
-        steps = list(
-            stock_removal(contour, Roughing(float(rng.uniform(0.5, 3)), 0.3, ALLOWANCE), facing=False)
-        )
+        steps = list(stock_removal(contour, Roughing(float(rng.uniform(0.5, 3)), 0.3, ALLOWANCE)))
         line = surface(contour, ALLOWANCE, 2000)
         order = np.argsort(line.real, kind="stable")
         for begin, end in cuts(steps, contour.start)[: -len(legs) + 1]:
@@ -142,14 +142,14 @@ def test_no_pass_cuts_into_the_moved_profile() -> None:
 def test_g72_is_g71_with_x_and_z_exchanged() -> None:
     given = Roughing(2.0, 0.4, ALLOWANCE)
     other = Roughing(2.0, 0.4, complex(0.25, 0.1))
-    turned = [exchanged(step) for step in stock_removal(exchanged(SHAFT), other, facing=True)]
-    assert turned == list(stock_removal(SHAFT, given, facing=False))
+    turned = [exchanged(step) for step in facing(stock_removal, exchanged(SHAFT), other)]
+    assert turned == list(stock_removal(SHAFT, given))
 
 
 def test_what_the_passes_leave_more_is_taken_by_the_last() -> None:
-    plain = cuts(list(stock_removal(SHAFT, Roughing(3.0, 0.5, ALLOWANCE), facing=False)), SHAFT.start)
+    plain = cuts(list(stock_removal(SHAFT, Roughing(3.0, 0.5, ALLOWANCE))), SHAFT.start)
     more = cuts(
-        list(stock_removal(SHAFT, Roughing(3.0, 0.5, ALLOWANCE, complex(0.2, 0.0)), facing=False)),
+        list(stock_removal(SHAFT, Roughing(3.0, 0.5, ALLOWANCE, complex(0.2, 0.0)))),
         SHAFT.start,
     )
     assert plain[-len(SHAFT.legs) + 1 :] == more[-len(SHAFT.legs) + 1 :]
@@ -181,13 +181,13 @@ def test_g73_is_the_profile_again_and_again() -> None:
 )
 def test_refused_profiles(legs: tuple[Leg, ...], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        list(stock_removal(Contour(2 + 20j, True, legs), Roughing(1.0, 0.1, 0j), facing=False))
+        list(stock_removal(Contour(2 + 20j, True, legs), Roughing(1.0, 0.1, 0j)))
 
 
 def test_refused_depths() -> None:
     for depth in (0.0, -1.0, 1e-9):
         with pytest.raises(ValueError, match="depth"):
-            list(stock_removal(SHAFT, Roughing(depth, 0.1, 0j), facing=False))
+            list(stock_removal(SHAFT, Roughing(depth, 0.1, 0j)))
     with pytest.raises(ValueError, match="passes"):
         list(pattern_repeat(SHAFT, 0, 0j, 0j))
 

@@ -152,7 +152,9 @@ class _Function:
         self.loops.append((loop.name, again, after))
         self._body(loop.body)
         self.loops.pop()
-        if any(isinstance(s, tree.Continue) and s.loop == loop.name for s in tree.statements_in(loop.body)):
+        if any(
+            isinstance(s, tree.Leave) and s.on and s.loop == loop.name for s in tree.statements_in(loop.body)
+        ):
             self.blocks.here(again)
         self._tick(loop.place)
         if loop.kind == "repeat":
@@ -160,13 +162,12 @@ class _Function:
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 
-    def _break(self, statement: tree.Break | tree.Continue) -> None:
+    def _leave(self, leave: tree.Leave) -> None:
         for name, again, after in reversed(self.loops):
-            if name == statement.loop:
-                self.blocks.go(statement.place, after if isinstance(statement, tree.Break) else again)
+            if name == leave.loop:
+                self.blocks.go(leave.place, again if leave.on else after)
                 return
-        what = "break" if isinstance(statement, tree.Break) else "continue"
-        raise tree.ProgramFault(statement.place, f"{what} outside of the loop {statement.loop}")
+        raise tree.ProgramFault(leave.place, f"there is no loop {leave.loop} around this")
 
     def _label_here(self, _: tree.Label) -> None:
         self.blocks.here(self.blocks.numbers[self._seen][1])
@@ -243,8 +244,7 @@ _WRITE: dict[type, Callable[..., None]] = {
     tree.Line: _Function._line,
     tree.If: _Function._if,
     tree.Loop: _Function._loop,
-    tree.Break: _Function._break,
-    tree.Continue: _Function._break,
+    tree.Leave: _Function._leave,
     tree.Label: _Function._label_here,
     tree.Goto: _Function._goto,
     tree.Call: _Function._call,

@@ -150,7 +150,7 @@ class If(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """`while` asks before a turn, `do` after it, `repeat` counts; Break and Continue say its name."""
+    """`while` asks before a turn, `do` after it, `repeat` counts; Leave says its name."""
 
     place: SourcePlace
     kind: str
@@ -159,18 +159,12 @@ class Loop(NamedTuple):
     body: list[Statement]
 
 
-class Break(NamedTuple):
-    """Leave the loop of that name."""
+class Leave(NamedTuple):
+    """Leave the loop of that name, or go `on` with its next turn."""
 
     place: SourcePlace
     loop: str
-
-
-class Continue(NamedTuple):
-    """Go to the next turn of the loop of that name."""
-
-    place: SourcePlace
-    loop: str
+    on: bool
 
 
 class Label(NamedTuple):
@@ -293,7 +287,7 @@ class Statements:
 
 
 Statement = (
-    PlainRows | Line | If | Loop | Break | Continue | Label | Goto | Call | Return | Message | Modes | MadeRows
+    PlainRows | Line | If | Loop | Leave | Label | Goto | Call | Return | Message | Modes | MadeRows
 )  # fmt: skip
 
 

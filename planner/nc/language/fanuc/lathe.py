@@ -10,26 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.nc.integers import LENGTHS
+from planner.nc.language import tree
 from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, of_shared, shared
 from planner.nc.language.source import Source, SourceLine
-from planner.nc.language.tree import (
-    Call,
-    Expression,
-    Goto,
-    Label,
-    Message,
-    Number,
-    Numbered,
-    PlainRows,
-    Procedure,
-    ProgramFault,
-    SourcePlace,
-    Statement,
-    Word,
-    Words,
-    made,
-    row,
-)
 
 _CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+).*?P(\d+)")
 _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
@@ -37,7 +20,9 @@ _AFTER = 1_000_000_000  # label behind the last block of a profile: its number a
 # Words of cycles that are in least increments where they have no point; of others D is.
 _INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
 # The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
-_INCREMENT = Number(1e-4) + (Numbered(Number(4006.0)) - Number(20.0)) * Number(1e-3 - 1e-4)
+_INCREMENT = tree.Number(1e-4) + (tree.Numbered(tree.Number(4006.0)) - tree.Number(20.0)) * tree.Number(
+    1e-3 - 1e-4
+)
 
 
 class LatheParser(LatheWords):
@@ -47,11 +32,11 @@ class LatheParser(LatheWords):
         super().__init__(source)
         self.pairs: set[tuple[int, int]] = set()  # P and Q of the cycles
         self.called: set[tuple[int, int]] = set()  # so far
-        self.profiles: dict[tuple[int, int], tuple[list[Statement], int, int]] = {}
-        self.cycles: list[tuple[tuple[int, int], SourcePlace]] = []
-        self.waiting: dict[str, dict[str, Expression]] = {}  # words of the first blocks of cycles
+        self.profiles: dict[tuple[int, int], tuple[list[tree.Statement], int, int]] = {}
+        self.cycles: list[tuple[tuple[int, int], tree.SourcePlace]] = []
+        self.waiting: dict[str, dict[str, tree.Expression]] = {}  # words of the first blocks of cycles
 
-    def parse(self) -> list[Procedure]:
+    def parse(self) -> list[tree.Procedure]:
         """All procedures of the file, and one for the profile of each cycle."""
         words = self.source.words
         rows = np.flatnonzero(words.letter[words.first[:-1]] != ord("%"))
@@ -66,14 +51,14 @@ class LatheParser(LatheWords):
         for pair, place in self.cycles:
             body, first, last = self.profiles.get(pair, (procedures[0].body, 0, -1))
             if last < 0:
-                self.faults.append(ProgramFault(place, _no_profile(pair)))
+                self.faults.append(tree.ProgramFault(place, _no_profile(pair)))
             elif all(known.name != _profile_name(pair) for known in procedures):
-                procedures.append(Procedure(_profile_name(pair), body[first].place, body[first:last]))
+                procedures.append(tree.Procedure(_profile_name(pair), body[first].place, body[first:last]))
         if not self.source.file:
             start = procedures[0].place
             body = procedures[0].body
-            percent = bool(body) and isinstance(body[0], PlainRows)  # stands before all else
-            body.insert(int(percent), row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
+            percent = bool(body) and isinstance(body[0], tree.PlainRows)  # stands before all else
+            body.insert(int(percent), tree.row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
         return procedures
 
     def take_line(self, line: SourceLine) -> None:
@@ -82,7 +67,7 @@ class LatheParser(LatheWords):
         begun = [pair for pair in self.pairs if pair[0] == number]
         for pair in begun:
             if pair in self.called:  # its cycle has made it: what follows is behind it
-                self.body.append(Goto(line.place, Number(float(_AFTER + pair[1]))))
+                self.body.append(tree.Goto(line.place, tree.Number(float(_AFTER + pair[1]))))
         for pair in begun:
             self.profiles.setdefault(pair, (self.body, len(self.body), -1))
         super().take_line(line)
@@ -92,9 +77,9 @@ class LatheParser(LatheWords):
             if body is self.body and last < 0:
                 self.profiles[pair] = (self.body, first, len(self.body))
         if ended:
-            self.body.append(Label(line.place, _AFTER + number))
+            self.body.append(tree.Label(line.place, _AFTER + number))
 
-    def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
+    def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
         own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
         given = {word.letter: word for word in words if word.letter in own}
         first = not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ")
@@ -112,7 +97,8 @@ class LatheParser(LatheWords):
             self._thread(given, line)
             return
         first_block, last_block = (
-            int(value.value) if isinstance(value := given[letter].value, Number) else -1 for letter in "PQ"
+            int(value.value) if isinstance(value := given[letter].value, tree.Number) else -1
+            for letter in "PQ"
         )
         profile = (first_block, last_block)
         if profile not in self.pairs:
@@ -120,17 +106,19 @@ class LatheParser(LatheWords):
         self.cycles.append((profile, line.place))
         self.called.add(profile)
         name = _profile_name(profile)
-        call = Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
+        call = tree.Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
         if cycle == "G70":
-            self.body += [made(line.place, "start"), call, made(line.place, "back")]
+            self.body += [tree.made(line.place, "start"), call, tree.made(line.place, "back")]
             return
         values = _ROUGHING[cycle](
             self, {letter: self._length(word, cycle, line) for letter, word in given.items()}, line
         )
-        self.body += [shared(values, line), made(line.place, "profile"), call]
+        self.body += [shared(values, line), tree.made(line.place, "profile"), call]
         self.body.append(of_shared(line.place, cycle, values))
 
-    def _removal(self, given: dict[str, Expression], line: SourceLine, depth: str) -> dict[str, Expression]:
+    def _removal(
+        self, given: dict[str, tree.Expression], line: SourceLine, depth: str
+    ) -> dict[str, tree.Expression]:
         """G71 (depth in U of its first block) and G72 (in W)."""
         before = self.waiting.get("G71" if depth == "U" else "G72", {})
         values = {letter: given[letter] for letter in "UWIK" if letter in given}
@@ -142,7 +130,7 @@ class LatheParser(LatheWords):
             values["R"] = before["R"]
         return values
 
-    def _pattern(self, given: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
+    def _pattern(self, given: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:
         before = self.waiting.get("G73", {})
         values = {letter: given[letter] for letter in "UW" if letter in given}
         for letter, first in (("I", "U"), ("K", "W"), ("D", "R")):
@@ -153,7 +141,7 @@ class LatheParser(LatheWords):
             raise line.fault("G73 needs the number of its passes: D, or R in a block before this one")
         return values
 
-    def _thread(self, given: dict[str, Word], line: SourceLine) -> None:
+    def _thread(self, given: dict[str, tree.Word], line: SourceLine) -> None:
         values = {letter: self._length(word, "G76", line) for letter, word in given.items()}
         if self.feed is None:
             raise line.fault("G76 needs the lead of the thread as an F word")
@@ -163,25 +151,25 @@ class LatheParser(LatheWords):
             if first is None or "P" not in given or "Q" not in given:
                 raise line.fault("G76 needs K and D, or P and Q with a block G76 P Q R before it")
             values = {**values, "K": values["P"], "D": values["Q"], **_finishing(first, line)}
-            values["I"] = self._length(given["R"], "G76", line) if "R" in given else Number(0.0)
+            values["I"] = self._length(given["R"], "G76", line) if "R" in given else tree.Number(0.0)
         else:
             if "D" not in given:
                 raise line.fault("G76 needs D, the depth of the first pass")
             values.pop("Q", None)  # the angle of the spindle where the thread begins
             values.pop("R", None)
             text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"
-            self.body.append(Message(line.place, (text,)))
+            self.body.append(tree.Message(line.place, (text,)))
         values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
         values["F"] = self.feed
-        self.body.append(made(line.place, "G76", **values))
+        self.body.append(tree.made(line.place, "G76", **values))
         self.threading = False
 
-    def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
+    def _length(self, word: tree.Word, cycle: str, line: SourceLine) -> tree.Expression:
         """A word of a cycle in the program's unit: a number without a point is in least increments."""
         letter = word.letter
         in_increments = _INCREMENTS.get(cycle, "D")
         is_count = cycle == "G73" and letter == "D"
-        if letter not in in_increments or not isinstance(word.value, Number) or is_count:
+        if letter not in in_increments or not isinstance(word.value, tree.Number) or is_count:
             return word.value
         text = self.source.words.data[word.at - self.source.begin :]
         match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
@@ -190,23 +178,29 @@ class LatheParser(LatheWords):
         return word.value * _INCREMENT
 
 
-_ROUGHING: dict[str, Callable[[LatheParser, dict[str, Expression], SourceLine], dict[str, Expression]]] = {
+_ROUGHING: dict[
+    str, Callable[[LatheParser, dict[str, tree.Expression], SourceLine], dict[str, tree.Expression]]
+] = {
     "G71": lambda parser, given, line: parser._removal(given, line, "U"),
     "G72": lambda parser, given, line: parser._removal(given, line, "W"),
     "G73": LatheParser._pattern,
 }
 
 
-def _finishing(first: dict[str, Expression], line: SourceLine) -> dict[str, Expression]:
+def _finishing(first: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:
     """The first block of G76: P mmrraa has the cuts at full depth, ten chamfers in leads, the angle."""
-    digits = first.get("P", Number(10_000.0))
-    if not isinstance(digits, Number) or digits.value != int(digits.value) or not 0 <= digits.value < 1e6:
+    digits = first.get("P", tree.Number(10_000.0))
+    if (
+        not isinstance(digits, tree.Number)
+        or digits.value != int(digits.value)
+        or not 0 <= digits.value < 1e6
+    ):
         raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")
     often, rest = divmod(int(digits.value), 10_000)
     chamfer, angle = divmod(rest, 100)
     values = {"L": float(max(often, 1)), "E": chamfer / 10.0, "A": float(angle)}
-    found: dict[str, Expression] = {letter: first.get(letter, Number(0.0)) for letter in "QR"}
-    return found | {letter: Number(value) for letter, value in values.items()}
+    found: dict[str, tree.Expression] = {letter: first.get(letter, tree.Number(0.0)) for letter in "QR"}
+    return found | {letter: tree.Number(value) for letter, value in values.items()}
 
 
 def _no_profile(pair: tuple[int, int]) -> str:

@@ -7,7 +7,7 @@ to can be read by others.
 
 import copy
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
@@ -21,6 +21,7 @@ from planner.nc.language.tree import SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Kind, Program
 from planner.nc.state import State
+from planner.nc.turning import Leg
 
 RETRACT = 0.5  # e where the program does not give it; controls have a setting [mm]
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
@@ -49,9 +50,9 @@ class LatheCycles:
             "G74": partial(self._pecking, cycle="G74"),
             "G75": partial(self._pecking, cycle="G75"),
             "G76": self._thread,
-            "G90": partial(self._single, facing=False),
+            "G90": partial(self._single, cut=lathe_cuts.single_cut),
             "G92": self._single_thread,
-            "G94": partial(self._single, facing=True),
+            "G94": partial(self._single, cut=partial(turning.facing, lathe_cuts.single_cut)),
         }
 
     def _begin_at_once(self, making: Making, given: Given) -> Iterable[Row]:
@@ -102,7 +103,9 @@ class LatheCycles:
             allowance=self._allowance(given),
             more=complex(given.get("K", 0.0), given.get("I", 0.0)) * unit,
         )
-        return self._rows(turning.stock_removal(contour, roughing, facing=cycle == "G72"))
+        if cycle == "G72":
+            return self._rows(turning.facing(turning.stock_removal, contour, roughing))
+        return self._rows(turning.stock_removal(contour, roughing))
 
     def _retract(self, making: Making, given: Given, cycle: str) -> float:
         if "R" in given:
@@ -137,10 +140,9 @@ class LatheCycles:
         )
         return self._rows(lathe_cuts.thread_passes(thread), start)
 
-    def _single(self, making: Making, given: Given, *, facing: bool) -> Iterable[Row]:
+    def _single(self, making: Making, given: Given, *, cut: Callable[..., Iterator[Leg]]) -> Iterable[Row]:
         start = self._here()
-        taper = given.get("R", 0.0) * self._unit
-        return self._rows(lathe_cuts.single_cut(start, self._end(given, start), taper, facing=facing))
+        return self._rows(cut(start, self._end(given, start), given.get("R", 0.0) * self._unit))
 
     def _single_thread(self, making: Making, given: Given) -> Iterable[Row]:
         start = self._here()
@@ -157,7 +159,9 @@ class LatheCycles:
             retract=self._retract(making, given, cycle) if "K" in given else 0.0,
             relief=abs(given.get("D", 0.0)) * self._unit,
         )
-        return self._rows(lathe_cuts.pecked(pecking, grooving=cycle == "G75"))
+        if cycle == "G75":
+            return self._rows(turning.facing(lathe_cuts.pecked, pecking))
+        return self._rows(lathe_cuts.pecked(pecking))
 
     def _here(self) -> complex:
         """Where the tool stands; it is the start of the cycle too. Raises ValueError."""
@@ -184,7 +188,7 @@ class LatheCycles:
         """What X words are of a radius."""
         return 2.0 if self._state.diameters else 1.0
 
-    def _rows(self, legs: Iterable[turning.Leg], start: complex | None = None) -> list[Row]:
+    def _rows(self, legs: Iterable[Leg], start: complex | None = None) -> list[Row]:
         """The moves of a cycle from `start`, else from where it began."""
         rows, at = [], self._point(self._start) if start is None else start
         for leg in legs:
@@ -223,9 +227,9 @@ def _contour_of(program: Program, offset: np.ndarray, start: complex) -> turning
             if normal != 1 or abs(sweep) > 2.0 * math.pi:
                 raise ValueError("an arc of the profile lies in another plane than z x; write G18 before it")
             middle = complex(centre[2] - offset[2], centre[0] - offset[0])
-            legs.append(turning.Leg(point, 1 if sweep > 0 else -1, middle))
+            legs.append(Leg(point, 1 if sweep > 0 else -1, middle))
         else:
-            legs.append(turning.Leg(point))
+            legs.append(Leg(point))
     if not legs:
         raise ValueError("the profile of the cycle has no moves")
     if legs[0].turning:

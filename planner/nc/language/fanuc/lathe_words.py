@@ -8,31 +8,15 @@ G50 with coordinates are refused.
 
 from collections.abc import Iterable
 
+from planner.nc.language import tree
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
-from planner.nc.language.tree import (
-    Assignments,
-    Expression,
-    Line,
-    MadeRows,
-    Message,
-    Named,
-    Number,
-    Numbered,
-    SourcePlace,
-    Word,
-    Words,
-    assign,
-    made,
-    row,
-    word,
-)
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
 X_HERE, Z_HERE = (
-    Numbered(Number(5001.0)),
-    Numbered(Number(5002.0)),
+    tree.Numbered(tree.Number(5001.0)),
+    tree.Numbered(tree.Number(5002.0)),
 )  # parameters that hold the end of the last block
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Codes that are not read, and why.
@@ -63,19 +47,19 @@ class LatheWords(FanucParser):
 
     def __init__(self, source: Source):
         super().__init__(source)
-        self.feed: Expression | None = None
+        self.feed: tree.Expression | None = None
         self.threading = False  # G32 is in force
-        self.surface: Expression | None = None  # S of G96
-        self.speed_max: Expression | None = None
+        self.surface: tree.Expression | None = None  # S of G96
+        self.speed_max: tree.Expression | None = None
         self.tool = -1
         self.cut = ""  # G90, G92 or G94 while it is in force
         self.cut_given: set[str] = set()  # its words so far
-        self.retract: dict[str, Expression] = {}  # R of the first blocks of G74 and G75
+        self.retract: dict[str, tree.Expression] = {}  # R of the first blocks of G74 and G75
 
-    def _cycle(self, cycle: str, words: Words, line: SourceLine) -> None:
+    def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
         raise NotImplementedError
 
-    def _words(self, words: Words, assignments: Assignments, line: SourceLine) -> None:
+    def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = {word.code for word in words}
         for code in sorted(codes & set(_REFUSED)):
             raise line.fault(f"{_REFUSED[code]} not read; write the moves out")
@@ -92,53 +76,55 @@ class LatheWords(FanucParser):
         words = self._speeds(words, given, codes, line)
         if "G4" in codes and "P" not in given:
             words = tuple(word._replace(letter="P") if word.letter in "XU" else word for word in words)
-            self.body.append(Line(line.place, tuple(word for word in words if word.letter != "H")))
+            self.body.append(tree.Line(line.place, tuple(word for word in words if word.letter != "H")))
             return
         words = tuple(changed for word in words if (changed := self._changed(word, line)) is not None)
         super()._words(self._threads(words, codes), assignments, line)
 
-    def _changed(self, word: Word, line: SourceLine) -> Word | None:
+    def _changed(self, word: tree.Word, line: SourceLine) -> tree.Word | None:
         """The word as LinuxCNC's lathes have it; None for one that says nothing."""
         letter, code = word.letter, word.code
         if letter in "UW":
             axis, here = ("X", X_HERE) if letter == "U" else ("Z", Z_HERE)
             return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
-            if word.value != Number(0.0):
+            if word.value != tree.Number(0.0):
                 raise line.fault("H moves the axis C, which is not planned; X and Z are", word.at)
             return None
         if code in ("G98", "G99"):
-            return word._replace(value=Number(94.0 if code == "G98" else 95.0))
+            return word._replace(value=tree.Number(94.0 if code == "G98" else 95.0))
         return word
 
-    def _threads(self, words: Words, codes: set[str]) -> Words:
+    def _threads(self, words: tree.Words, codes: set[str]) -> tree.Words:
         if "G32" in codes:
             self.threading = True
         elif codes & {"G0", "G1", "G2", "G3", "G00", "G01", "G02", "G03"}:
             self.threading = False
         if not self.threading or not any(word.letter in "XZ" for word in words):
             return words
-        kept = [word._replace(value=Number(33.0)) if word.code == "G32" else word for word in words]
+        kept = [word._replace(value=tree.Number(33.0)) if word.code == "G32" else word for word in words]
         kept = [word for word in kept if word.letter != "F"]
         if self.feed is not None:
-            kept.append(Word("K", kept[-1].at, self.feed))
+            kept.append(tree.Word("K", kept[-1].at, self.feed))
         return tuple(kept)
 
-    def _tool(self, words: Words, number: Expression, line: SourceLine) -> Words:
+    def _tool(self, words: tree.Words, number: tree.Expression, line: SourceLine) -> tree.Words:
         """T0203 as rows of its own; the other words are left."""
-        if not isinstance(number, Number) or number.value < 0 or number.value != int(number.value):
+        if not isinstance(number, tree.Number) or number.value < 0 or number.value != int(number.value):
             raise line.fault("T takes a number, such as T0203 (tool 2, offset 3)")
         tool = offset = int(number.value)
         if tool >= _TOOL_DIGITS:
             tool, offset = divmod(tool, _TOOL_DIGITS)
         if tool != self.tool:
-            self.body.append(row(line.place, ("T", float(tool)), ("M", 6.0)))
+            self.body.append(tree.row(line.place, ("T", float(tool)), ("M", 6.0)))
         self.tool = tool
         length = (("G", 43.0), ("H", float(offset))) if offset else (("G", 49.0),)
-        self.body.append(row(line.place, *length))
+        self.body.append(tree.row(line.place, *length))
         return tuple(word for word in words if word.letter != "T" and word.code != "M6")
 
-    def _speeds(self, words: Words, given: dict[str, Expression], codes: set[str], line: SourceLine) -> Words:
+    def _speeds(
+        self, words: tree.Words, given: dict[str, tree.Expression], codes: set[str], line: SourceLine
+    ) -> tree.Words:
         """G50 S is kept and becomes D of G96."""
         if "G50" in codes or "G92" in codes:
             if "S" not in given or given.keys() & set("XZUW"):
@@ -156,11 +142,14 @@ class LatheWords(FanucParser):
             return (*words, *self._surface(line))
         return words
 
-    def _surface(self, line: SourceLine) -> list[Word]:
+    def _surface(self, line: SourceLine) -> list[tree.Word]:
         at, speeds = line.place.at, (("S", self.surface), ("D", self.speed_max))
-        return [word("G", at, 96.0), *(word(c, at, speed) for c, speed in speeds if speed is not None)]
+        return [
+            tree.word("G", at, 96.0),
+            *(tree.word(c, at, speed) for c, speed in speeds if speed is not None),
+        ]
 
-    def _single(self, words: Words, codes: set[str], line: SourceLine) -> bool:
+    def _single(self, words: tree.Words, codes: set[str], line: SourceLine) -> bool:
         """Read a line with such a cycle, or a repeated cut; False if it is none. Raises ProgramFault."""
         letters = {word.letter for word in words}
         pecks = next((code for code in PECKS if code in codes), "")
@@ -187,7 +176,7 @@ class LatheWords(FanucParser):
         self._cutting(words, line)
         return True
 
-    def _cutting(self, words: Words, line: SourceLine) -> None:
+    def _cutting(self, words: tree.Words, line: SourceLine) -> None:
         given = {word.letter: word.value for word in words if word.letter in _PLACE + "RIK"}
         self._rest(words, set(given), line)
         taper = "K" if self.cut == "G94" else "I"
@@ -205,12 +194,12 @@ class LatheWords(FanucParser):
             values["F"] = self.feed
             self.cut_given.add("F")
             text = "G92: the control's setting for the chamfer of a thread is taken as 0"
-            self.body.append(Message(line.place, (text,)))
+            self.body.append(tree.Message(line.place, (text,)))
         self.body.append(shared(values, line))
         self.body.append(of_shared(line.place, self.cut, sorted(self.cut_given)))
         self.threading = False
 
-    def _pecking(self, cycle: str, words: Words, line: SourceLine) -> None:
+    def _pecking(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
         own = {word.letter: word for word in words if word.letter in _PLACE + "PQRIKD"}
         if set(own) == {"R"}:
             self.retract[cycle] = own["R"].value
@@ -233,21 +222,21 @@ class LatheWords(FanucParser):
                 values["D"] = own[letter].value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
-        self.body.append(made(line.place, cycle, **values))
+        self.body.append(tree.made(line.place, cycle, **values))
         self.threading = False
 
-    def _rest(self, words: Words, own: set[str], line: SourceLine) -> None:
+    def _rest(self, words: tree.Words, own: set[str], line: SourceLine) -> None:
         """The line's other words, F S T M, which are executed before the cycle."""
         rest = tuple(word for word in words if word.letter not in own and word.code not in (*CUTS, *PECKS))
         if rest:
             self._words(rest, (), line)
 
-    def _length(self, word: Word, cycle: str, line: SourceLine) -> Expression:
+    def _length(self, word: tree.Word, cycle: str, line: SourceLine) -> tree.Expression:
         """A word of a cycle in the program's unit."""
         raise NotImplementedError
 
 
-def absolute(given: dict[str, Expression]) -> dict[str, Expression]:
+def absolute(given: dict[str, tree.Expression]) -> dict[str, tree.Expression]:
     """Words with X and Z for U and W, which count from where the tool is."""
     values = dict(given)
     for letter, axis, here in (("U", "X", X_HERE), ("W", "Z", Z_HERE)):
@@ -256,15 +245,15 @@ def absolute(given: dict[str, Expression]) -> dict[str, Expression]:
     return values
 
 
-def shared(values: dict[str, Expression], line: SourceLine) -> Line:
+def shared(values: dict[str, tree.Expression], line: SourceLine) -> tree.Line:
     """The words in shared names, for a cycle that is made later."""
-    return assign(line.place, *((_shared(letter), value) for letter, value in values.items()))
+    return tree.assign(line.place, *((_shared(letter), value) for letter, value in values.items()))
 
 
-def of_shared(place: SourcePlace, cycle: str, letters: Iterable[str]) -> MadeRows:
+def of_shared(place: tree.SourcePlace, cycle: str, letters: Iterable[str]) -> tree.MadeRows:
     """A cycle of the words in shared names."""
-    return made(place, cycle, **{letter: _shared(letter) for letter in letters})
+    return tree.made(place, cycle, **{letter: _shared(letter) for letter in letters})
 
 
-def _shared(letter: str) -> Named:
-    return Named(f"cycle {letter.lower()}", True)
+def _shared(letter: str) -> tree.Named:
+    return tree.Named(f"cycle {letter.lower()}", True)

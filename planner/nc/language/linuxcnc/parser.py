@@ -87,7 +87,7 @@ class LinuxcncParser(LineParser):
         else:
             if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
                 raise line.fault(f"there is no loop o{label} around this {keyword}")
-            self.body.append((tree.Break if keyword == "break" else tree.Continue)(line.place, label))
+            self.body.append(tree.Leave(line.place, label, keyword == "continue"))
 
     def _begin(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
         if keyword == "sub" and self.open:

@@ -3,18 +3,16 @@ same program again.
 
 The text is RS274NGC in mm: G0 for rapids, G1, G2 and G3 with F words, G4 for dwells and full stops, M and T
 words for the events, of which M0, M1, M6 and M60 are full stops by themselves. Coordinates are rounded to
-`DECIMALS`, a tenth of what the reader may be off.
+`flat.DECIMALS`, a tenth of what the reader may be off.
 """
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.language.flat import flat_number, in_comment
 from planner.nc.program import Kind, PathControl, Program, plain
 from planner.nc.writer import FEED_MIN, round_down
 
-DECIMALS = 7  # of a coordinate in mm
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
-# Characters that must not stand in a comment, and what stands there instead.
-_NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
 
 
@@ -25,7 +23,7 @@ def program_text(program: Program, feeds: FloatArray, tolerance: float) -> str:
                 negative there
     tolerance : contour error budget [mm], for G64 P
     """
-    words = [f"({program.source.rpartition('/')[2].translate(_NO_COMMENT)}, written by feedrate-planner)"]
+    words = [f"({in_comment(program.source)}, written by feedrate-planner)"]
     words += ["G21 G17 G90 G91.1 G94 G40 G49"]
     mode = PathControl(int(program.path_control[0])) if len(program) else PathControl.BLEND
     words += [_CONTROL.get(mode, f"G64 P{plain(tolerance)}")]
@@ -61,14 +59,10 @@ def _blocks(program: Program, feeds: FloatArray) -> list[str]:
 
 
 def _xy(end: FloatArray) -> str:
-    return f"X{_number(end[0])} Y{_number(end[1])}"
+    return f"X{flat_number(end[0])} Y{flat_number(end[1])}"
 
 
 def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> str:
     centre = program.arc_center[row] - position
     code = "G3" if program.arc_sweep[row] > 0 else "G2"
-    return f"{code} {_xy(end)} I{_number(centre[0])} J{_number(centre[1])}"
-
-
-def _number(value: float) -> str:
-    return plain(round(float(value), DECIMALS) + 0.0)  # + 0.0 turns -0 into 0
+    return f"{code} {_xy(end)} I{flat_number(centre[0])} J{flat_number(centre[1])}"

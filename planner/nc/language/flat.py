@@ -15,7 +15,7 @@ from planner.nc.program import Program, plain
 from planner.nc.reader import execute, interpret
 from planner.nc.reading import FANUC, Reading
 
-DECIMALS = 7  # of a flat_number
+DECIMALS = 7  # of a number
 _LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
 _LENGTHS = "".join(map(chr, sorted(LENGTHS)))
 _ENDS = ("M2", "M02", "M30")
@@ -33,8 +33,9 @@ class Flat:
     def __init__(self, source: str, *, points: bool = False):
         self.points = points
         self._dwells = DwellWords()
-        name = PurePath(source).name.translate(_NO_COMMENT)
-        self.lines = [f"({name}, expanded by feedrate-planner: parameters, loops and calls written out)"]
+        self.lines = [
+            f"({in_comment(source)}, expanded by feedrate-planner: parameters, loops and calls written out)"
+        ]
 
     def add(self, words: Words) -> None:
         """The rows of a chunk."""
@@ -61,9 +62,14 @@ class Flat:
         return "\n".join([*self.lines, *([] if ended else ["M2"]), ""])
 
 
+def in_comment(source: str) -> str:
+    """The name of a program as it may stand in a comment."""
+    return PurePath(source).name.translate(_NO_COMMENT)
+
+
 def flat_number(value: float) -> str:
-    """A flat_number without exponent, rounded to `DECIMALS`."""
-    text = repr(round(value, DECIMALS) + 0.0)
+    """A number without exponent, rounded to `DECIMALS`."""
+    text = repr(round(float(value), DECIMALS) + 0.0)  # + 0.0 turns -0 into 0
     return plain(float(text)) if "e" in text else text.removesuffix(".0")
 
 

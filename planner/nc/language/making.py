@@ -215,9 +215,9 @@ class Pecks:
     """Infeeds of a deep hole.
 
     infeed : the first, 0 for all at once;  less : by which each is less than the one before;  least : but at least this
-    breaks : how many infeeds end with a retract by `back` alone, before one that leads out to the clearance
+    breaks : how many infeeds (inf for all) end with a retract by `back` alone, before one that leads out to the clearance
     chip   : depth between two such retracts within an infeed, 0 for none
-    above  : dwell outside [s]
+    above, below : dwells outside, and at the end of each infeed [s]
     ahead  : how far above the depth already drilled rapid speed ends, at the first and at the last infeed
     """
 
@@ -226,9 +226,10 @@ class Pecks:
     ahead: tuple[float, float]
     less: float = 0.0
     least: float = 0.0
-    breaks: int = 0
+    breaks: float = 0
     chip: float = 0.0
     above: float = 0.0
+    below: float = 0.0
 
     def depths(self, depth: float) -> list[float]:
         """Where the infeeds end, down to a depth. Raises ValueError for infeeds that never reach it."""
@@ -251,12 +252,13 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
     broken, done = 0, 0.0
     for k, deep in enumerate(depths):
         for part in range(1, equal_steps(deep - done, pecks.chip)):
-            yield go(hole.top - done - part * pecks.chip, hole.feed)
+            yield feed_to(hole.top - done - part * pecks.chip, hole.feed)
             yield go(hole.top - done - part * pecks.chip + pecks.back)
-        yield go(hole.top - deep, hole.feed)
+        yield feed_to(hole.top - deep, hole.feed)
         done = deep
         if k == len(depths) - 1:
             break
+        yield from dwell_rows(pecks.below)
         if broken < pecks.breaks:
             broken += 1
             yield go(hole.top - deep + pecks.back)

@@ -12,9 +12,21 @@ import numpy as np
 
 from planner.nc.arcs import IN_PLANE
 from planner.nc.interpreter import Interpreter
-from planner.nc.language import travel_rows
 from planner.nc.language.approach import Approach
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
+from planner.nc.language.travel_rows import (
+    AXES,
+    CENTRES,
+    RADIUS,
+    TURNS,
+    Coordinates,
+    G,
+    M,
+    Move,
+    TravelRow,
+    travel_rows_of,
+    words_of,
+)
 from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
@@ -29,7 +41,7 @@ _PLACING = frozenset(
 _NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
 
 
-class RowsThrough(travel_rows.Coordinates):
+class RowsThrough(Coordinates):
     """The frame and the compensation in force.
 
     active : rows are looked at
@@ -52,11 +64,11 @@ class RowsThrough(travel_rows.Coordinates):
         self._approach: Approach | None = None
         self._coming: CornerMove | None = None  # of the next move
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
-        self._between: list[travel_rows.TravelRow] = []  # rows without a move behind it
+        self._between: list[TravelRow] = []  # rows without a move behind it
         self.absolute, self.motion = True, 0
-        self.last: travel_rows.Move | None = None
+        self.last: Move | None = None
         self.lost = False
-        self._ahead: list[travel_rows.TravelRow] = []  # rows that come before the next ones
+        self._ahead: list[TravelRow] = []  # rows that come before the next ones
 
     @property
     def compensated(self) -> bool:
@@ -73,11 +85,11 @@ class RowsThrough(travel_rows.Coordinates):
         if self._idle():
             out += self._restored(words)
             if out:
-                yield travel_rows.words_of(out, words.data, words.files)
+                yield words_of(out, words.data, words.files)
             self.active = self.lost = False
             yield words
             return
-        for one in travel_rows.travel_rows_of(words):
+        for one in travel_rows_of(words):
             try:
                 foreign = self._take(one, out)
             except ProgramFault:
@@ -85,13 +97,13 @@ class RowsThrough(travel_rows.Coordinates):
             except ValueError as fault:
                 raise self._fault(one, str(fault)) from fault
             if foreign:
-                yield travel_rows.words_of(out, words.data, words.files)
+                yield words_of(out, words.data, words.files)
                 out = []
                 self._look()
         if out:
-            yield travel_rows.words_of(out, words.data, words.files)
+            yield words_of(out, words.data, words.files)
 
-    def end(self) -> list[travel_rows.TravelRow]:
+    def end(self) -> list[TravelRow]:
         """Rows left to execute when the program has ended without M2 or M30. Raises ValueError."""
         self._no_corner()
         if self._approach is not None:
@@ -100,17 +112,17 @@ class RowsThrough(travel_rows.Coordinates):
             self._leave()
         return self._taken()
 
-    def _taken(self) -> list[travel_rows.TravelRow]:
+    def _taken(self) -> list[TravelRow]:
         out, self._ahead = self._ahead, []
         return out
 
-    def _fault(self, row: travel_rows.TravelRow, message: str) -> ProgramFault:
+    def _fault(self, row: TravelRow, message: str) -> ProgramFault:
         at = row.words[0][2] if row.words else 0
         return ProgramFault(SourcePlace(sum(begin <= at for begin, _ in self._files), row.line, at), message)
 
-    def _take(self, row: travel_rows.TravelRow, out: list[travel_rows.TravelRow]) -> bool:
+    def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
         """Take a row; True if the position is to be asked of the interpreter behind it."""
-        codes = {value for letter, value, _ in row.words if letter == travel_rows.G}
+        codes = {value for letter, value, _ in row.words if letter == G}
         own = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
         for code in codes & {90.0, 91.0}:
             self.absolute = code == 90.0
@@ -124,12 +136,12 @@ class RowsThrough(travel_rows.Coordinates):
             self.normal = _PLANES[code]
         if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
-        moved = {letter for letter, _, _ in row.words} & {*travel_rows.AXES, *travel_rows.CENTRES}
-        distance = [(travel_rows.G, 90.0), (travel_rows.G, 91.0)]
+        moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
+        distance = [(G, 90.0), (G, 91.0)]
         kept = [word for word in row.words if word[:2] not in distance]
         foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
-        ends = any(letter == travel_rows.M and value in _ENDS for letter, value, _ in row.words)
-        changes = any(letter == travel_rows.M and value == 6.0 for letter, value, _ in row.words)
+        ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
+        changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
         if foreign or changes:
             self._no_corner()
         if (foreign or changes) and self.compensated:
@@ -138,16 +150,16 @@ class RowsThrough(travel_rows.Coordinates):
         if foreign - _PLACING:
             raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
         if foreign:
-            out.append(travel_rows.TravelRow(kept, row.line, row.frame))
+            out.append(TravelRow(kept, row.line, row.frame))
             return True
         if moved and 4.0 not in own:
-            self._move(travel_rows.TravelRow(kept, row.line, row.frame), out)
+            self._move(TravelRow(kept, row.line, row.frame), out)
         elif kept:
-            self._pass(travel_rows.TravelRow(kept, row.line, row.frame), out, last=ends)
+            self._pass(TravelRow(kept, row.line, row.frame), out, last=ends)
             return changes
         return False
 
-    def _pass(self, row: travel_rows.TravelRow, out: list[travel_rows.TravelRow], *, last: bool) -> None:
+    def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
         if last and self._approach is not None:
             raise ValueError("APPR is followed by no contour")
         if self._corner is not None:
@@ -165,36 +177,32 @@ class RowsThrough(travel_rows.Coordinates):
             return
         out += [self._in_units(one) for one in self._offset.pass_row(row)]
 
-    def _move(self, row: travel_rows.TravelRow, out: list[travel_rows.TravelRow]) -> None:
+    def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
         given = {
-            letter: value * (1.0 if letter == travel_rows.TURNS else self._unit)
+            letter: value * (1.0 if letter == TURNS else self._unit)
             for letter, value, _ in row.words
-            if letter != travel_rows.G
+            if letter != G
         }
         target = self.place.copy()
-        for axis, letter in enumerate(travel_rows.AXES):
+        for axis, letter in enumerate(AXES):
             if letter in given:
                 target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
         mapped, arc = self.mapped(target), None
         if self.motion in (2, 3):
             arc = self.arc(self.place, target, given, self.motion == 2, self._unit)
-        named = [b for b in range(3) if travel_rows.AXES[b] in given]
+        named = [b for b in range(3) if AXES[b] in given]
         axes = [a for a in range(3) if (self.matrix[a, named] != 0.0).any()]
         if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self.normal])):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):
             self._beside = False
-        own = {travel_rows.G, *travel_rows.AXES, *travel_rows.CENTRES, travel_rows.RADIUS}
-        own |= {travel_rows.TURNS} if arc is not None else set()
+        own = {G, *AXES, *CENTRES, RADIUS}
+        own |= {TURNS} if arc is not None else set()
         # all but the motion code, coordinates and centre
-        rest = [
-            word for word in row.words if word[0] not in own or (word[0] == travel_rows.G and word[1] > 3.0)
-        ]
+        rest = [word for word in row.words if word[0] not in own or (word[0] == G and word[1] > 3.0)]
         at = row.words[0][2]
         code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
-        move = travel_rows.Move(
-            travel_rows.TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc
-        )
+        move = Move(TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc)
         self.place, self._mapped = target, mapped
         self.moves += 1
         if not move.stands(self.normal):
@@ -213,8 +221,8 @@ class RowsThrough(travel_rows.Coordinates):
         else:
             self._go(move, out)
 
-    def _go(self, move: travel_rows.Move, out: list[travel_rows.TravelRow]) -> None:
-        rows: list[travel_rows.TravelRow] = []
+    def _go(self, move: Move, out: list[TravelRow]) -> None:
+        rows: list[TravelRow] = []
         if self._approach is not None:
             rows, self._offset = self._approach.rows(move)
             self._approach = None
@@ -244,7 +252,7 @@ class RowsThrough(travel_rows.Coordinates):
             raise ValueError("frames and compensation with absolute arc centres are not read")
         self._look()
         if not state.absolute:
-            self._ahead.append(travel_rows.TravelRow([(travel_rows.G, 90.0, 0)], 1, 0))
+            self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))
 
     def _look(self) -> None:
         self._mapped = self.interpreter.state.programmed()[:3].copy()
@@ -264,7 +272,7 @@ class RowsThrough(travel_rows.Coordinates):
         turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
         return self.is_plain and not (waits or turned)
 
-    def _restored(self, words: Words) -> list[travel_rows.TravelRow]:
+    def _restored(self, words: Words) -> list[TravelRow]:
         """Rows that bring back G91 and the motion code, where rows behind them count on them."""
         if not len(words.line):
             return []
@@ -272,12 +280,12 @@ class RowsThrough(travel_rows.Coordinates):
         codes = [] if self.absolute else [91.0]
         if self.motion in (0, 1) and self.motion != self.interpreter.state.motion:
             codes.append(float(self.motion))
-        return [travel_rows.TravelRow([(travel_rows.G, code, at)], line, frame) for code in codes]
+        return [TravelRow([(G, code, at)], line, frame) for code in codes]
 
-    def _in_units(self, row: travel_rows.TravelRow) -> travel_rows.TravelRow:
+    def _in_units(self, row: TravelRow) -> TravelRow:
         if self._unit == 1.0:
             return row
-        lengths = {*travel_rows.AXES, *travel_rows.CENTRES}
-        return travel_rows.TravelRow(
+        lengths = {*AXES, *CENTRES}
+        return TravelRow(
             [(c, v / self._unit if c in lengths else v, at) for c, v, at in row.words], row.line, row.frame
         )

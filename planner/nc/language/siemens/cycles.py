@@ -27,6 +27,7 @@ Patterns of holes, each drilled by the cycle of MCALL:
 Controls may begin a row at its other end, if that is nearer; here it begins at its first hole.
 """
 
+import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -35,14 +36,14 @@ from planner.nc.language.making import (
     HolePlan,
     Maker,
     Making,
+    Pecks,
     Row,
     around,
     coarse_lead,
     drilled,
-    dwell_rows,
-    equal_steps,
     feed_to,
     go,
+    pecked,
     tapped,
 )
 from planner.nc.language.milling import (
@@ -212,21 +213,20 @@ def _straight(name: str, *behind: Row, out: bool = False) -> Maker:
 
 def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
     hole, less = _hole("CYCLE83", given), abs(given.get("DAM", 0.0))
-    first, apart = _depth(given, "FDEP", "FDPR"), _APART / making.unit
-    depth, step = max(first, hole.bottom), hole.top - first
-    equal_steps(hole.top - hole.bottom, less or max(step, _SHORT))
-    yield go(hole.clear)
-    yield feed_to(depth, None)
-    while depth > hole.bottom:
-        yield from dwell_rows(hole.dwell)
-        if given.get("VARI", 0.0):
-            yield go(hole.clear)
-            yield from dwell_rows(given.get("DTS", 0.0))
-        yield go(depth + apart)
-        step = max(step - less, less) if less > 0.0 else step
-        depth = max(depth - step, hole.bottom)
-        yield feed_to(depth, None)
-    yield from dwell_rows(hole.dwell)
+    first, apart = hole.top - _depth(given, "FDEP", "FDPR"), _APART / making.unit
+    yield from pecked(
+        hole,
+        Pecks(
+            max(first, _SHORT),
+            back=apart,
+            ahead=(apart, apart),
+            less=less,
+            least=less,
+            breaks=0 if given.get("VARI", 0.0) else math.inf,
+            above=given.get("DTS", 0.0),
+            below=hole.dwell,
+        ),
+    )
     yield go(hole.retract)
 
 

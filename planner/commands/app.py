@@ -69,13 +69,13 @@ def _plain(fault: Any, options: list[str]) -> None:
         fault.message, fault.possibilities = f"{wrong} has no use any more: {GONE[wrong]}", None
     if type(fault).__name__ == "MissingParameter" and not fault.message:
         fault.message = getattr(fault.param, "help", None) or ""
-    said = str(fault.message or "").removeprefix("Value error, ")
-    if found := _NUMBER.fullmatch(said):
+    text = str(fault.message or "").removeprefix("Value error, ")
+    if found := _NUMBER.fullmatch(text):
         kind = "a whole number" if "integer" in found.groups() else "a number"
-        said = f"give {kind}"
-    elif least := _LEAST.match(said):
-        said = f"must be {least[1]} or more"
-    fault.message = said
+        text = f"give {kind}"
+    elif least := _LEAST.match(text):
+        text = f"must be {least[1]} or more"
+    fault.message = text
 
 
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}

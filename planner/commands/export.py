@@ -97,14 +97,14 @@ def export_command(
             raise InputError(_POSITIONS_ALONE, source=str(plan))
         if for_ is For.stream:
             write_stream(new, trajectory, unit)
-            said = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
+            text = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
         else:
             periods, miss = write_pvt(new, trajectory, unit, WITHIN if within is None else within)
-            said = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
+            text = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
             if between != "cubic":
-                said += f'; the verdict is on interpolation = "{between}" between the setpoints'
+                text += f'; the verdict is on interpolation = "{between}" between the setpoints'
     _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
-    say(f"{output}: {said}")
+    say(f"{output}: {text}")
 
 
 @contextmanager
@@ -148,8 +148,8 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
 
     with _new_directory(output) as new:
         if not plan.is_dir():
-            said = "give the directory that 'plan -o' wrote: the program is needed too"
-            raise InputError(said, source=str(plan))
+            text = "give the directory that 'plan -o' wrote: the program is needed too"
+            raise InputError(text, source=str(plan))
         saved, _, _ = saved_plan(plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)

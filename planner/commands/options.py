@@ -220,8 +220,8 @@ def taking(
         given = {name: kwargs.pop(name) for name in options}
         command(*args, **{argument: gathered(given)}, **kwargs)
 
-    own = inspect.signature(command, eval_str=True)
-    parameters = [p for p in own.parameters.values() if p.name != argument] + [
+    signature = inspect.signature(command, eval_str=True)
+    parameters = [p for p in signature.parameters.values() if p.name != argument] + [
         inspect.Parameter(
             name,
             inspect.Parameter.KEYWORD_ONLY,
@@ -230,7 +230,7 @@ def taking(
         )
         for name, (kind, option) in options.items()
     ]
-    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
 

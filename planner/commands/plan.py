@@ -161,8 +161,8 @@ def plan_command(
         for name in written:
             say(str(output / name) if output else name)
     if result.trajectory is None:
-        kept = f"; {output} was not touched" if output is not None else ""
-        raise NotSolvedError(f"{result.sentence}{kept}")
+        untouched = f"; {output} was not touched" if output is not None else ""
+        raise NotSolvedError(f"{result.sentence}{untouched}")
     if result.verdict is None or not result.verdict.passed:
         raise typer.Exit(FAILED)
 

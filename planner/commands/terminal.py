@@ -103,10 +103,10 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 def memory_used_up(fault: MemoryError, judging: bool = False) -> str:
     """The message for a job that needs more memory than there is, and what to do about it; `judging` a file
     that was planned."""
-    said = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
+    text = f"the memory is used up ({fault})" if str(fault) else "the memory is used up"
     if judging:
-        return f"{said}; verify a part of the motion at a time"
-    return f"{said}; split the program, or use --geometry spline or a faster --method (kinematic, stop)"
+        return f"{text}; verify a part of the motion at a time"
+    return f"{text}; split the program, or use --geometry spline or a faster --method (kinematic, stop)"
 
 
 def say(text: str, *, err: bool = False) -> None:

@@ -104,18 +104,18 @@ def verify_command(
             "cycle_time_s": time,
             "notes": notes,
         }
-        said = {"assumptions": program.assumptions, **verdict_summary(verdict), **about}
-        say(json.dumps(said, indent=2))
+        summary = {"assumptions": program.assumptions, **verdict_summary(verdict), **about}
+        say(json.dumps(summary, indent=2))
     else:
         for note in notes:
             say(f"note: {note}", err=True)
         low, high = float(budgets.min()), float(budgets.max())
-        asked = {
+        inputs = {
             "cycle time": f"{time:.4f} s",
             "tolerance": f"{low:g} mm" if low == high else f"{low:g} to {high:g} mm",
         }
         title = f"{trajectory} on {job}, machine {limits.name}"
-        show(*assumed_lines(program.assumptions), verdict_table(verdict, title, asked))
+        show(*assumed_lines(program.assumptions), verdict_table(verdict, title, inputs))
     if not verdict.passed:
         raise typer.Exit(FAILED)
 

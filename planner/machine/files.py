@@ -49,8 +49,10 @@ def load_machine(path: str | Path) -> Machine:
             if _SETTINGS.search(text)
             else ""
         )
-        said = fault if isinstance(fault, tomllib.TOMLDecodeError) else "a number has more than 4,300 digits"
-        raise InputError(f"not valid TOML: {said}{settings}", source=source) from fault
+        reason = (
+            fault if isinstance(fault, tomllib.TOMLDecodeError) else "a number has more than 4,300 digits"
+        )
+        raise InputError(f"not valid TOML: {reason}{settings}", source=source) from fault
     return machine_from_dict(data, source=source)
 
 

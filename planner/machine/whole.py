@@ -268,27 +268,27 @@ def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -
 
     keys : of the record, under "", and of each of its tables, under its name
     """
-    said: list[str] = []
+    faults: list[str] = []
     found = fault.errors()
     for error in found:
-        if len(said) == FAULTS_SAID:
-            said.append(f"and {len(found) - FAULTS_SAID:,} more")
+        if len(faults) == FAULTS_SAID:
+            faults.append(f"and {len(found) - FAULTS_SAID:,} more")
             break
         place = [part if len(part) <= SHOWN else f"{part[:SHOWN]}..." for part in map(str, error["loc"])]
         key = ".".join(place)
         if error["type"] == "missing":
-            said.append(f"{key}: missing")
+            faults.append(f"{key}: missing")
         elif error["type"] == "extra_forbidden":
             known = keys.get("" if len(place) == 1 else place[0], ())
             near = difflib.get_close_matches(place[-1], known, n=1)
-            said.append(f"{key}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else ""))
+            faults.append(f"{key}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else ""))
         elif error["type"] == "value_error":
             text = error["msg"].removeprefix("Value error, ")
-            said.append(f"{key}: {text}" if key else text)
+            faults.append(f"{key}: {text}" if key else text)
         else:
             needed = _NEEDED.get(error["type"], error["msg"]).format(**error.get("ctx", {}))
-            said.append(f"{key}: {needed}, found {shown(error['input'])}")
-    return "; ".join(said)
+            faults.append(f"{key}: {needed}, found {shown(error['input'])}")
+    return "; ".join(faults)
 
 
 def shown(value: object) -> str:

@@ -198,7 +198,7 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
         block.partial = True
         block.foreign |= letter == "G"
         alone = letter == "M" and code not in codes.M_GROUP and not before
-        return found.own if found else EVERYTHING if alone else ""
+        return found.letters if found else EVERYTHING if alone else ""
     if ignored.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
         block.tool_point, block.at["tool point"] = code // 10, word
         block.events.append((letter, code / 10))
@@ -212,7 +212,7 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
     ignored.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
-    return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.own
+    return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.letters
 
 
 def _add_code(
@@ -248,11 +248,11 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
     """Report words that no code of the line uses; numbers of offsets are counted. Where the line has no
     motion code, the one in force may use them: the interpreter looks."""
     named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
-    block.own = frozenset("".join(codes.WORDS.get(name, "") for name in named))
+    block.uses = frozenset("".join(codes.WORDS.get(name, "") for name in named))
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
-    if "E" in block.own:
+    if "E" in block.uses:
         ignored.used("E")
-    for letter in sorted(block.value.keys() - block.own - _ALWAYS - set(in_force), key=block.at.__getitem__):
+    for letter in sorted(block.value.keys() - block.uses - _ALWAYS - set(in_force), key=block.at.__getitem__):
         if letter in "DH" and not ignored.strict:
             ignored.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
         elif ignored.treatment[ord(letter)] != LEFT_OUT:

@@ -115,7 +115,7 @@ class Assumption:
     of it, and whether that may change geometry or time (docs/language.md)."""
 
     name: str
-    said: str
+    meaning: str
     changes: bool = False
 
     def named(self, times: int) -> str:

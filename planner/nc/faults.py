@@ -59,7 +59,7 @@ class FaultList(MadeWhenAsked[Fault]):
         return Fault(line, words.column(word), words.text(word), message, words.file(word))
 
 
-class Said(NamedTuple):
+class Note(NamedTuple):
     """A note, its line, and whether it is an assumption that may change geometry or time."""
 
     line: int
@@ -83,7 +83,7 @@ class Findings:
         # of the chunks so far, in the order of their words; a line that is executed many times is named once
         self.faults: list[tuple[Words, int, str]] = []
         self._reports: list[tuple[int, str]] = []  # of the chunk that is being read
-        self._said: set[tuple[int, str]] = set()
+        self._reported: set[tuple[int, str]] = set()
         self._notes: dict[tuple[bool, str], list[int]] = {}  # in their order: first line, times
 
     def report(self, word: int, message: str) -> None:
@@ -94,8 +94,8 @@ class Findings:
         """End a chunk: keep its reports and `more` of them in the order of its words."""
         for word, message in sorted(more + self._reports):
             key = (int(words.at[word]), message)
-            if key not in self._said:
-                self._said.add(key)
+            if key not in self._reported:
+                self._reported.add(key)
                 self.faults.append((words, word, message))
         self._reports.clear()
 
@@ -114,16 +114,16 @@ class Findings:
         else:
             self._notes.setdefault((True, text), [line, 0])[1] += 1
 
-    def notes(self, more: Sequence[Said]) -> Notes:
+    def notes(self, more: Sequence[Note]) -> Notes:
         """Assumptions and notes, each once with its first line and how often, and `more`, by line."""
         found = [
-            Said(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
+            Note(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
             for (changes, text), (line, times) in self._notes.items()
         ]
-        ordered = sorted([*found, *more], key=lambda said: said.line)
+        ordered = sorted([*found, *more], key=lambda note: note.line)
         return Notes(
-            tuple(said.text for said in ordered if said.changes),
-            tuple(said.text for said in ordered if not said.changes),
+            tuple(note.text for note in ordered if note.changes),
+            tuple(note.text for note in ordered if not note.changes),
         )
 
 
@@ -226,17 +226,19 @@ class IgnoredWords:
         if parked:
             at = self.parked[ord(letter)]
             where = "" if np.isnan(at) else f" at {plain(float(at))}"
-            said = f"axis {letter} is assumed to stand still{where}"
+            meaning = f"axis {letter} is assumed to stand still{where}"
         elif letter == "E":
-            said = "left out (--extruder ignore); what the extruder does by itself takes no time in this plan"
+            meaning = (
+                "left out (--extruder ignore); what the extruder does by itself takes no time in this plan"
+            )
         else:
-            said = "left out, as --ignore says: the plan knows nothing of this axis"
-        return Assumption(f"{letter} word{{|s}}", said, changes=parked)
+            meaning = "left out, as --ignore says: the plan knows nothing of this axis"
+        return Assumption(f"{letter} word{{|s}}", meaning, changes=parked)
 
-    def notes(self) -> list[Said]:
+    def notes(self) -> list[Note]:
         """Everything that was assumed, by its first line."""
         notes = []
         for what, found in self._counted.items():
-            text = f"{what.named(found.times)}: {what.said}; first {found.word} line {found.line}"
-            notes.append(Said(found.line, text, what.changes))
+            text = f"{what.named(found.times)}: {what.meaning}; first {found.word} line {found.line}"
+            notes.append(Note(found.line, text, what.changes))
         return notes

@@ -182,7 +182,7 @@ class Mover:
                 text = "G53 goes with absolute coordinates only; write G90 before it"
                 raise block.fault(text, "one-shot")
             offsets.assume_origin(state, "G53", block, self.findings)
-        if "H" in block.value and not state.strict and not {"H"} & (block.own | moves.used_in_force(state)):
+        if "H" in block.value and not state.strict and not {"H"} & (block.uses | moves.used_in_force(state)):
             self.ignored.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
         if state.motion in codes.SPLINES or (self.splines.open and "motion" in block.g):

@@ -59,7 +59,7 @@ class Block:
     homing: str = ""  # axes that go to their home position
     stops: bool = False  # one of `events` is a full stop
     settings: list[Setting] = field(default_factory=list)  # commands that set a factor or a limit
-    own: frozenset[str] = frozenset()  # letters of the words that codes of the line use
+    uses: frozenset[str] = frozenset()  # letters of the words that codes of the line use
     tool_point: int | None = None  # number of the M code that switches the tool centre point, or None
 
     def has(self, letters: str) -> bool:
@@ -250,7 +250,7 @@ def check_words(state: State, block: Block) -> None:
     """Raises WordFault for the first word that no code of the line or in force uses."""
     if state.motion == REFUSED_MOTION or block.partial:
         return
-    used = block.own | used_in_force(state)
+    used = block.uses | used_in_force(state)
     for letter in codes.MOTION_WORDS:
         if letter in block.value and letter not in used:
             raise WordFault(block.at[letter], unused(letter))

@@ -55,14 +55,14 @@ def program_of_points(
 def points_file(program: Program) -> bytes:
     """The file of a program that `program_of_points` made."""
     tolerance = float(program.tolerance[0])
-    said = {
+    entries = {
         "format": _FORMAT,
         "axes": "".join(program.axes),
         "tolerance": None if np.isnan(tolerance) else tolerance,
         "feed": [value if np.isfinite(value) else None for value in program.feed.tolist()],
         "points": [program.start.tolist(), *program.end.tolist()],
     }
-    return (json.dumps(said) + "\n").encode("ascii")
+    return (json.dumps(entries) + "\n").encode("ascii")
 
 
 def are_points(data: bytes) -> bool:
@@ -85,11 +85,11 @@ def own_text(program: Program) -> bytes | None:
 def read_points(data: bytes, source: str) -> Program:
     """The program of a file of points. Raises InputError for anything else."""
     try:
-        said: Any = json.loads(data)
-        position = np.asarray(said["points"], dtype=np.float64)
-        feed = np.array([np.inf if value is None else value for value in said["feed"]], dtype=np.float64)
-        tolerance = None if said["tolerance"] is None else float(said["tolerance"])
-        known = said["format"] == _FORMAT and said["axes"] == "".join(AXES)
+        entries: Any = json.loads(data)
+        position = np.asarray(entries["points"], dtype=np.float64)
+        feed = np.array([np.inf if value is None else value for value in entries["feed"]], dtype=np.float64)
+        tolerance = None if entries["tolerance"] is None else float(entries["tolerance"])
+        known = entries["format"] == _FORMAT and entries["axes"] == "".join(AXES)
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
     good = known and position.ndim == 2 and position.shape[1] == len(AXES) and len(position) > 1

@@ -47,7 +47,7 @@ class LimitsInForce:
         self._seen: list[dict[tuple[str, str], float]] = []  # on moves
         self._blocks = 0  # that were looked at
         self._line = self._along = 0  # of the first that is set, of the first acceleration along the path
-        self._kept = 1.0  # factor that M220 B keeps
+        self._kept_factor = 1.0  # factor that M220 B keeps
 
     def take(
         self, settings: Sequence[Setting], state: State, table: BlockTable, line: int, findings: Findings
@@ -63,8 +63,8 @@ class LimitsInForce:
             if setting.name == SPEED_FACTOR:
                 given = setting.values
                 if "b" in given:
-                    self._kept = state.feed_factor
-                factor = self._kept if "r" in given else state.feed_factor
+                    self._kept_factor = state.feed_factor
+                factor = self._kept_factor if "r" in given else state.feed_factor
                 factor = given["s"] / 100.0 if "s" in given else factor
                 state.feed *= factor / state.feed_factor
                 state.feed_factor = factor
@@ -112,8 +112,10 @@ class LimitsInForce:
     ) -> None:
         if name == SPEEDS:
             per_minute = max(given.values(), default=0.0) >= PER_MINUTE
-            said = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
-            findings.assume(f"speeds of {SPEEDS} are read per {said}", line)
+            unit_of_time = (
+                "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
+            )
+            findings.assume(f"speeds of {SPEEDS} are read per {unit_of_time}", line)
             self._set("velocity", given, unit, SECONDS_PER_MINUTE if per_minute else 1.0)
         elif name in ACCELERATIONS:
             self._set("acceleration", given, unit)

@@ -113,7 +113,7 @@ class CodeSetting:
     behind it on its line that are its own, whether it is a full stop."""
 
     what: Assumption | None
-    own: str
+    letters: str
     stops: bool = False
 
 

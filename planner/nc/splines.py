@@ -181,7 +181,7 @@ class SplineReader:
 
 def is_spline_line(block: Block) -> bool:
     """True if a line under a spline's motion code has words of the spline."""
-    return "motion" in block.g or bool(block.value.keys() & set("XYZIJKLRPQ") - block.own)
+    return "motion" in block.g or bool(block.value.keys() & set("XYZIJKLRPQ") - block.uses)
 
 
 def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
@@ -278,8 +278,8 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
             f"the first {order} knots of a spline of order {order} must be equal, and the last {order}", "K"
         )
     inner = knots[order:-order]
-    most = np.unique(inner, return_counts=True)[1].max(initial=0)
-    if most >= order or inner.min(initial=np.inf) == knots[0]:
+    times = np.unique(inner, return_counts=True)[1].max(initial=0)
+    if times >= order or inner.min(initial=np.inf) == knots[0]:
         text = f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
         raise block.fault(text, "K")
     if inner.max(initial=-np.inf) == knots[-1]:

@@ -139,11 +139,11 @@ def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | Non
     whole = _with_axes(program, switch.chain.axes)
     made = _Pieces(whole, on, tilted, switch.chain.with_tool(first.length), machine).program()
     off = int((~on & tilted & (program.kind == Kind.RAPID)).sum())
-    said = f"line {first.line}: the tool centre point is on ({first.word}), x, y, z are of the tip of a tool of {first.length:g} mm"
+    text = f"line {first.line}: the tool centre point is on ({first.word}), x, y, z are of the tip of a tool of {first.length:g} mm"
     if off:
-        said += f"; {off:,} rapid moves with it off and a rotary axis off 0 are straight lines of the joints"
+        text += f"; {off:,} rapid moves with it off and a rotary axis off 0 are straight lines of the joints"
     point = ToolPoint(word=first.word, line=first.line, length=first.length, rapids_off=off)
-    return dataclasses.replace(made, tool_point=point, notes=(*program.notes, said))
+    return dataclasses.replace(made, tool_point=point, notes=(*program.notes, text))
 
 
 def _tilted(program: Program, chain: Chain | None) -> Array:

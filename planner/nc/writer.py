@@ -63,8 +63,13 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     # [mm per minute]; not that of a move under G93 and G95, and in a thread
     f_word_feed = programmed * in_source.unit[row]
     off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
-    own = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
-    moving, row, programmed, often = moving[own], row[own], programmed[own], often[own]
+    changeable = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
+    moving, row, programmed, often = (
+        moving[changeable],
+        row[changeable],
+        programmed[changeable],
+        often[changeable],
+    )
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / in_source.unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf

@@ -212,19 +212,19 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
 
     Raises InputError for a name that is no setting and for values that are none.
     """
-    name, equals, said = text.partition("=")
+    name, equals, value = text.partition("=")
     if not equals:
         raise InputError(
             f"'{text}': write a name and a range, such as tolerance=0.005:0.1:10:log or y.jerk=1e5,2e5"
         )
     name = known_setting(name.strip(), machine)
     unit = unit_of(name, machine)
-    if _DASHED.fullmatch(said):
+    if _DASHED.fullmatch(value):
         raise InputError(f"{text}: for a range write FIRST:LAST:COUNT, for single values A,B,C")
-    if ":" not in said:
-        values = [parse_value(name, value, machine, tolerance) for value in said.split(",")]
+    if ":" not in value:
+        values = [parse_value(name, value, machine, tolerance) for value in value.split(",")]
         return Varied(name=name, values=tuple(dict.fromkeys(values)), unit=unit)
-    parts = said.split(":")
+    parts = value.split(":")
     spacing = parts[3].strip() if len(parts) == 4 else LINEAR
     if len(parts) not in (3, 4) or spacing not in (LINEAR, LOG):
         raise InputError(f"{text}: write FIRST:LAST:COUNT or FIRST:LAST:COUNT:{LOG}")

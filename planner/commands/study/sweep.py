@@ -228,9 +228,9 @@ def sweep_figure(done: Sweep, path: Path) -> None:
         figure.savefig(path, format="png")
 
 
-def _spread(items: object, most: int) -> list[int | None]:
+def _spread(items: object, count_max: int) -> list[int | None]:
     """At most so many of some items, the first and the last among them."""
     every = list(items)  # type: ignore[call-overload]
-    if len(every) <= most:
+    if len(every) <= count_max:
         return every
-    return [every[k] for k in np.unique(np.linspace(0, len(every) - 1, most).round().astype(int))]
+    return [every[k] for k in np.unique(np.linspace(0, len(every) - 1, count_max).round().astype(int))]

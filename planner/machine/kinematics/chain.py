@@ -121,9 +121,9 @@ class Chain:
         c is 0 at the pole. c lies within -pi to pi, the tilt of the first pair within 0 to pi, that of the
         second is its negative."""
         tilt = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
-        own = [sign * tilt for sign in (1.0, -1.0)]
+        angles = [sign * tilt for sign in (1.0, -1.0)]
         pairs = []
-        for angle in own:
+        for angle in angles:
             # with c = 0 the direction's x and y, for a tilt that is no pole
             place = {self.data.rotary[0]: angle, "c": 0.0}
             x0, y0, _ = (np.broadcast_to(v, tilt.shape) for v in self.direction(place))

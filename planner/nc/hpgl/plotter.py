@@ -122,11 +122,11 @@ class _Run:
         if at_will.any():
             text = "no speed (VS) before it; the pen runs as fast as the machine allows"
             assumed.append(f"line {block.line[at_will.argmax()]}: {text}")
-        for ignored, said in ((self.changing, assumed), (self.ignored, notes)):
+        for ignored, notes_of in ((self.changing, assumed), (self.ignored, notes)):
             for name, places in ignored.items():
                 times = f"{len(places)} times, first " if len(places) > 1 else ""
                 why = IGNORED.get(name, "the end of a page")
-                said.append(f"{name} ignored, {times}on line {self._place(places[0])[0]}: {why}")
+                notes_of.append(f"{name} ignored, {times}on line {self._place(places[0])[0]}: {why}")
         if self.unknown:
             count, first = len(self.unknown), self.unknown[0]
             what = f"{count:,} instruction{'s' if count > 1 else ''} that this reader does not know"

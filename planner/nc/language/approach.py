@@ -137,9 +137,9 @@ class Approach(ContourWay):
         there = at_place(before, self._start, _NORMAL)
         deep = at_place(before, self._first, _NORMAL)
         end = at_place(contour, self._first, _NORMAL)
-        own = self.kind == "LCT"
-        code = 1 if own and self.feed is not None else self._motion
-        moves = [Move(self.rest(feed=own), self.at, code, self._start, there, IN_PLANE[_NORMAL])]
+        touches = self.kind == "LCT"
+        code = 1 if touches and self.feed is not None else self._motion
+        moves = [Move(self.rest(feed=touches), self.at, code, self._start, there, IN_PLANE[_NORMAL])]
         if deep[_NORMAL] != there[_NORMAL]:
             moves.append(Move(self.rest(feed=True), self.at, 1, there, deep, [_NORMAL]))
         last = 1 if arc is None else 3 if arc.sweep > 0 else 2

@@ -89,9 +89,9 @@ class OffsetMoves:
             return []
         first, tangent = self._first, move.tangent(self.normal)
         place = self.begin_at(move.begin, tangent)
-        beside = at_place(in_plane(place, self.normal), first.end, self.normal)
+        offset_end = at_place(in_plane(place, self.normal), first.end, self.normal)
         axes = sorted({*first.axes, *IN_PLANE[self.normal]})
-        rows = Move(first.rest, first.at, first.code, first.begin, beside, axes).rows(self.normal)
+        rows = Move(first.rest, first.at, first.code, first.begin, offset_end, axes).rows(self.normal)
         for one in self._waiting:
             rows += [one] if isinstance(one, TravelRow) else one.rows(self.normal)
         self._add(move)

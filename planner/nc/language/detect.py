@@ -196,8 +196,8 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     if _has(words, "Y") or _has(words, "V"):
         return False
     letters = {chr(c) for c in np.unique(words.letter) if c}
-    own = set() if machine is None else {letter.upper() for letter in machine.axes}
-    if letters >= set("XZ") and letters & (set("UW") - own):
+    of_machine = set() if machine is None else {letter.upper() for letter in machine.axes}
+    if letters >= set("XZ") and letters & (set("UW") - of_machine):
         return not letters & set(reading.ignore)
     for codes, needed in (((70.0, 71.0, 72.0, 73.0), "PQ"), ((76.0,), "KD")):
         if any(letters >= set(needed) for letters in _rows_with(words, "G", *codes)):

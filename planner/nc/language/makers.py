@@ -39,7 +39,7 @@ def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     kind = round(given["kind"])
     matrix, shift = making.travel.programmed if kind >= ADDED else (np.eye(3), np.zeros(3))
     name = SIEMENS[kind % ADDED]
-    own, by = np.eye(3), np.zeros(3)
+    step, by = np.eye(3), np.zeros(3)
     for axis, letter in enumerate(AXES):
         if letter not in given:
             continue
@@ -50,16 +50,16 @@ def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
                 raise ValueError(
                     f"a rotation about {letter} tilts the plane; axes that turn are not planned here, and a tilted plane needs them"
                 )
-            own = own @ turned(given[letter], axis)
+            step = step @ turned(given[letter], axis)
         elif name == "SCALE":
             if given[letter] == 0.0:
                 raise ValueError("a scale of 0 makes a point of everything")
-            own[axis, axis] = given[letter]
+            step[axis, axis] = given[letter]
         else:
-            own[axis, axis] = -1.0
+            step[axis, axis] = -1.0
     if "RPL" in given:
-        own = own @ turned(given["RPL"], making.interpreter.state.normal)
-    making.travel.programmed = matrix @ own, matrix @ by + shift
+        step = step @ turned(given["RPL"], making.interpreter.state.normal)
+    making.travel.programmed = matrix @ step, matrix @ by + shift
     return _origin(making)
 
 

@@ -116,13 +116,13 @@ def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
         yield [("F", before)]
 
 
-def equal_steps(whole: float, most: float) -> int:
+def equal_steps(whole: float, step_max: float) -> int:
     """How many equal steps of at most `most` make a length; 1 where `most` is 0. Raises ValueError."""
-    if whole <= 0.0 or most <= 0.0:
+    if whole <= 0.0 or step_max <= 0.0:
         return 1
-    count = whole / most
+    count = whole / step_max
     if count > ROWS_MAX:
-        raise ValueError(f"{most:g} is too small an infeed for {whole:g}: more than {ROWS_MAX:,} passes")
+        raise ValueError(f"{step_max:g} is too small an infeed for {whole:g}: more than {ROWS_MAX:,} passes")
     return max(1, -int(-(count - _ROUNDING) // 1))
 
 

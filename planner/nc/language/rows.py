@@ -99,10 +99,10 @@ class AppendedRows:
             word = int(infinite[0])
             row = int(np.searchsorted(np.cumsum(length), word, side="right"))
             raise NotFinite(int(at[word]), int(tables.line[rows[row]]), chr(letter[word]))
-        kept = ~np.isnan(value)
-        if not kept.all():
-            length = np.add.reduceat(np.append(kept, False), np.cumsum(length) - length) * (length > 0)
-            letter, value, at = letter[kept], value[kept], at[kept]
+        has_value = ~np.isnan(value)
+        if not has_value.all():
+            length = np.add.reduceat(np.append(has_value, False), np.cumsum(length) - length) * (length > 0)
+            letter, value, at = letter[has_value], value[has_value], at[has_value]
         return Words(
             letter=letter,
             value=value,

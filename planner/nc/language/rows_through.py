@@ -123,23 +123,23 @@ class RowsThrough(Coordinates):
     def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
         """Take a row; True if the position is to be asked of the interpreter behind it."""
         codes = {value for letter, value, _ in row.words if letter == G}
-        own = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
+        others = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
         for code in codes & {90.0, 91.0}:
             self.absolute = code == 90.0
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
             self.motion = int(code)
-        for code in own & _PLANES.keys():
+        for code in others & _PLANES.keys():
             if _PLANES[code] != self.normal:
                 if self.compensated:
                     raise ValueError("the plane changes while cutter radius compensation is on")
                 self._no_corner()
             self.normal = _PLANES[code]
-        if own & {20.0, 21.0} and (20.0 in own) != (self._unit != 1.0):
+        if others & {20.0, 21.0} and (20.0 in others) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
         moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
         distance = [(G, 90.0), (G, 91.0)]
-        kept = [word for word in row.words if word[:2] not in distance]
-        foreign = own - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
+        words = [word for word in row.words if word[:2] not in distance]
+        foreign = others - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
         ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
         if foreign or changes:
@@ -150,12 +150,12 @@ class RowsThrough(Coordinates):
         if foreign - _PLACING:
             raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
         if foreign:
-            out.append(TravelRow(kept, row.line, row.frame))
+            out.append(TravelRow(words, row.line, row.frame))
             return True
-        if moved and 4.0 not in own:
-            self._move(TravelRow(kept, row.line, row.frame), out)
-        elif kept:
-            self._pass(TravelRow(kept, row.line, row.frame), out, last=ends)
+        if moved and 4.0 not in others:
+            self._move(TravelRow(words, row.line, row.frame), out)
+        elif words:
+            self._pass(TravelRow(words, row.line, row.frame), out, last=ends)
             return changes
         return False
 
@@ -196,10 +196,10 @@ class RowsThrough(Coordinates):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):
             self._beside = False
-        own = {G, *AXES, *CENTRES, RADIUS}
-        own |= {TURNS} if arc is not None else set()
+        geometry = {G, *AXES, *CENTRES, RADIUS}
+        geometry |= {TURNS} if arc is not None else set()
         # all but the motion code, coordinates and centre
-        rest = [word for word in row.words if word[0] not in own or (word[0] == G and word[1] > 3.0)]
+        rest = [word for word in row.words if word[0] not in geometry or (word[0] == G and word[1] > 3.0)]
         at = row.words[0][2]
         code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
         move = Move(TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc)

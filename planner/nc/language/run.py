@@ -167,7 +167,7 @@ class ProgramRun:
         function = self._function(str(name), word)
         if self._depth >= DEPTH_MAX:
             raise TooDeep(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time")
-        count, numbered, own = whole(times), self.numbered, self.language.locals
+        count, numbered, locals_ = whole(times), self.numbered, self.language.locals
         caller, self._frame = self._frame, self._frame_of(place, str(name))
         self._depth += 1
         self._saved.append(None)
@@ -182,12 +182,12 @@ class ProgramRun:
             if arguments is None:
                 value = function(self, {})
             else:
-                kept = numbered[1 : own + 1]
-                numbered[1 : own + 1] = [self.language.vacant] * own
+                outer = numbered[1 : locals_ + 1]
+                numbered[1 : locals_ + 1] = [self.language.vacant] * locals_
                 for number, given in arguments:
                     numbered[number] = given
                 value = function(self, {})
-                numbered[1 : own + 1] = kept
+                numbered[1 : locals_ + 1] = outer
             if self._restored_at_return[-1]:
                 self.modes("restore", place)
         self._saved.pop()

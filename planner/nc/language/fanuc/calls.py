@@ -155,12 +155,12 @@ def block_name(number: int, program: tree.Procedure) -> str:
     return f"N{number} of O{program.name}" if program.name else f"N{number}"
 
 
-def _split(words: tree.Words, code: str, own: str) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
+def _split(words: tree.Words, code: str, letters: str) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
     """The words that a call does not use, and those that it does."""
     rest, given = [], {}
     for word in words:
         letter = word.letter
-        if letter in own and letter not in given:
+        if letter in letters and letter not in given:
             given[letter] = word.value
         elif word.code != code:
             rest.append(word)

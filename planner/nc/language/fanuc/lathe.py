@@ -80,8 +80,8 @@ class LatheParser(LatheWords):
             self.body.append(tree.Label(line.place, _AFTER + number))
 
     def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
-        own = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
-        given = {word.letter: word for word in words if word.letter in own}
+        letters_of = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
+        given = {word.letter: word for word in words if word.letter in letters_of}
         first = not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ")
         if first:  # of two blocks
             lengths = "QR" if cycle == "G76" else "UWR"
@@ -90,7 +90,7 @@ class LatheParser(LatheWords):
                 for letter, word in given.items()
             }
             return
-        rest = tuple(word for word in words if word.letter not in own and word.code != cycle)
+        rest = tuple(word for word in words if word.letter not in letters_of and word.code != cycle)
         if rest:
             self._words(rest, (), line)
         if cycle == "G76":

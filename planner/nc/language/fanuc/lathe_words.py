@@ -102,11 +102,11 @@ class LatheWords(FanucParser):
             self.threading = False
         if not self.threading or not any(word.letter in "XZ" for word in words):
             return words
-        kept = [word._replace(value=tree.Number(33.0)) if word.code == "G32" else word for word in words]
-        kept = [word for word in kept if word.letter != "F"]
+        others = [word._replace(value=tree.Number(33.0)) if word.code == "G32" else word for word in words]
+        others = [word for word in others if word.letter != "F"]
         if self.feed is not None:
-            kept.append(tree.Word("K", kept[-1].at, self.feed))
-        return tuple(kept)
+            others.append(tree.Word("K", others[-1].at, self.feed))
+        return tuple(others)
 
     def _tool(self, words: tree.Words, number: tree.Expression, line: SourceLine) -> tree.Words:
         """T0203 as rows of its own; the other words are left."""
@@ -200,34 +200,36 @@ class LatheWords(FanucParser):
         self.threading = False
 
     def _pecking(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
-        own = {word.letter: word for word in words if word.letter in _PLACE + "PQRIKD"}
-        if set(own) == {"R"}:
-            self.retract[cycle] = own["R"].value
+        of_cycle = {word.letter: word for word in words if word.letter in _PLACE + "PQRIKD"}
+        if set(of_cycle) == {"R"}:
+            self.retract[cycle] = of_cycle["R"].value
             self._rest(words, {"R"}, line)
             return
-        self._rest(words, set(own), line)
-        values = absolute({letter: word.value for letter, word in own.items() if letter in _PLACE})
+        self._rest(words, set(of_cycle), line)
+        values = absolute({letter: word.value for letter, word in of_cycle.items() if letter in _PLACE})
         along, across = "ZX" if cycle == "G74" else "XZ"
         if along not in values:
             raise line.fault(f"{cycle} needs the bottom as {along} or {'W' if along == 'Z' else 'U'}")
         for letters, peck in (("QK", cycle == "G74"), ("PI", cycle == "G75")):
             for letter in letters:
-                if letter in own:
-                    values["K" if peck else "I"] = self._length(own[letter], cycle, line)
+                if letter in of_cycle:
+                    values["K" if peck else "I"] = self._length(of_cycle[letter], cycle, line)
         if across in values and "I" not in values:
             shift = "P or I" if cycle == "G74" else "Q or K"
             raise line.fault(f"{cycle} with {across} needs {shift}, from one cut to the next")
         for letter in "RD":
-            if letter in own:
-                values["D"] = own[letter].value
+            if letter in of_cycle:
+                values["D"] = of_cycle[letter].value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
         self.body.append(tree.made(line.place, cycle, **values))
         self.threading = False
 
-    def _rest(self, words: tree.Words, own: set[str], line: SourceLine) -> None:
+    def _rest(self, words: tree.Words, of_cycle: set[str], line: SourceLine) -> None:
         """The line's other words, F S T M, which are executed before the cycle."""
-        rest = tuple(word for word in words if word.letter not in own and word.code not in (*CUTS, *PECKS))
+        rest = tuple(
+            word for word in words if word.letter not in of_cycle and word.code not in (*CUTS, *PECKS)
+        )
         if rest:
             self._words(rest, (), line)
 

@@ -188,13 +188,13 @@ class FanucParser(FanucControl):
     def _modal_call(self, call: tree.Call, line: SourceLine) -> None:
         """The call that follows every move: its arguments are computed now and kept in names of their own."""
         assert call.arguments is not None
-        kept: list[tuple[int, tree.Expression]] = []
+        arguments: list[tuple[int, tree.Expression]] = []
         for number, value in call.arguments:
             self.hidden += 1
             name = tree.Named(f"g66 {self.hidden}", False)
             self.body.append(tree.assign(line.place, (name, value)))
-            kept.append((number, name))
-        self.modal = call._replace(arguments=tuple(kept))
+            arguments.append((number, name))
+        self.modal = call._replace(arguments=tuple(arguments))
 
 
 def _targets(texts: list[str]) -> frozenset[int] | None:

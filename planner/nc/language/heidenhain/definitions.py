@@ -12,7 +12,7 @@ from planner.nc.language import tree
 from planner.nc.language.heidenhain import cycles, moves
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import Block, Items, Rows, items, looked_up, own, parameter
+from planner.nc.language.heidenhain.text import Block, Items, Rows, items, looked_up, parameter, variable
 from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
@@ -184,7 +184,7 @@ class Definitions(Flow):
         if cycle in cycles.PATTERNS:
             self._call_cycle(block)
             return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
-        return [tree.assign(block.place, *given, (own("cycle"), tree.Number(float(cycle))))]
+        return [tree.assign(block.place, *given, (variable("cycle"), tree.Number(float(cycle))))]
 
     def _old_cycle(self, block: Block, cycle: int, part: int) -> Rows:
         if cycle in (9, 32, *moves.TITLES) and part == 0:
@@ -206,7 +206,7 @@ class Definitions(Flow):
     def _pecking(self, block: Block, part: int) -> Rows:
         """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
-            return [tree.assign(block.place, (own("cycle"), tree.ONE))]
+            return [tree.assign(block.place, (variable("cycle"), tree.ONE))]
         column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
@@ -224,7 +224,7 @@ class Definitions(Flow):
         machine = False
         for code, column in given.codes:
             at = block.byte(column)
-            own = Line(block.place, (word("M", at, float(code)),))
+            as_it_is = Line(block.place, (word("M", at, float(code)),))
             if code == 99:
                 after += self._call_cycle(block)
             elif code == 91 and not straight:
@@ -235,7 +235,7 @@ class Definitions(Flow):
                 spindle = word("M", at, 3.0 if code == 13 else 4.0)
                 before.append(Line(block.place, (spindle, word("M", at, 8.0))))
             elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
-                before += [own, looked_up(block)]
+                before += [as_it_is, looked_up(block)]
             elif code in REFUSED:
                 raise block.fault(f"M{code} is not read: {REFUSED[code]}; {REMEDY}", column)
             elif code in NOTHING:
@@ -243,10 +243,12 @@ class Definitions(Flow):
             elif code in AT_END and self.file:
                 after.append(Return(block.place))
             elif code in (0, 1, 5, 9, *AT_END):
-                after.append(own)
+                after.append(as_it_is)
             else:
                 # planned and flat programs do not have it: whoever read them would take it for another
-                before.append(assumed_row(block.place, "machine code") if is_of_the_builder(code) else own)
+                before.append(
+                    assumed_row(block.place, "machine code") if is_of_the_builder(code) else as_it_is
+                )
         return before, after, machine
 
     def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from planner.nc.language import tree
-from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, Rows, own, parameter
+from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, Rows, parameter, variable
 
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
 # FN functions by their numbers: comparisons, and operations on two values and on one.
@@ -46,7 +46,7 @@ class Flow:
         if repeat is None:
             self.called.add(label)
             return [tree.Call(block.place, procedure_name(label, self.file), None, block.text)]
-        counter = own(f"rep{self.file}_{self.repeats}")
+        counter = variable(f"rep{self.file}_{self.repeats}")
         self.repeats += 1
         return [tree.repeated(block.place, counter, tree.Number(float(repeat[1])), label)]
 

@@ -68,11 +68,11 @@ class HeidenhainParser(Definitions):
                     name = procedure_name(label, source.file)
                     procedures.append(tree.Procedure(name, self.blocks[first].place, body))
         set_up: list[tuple[tree.Parameter, tree.Expression]] = [
-            (text.own(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
+            (text.variable(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
         ]
         if not source.file:
             set_up += [(one, tree.ZERO) for one in (text.X, text.Y, text.Z, *text.POLE, *text.POLAR)]
-            set_up += [(text.own("cycle"), tree.ZERO), (text.PLANE, tree.TWO)]
+            set_up += [(text.variable("cycle"), tree.ZERO), (text.PLANE, tree.TWO)]
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 

@@ -44,7 +44,7 @@ _ITEM = (
 _ROTARY = ("A", "B", "C")
 
 
-def own(name: str) -> tree.Named:
+def variable(name: str) -> tree.Named:
     """A variable of the reader's own: the position, the pole, what a cycle needs."""
     return tree.Named(f"_{name}", True)
 
@@ -189,11 +189,11 @@ class Formula(TokenReader):
         return tree.op(name, self.value()) if name in LANGUAGE.functions else None
 
 
-X, Y, Z = own("x"), own("y"), own("z")
+X, Y, Z = variable("x"), variable("y"), variable("z")
 POSITION = {"X": X, "Y": Y, "Z": Z}
-POLE = own("cx"), own("cy"), own("cz")
-PLANE = own("plane")  # the normal of the pole's plane, 0 to 2
-POLAR = own("pr"), own("pa")
+POLE = variable("cx"), variable("cy"), variable("cz")
+PLANE = variable("plane")  # the normal of the pole's plane, 0 to 2
+POLAR = variable("pr"), variable("pa")
 
 
 @dataclass

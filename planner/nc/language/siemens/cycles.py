@@ -321,8 +321,8 @@ _CYCLES: dict[str, Maker] = {
 }
 
 
-def _kept(maker: Maker) -> Maker:
+def _keeping_modes(maker: Maker) -> Maker:
     return lambda making, given: around(making, maker(making, given), feed=False)
 
 
-MAKERS = {name: _kept(maker) for name, maker in _CYCLES.items()}
+MAKERS = {name: _keeping_modes(maker) for name, maker in _CYCLES.items()}

@@ -213,3 +213,20 @@ def test_frames_act_as_they_are_combined() -> None:
 def test_frames_that_are_not_known_are_refused(body: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(body)
+
+
+@pytest.mark.parametrize("side", ["RL", "RR"])
+@pytest.mark.parametrize("mirror", ["", "CYCL DEF 8.0\nCYCL DEF 8.1 X\n"])
+def test_a_tangent_arc_is_compensated_as_the_arc_about_its_centre(side: str, mirror: str) -> None:
+    """CT from a line, over a plunge, and from the arc of the CT before it; the centres are known."""
+    begin = f"{mirror}L X-30 Y+0 Z+5 FMAX\nL X-12 {side} F500\nL X+14\nL Z-1\n"
+    end = "L Y+70\nL X-40 Y+70 R0 FMAX"
+    given = read(f"{begin}CT X+27 Y+13\nCT X+14 Y+26\n{end}")
+    known = read(f"{begin}CC X+14 Y+13\nC X+27 Y+13 DR+\nC X+14 Y+26 DR+\n{end}")
+    np.testing.assert_allclose(given.end, known.end, atol=1e-9)
+    np.testing.assert_allclose(given.arc_sweep, known.arc_sweep, atol=1e-9)
+
+
+def test_a_tangent_arc_needs_a_move_of_the_contour_before_it() -> None:
+    with pytest.raises(InputError, match="none in the plane"):
+        read("L X+0 Y+0 FMAX\nL X+9 F100\nAPPR LT X+20 Y+5 LEN6 RL F100\nCT X+30 Y+15\nL X+50\nDEP LT LEN9")

@@ -100,6 +100,13 @@ def test_corners_and_arcs() -> None:
     assert arcs.arc_sweep[2] == pytest.approx(math.pi)
 
 
+def test_a_tangent_arc_is_compensated() -> None:
+    """The contour of CT is that of the arc with the radius that its chord has: |v|^2 / (2 v n)."""
+    text = "T1 M6\nG0 X-20 Y0\nG1 G41 X-8 F300 CFTCP\nG1 X9\n{}\nG1 Y60\nG40 G0 X-50"
+    given, known = (read(text.format(arc)) for arc in ("CT X19 Y10", "G3 X19 Y10 CR=10"))
+    np.testing.assert_allclose(ends(given), ends(known), atol=1e-9)
+
+
 def test_a_line_is_repeated_by_its_label() -> None:
     found = read(
         "G91 G1 X0 F100\nSTEP: X2\nY1\nREPEATB STEP P=2\nN70 Y3\nR1=R1+1\nIF R1<3 GOTOB N70\nN90 X-1\nREPEATB N90"

@@ -19,6 +19,7 @@ from planner.nc.language.tokens import Token, TokenReader
 
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
 _PIECE = re.compile(r"\((?P<inner>[^()]*)\)|;(?P<rest>.*)|(?P<open>\()|(?P<kept>[^ \t\r\x1a(;]+)", re.DOTALL)
+_LETTERS = re.compile(r"[A-Za-z]+")
 LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, which is known here
 
 
@@ -76,15 +77,16 @@ class LineReader(TokenReader):
 
     def expect(self, text: str, after: str = "") -> None:
         if not self.take(text):
-            raise self.fault(f"{text} is missing{after and ' after '}{after}; {self._comes()} comes instead")
+            after = after or ("the expression" if text == self.closing else "this")
+            raise self.fault(f"{text} is missing after {after}; {self._comes()} comes instead")
 
     def _comes(self) -> str:
         return "the end of the line" if self.ended else repr(self.text[self.column()])
 
     def no_value(self) -> tree.ProgramFault:
-        if self.kind() in ("name", "letter"):
+        if letters := _LETTERS.match(self.text, self.column()):
             known = ", ".join(sorted(self.language.functions))
-            return self.fault(f"{self.peek()} is no function; there are {known}")
+            return self.fault(f"{letters[0].upper()} is no function; there are {known}")
         text = "a number, parameter, function or [expression] was expected"
         return self.fault(f"{text}; {self._comes()} comes")
 

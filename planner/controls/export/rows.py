@@ -189,7 +189,7 @@ def _flags(before: list[Word], rest: str) -> list[Word]:
     is told. None where the line is not that of a setting to which they all belong."""
     alone = [word.letter for word in before if word.letter in "GM"] == ["M"] and before[0].letter == "M"
     found = setting("M", before[0].code, "", "") if alone and _FLAGS.fullmatch(rest) else None
-    if found is None or found.own != EVERYTHING:
+    if found is None or found.letters != EVERYTHING:
         return []
     return [Word(c.upper(), float(number or "nan"), number) for c, number in _FLAG.findall(rest)]
 
@@ -224,7 +224,7 @@ def _parted(words: list[Word], ignored: frozenset[str]) -> tuple[list[Word], lis
                 own = ""
             else:
                 others.append([word])
-                own = found.own if found and not left_out else EVERYTHING
+                own = found.letters if found and not left_out else EVERYTHING
                 own += "E" if word.code == G92 else ""
         elif word.letter in own:
             others[-1].append(word)

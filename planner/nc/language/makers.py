@@ -189,7 +189,7 @@ def _direction(making: Making) -> complex:
 def _executed(interpreter: Interpreter, normal: int) -> complex:
     """Tangent at the end of the last move in the plane that was executed, of any length; 0 for none."""
     table = interpreter.table
-    arcs = {block: arc for block, *arc in table.arcs}
+    arcs = {block: (centre, about, sweep) for block, centre, about, sweep in table.arcs}
     for k in range(table.blocks - 1, -1, -1):
         end = in_plane(table.block.end[k], normal)
         way = end - (in_plane(table.block.end[k - 1], normal) if k else 0j)

@@ -5,6 +5,8 @@ cut or round: every point of it is within eps of the path, and a corner within e
 than 2 eps of the length on either side. So vertex i+1 is looked for where the length run since vertex i is
 within `SLACK` eps of L, never before vertex i, at the nearest point of the chords there. Order and length
 decide, not nearness alone: closed paths, full circles and neighbouring turns of a spiral are told apart.
+Among blocks shorter than eps the nearest point may be behind those of the vertices after it: of a motion that
+is known to its end, each vertex is passed while all after it can still be passed within their tolerances.
 (Which block each point of a motion is at, by distances and budgets, is in geometry/point_matching.py.)
 """
 
@@ -36,7 +38,8 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     stop = np.flatnonzero(toolpath.joint == Joint.STOP)
     begin, end = _standing(motion)
     if len(begin) != len(stop) or len(stop) == 2:
-        return passing_times_of([motion], toolpath)
+        stop, begin = np.array([0, len(toolpath)]), np.array([0, len(motion) - 1])
+        end = begin
     times = np.empty(len(toolpath) + 1)
     for first, last, leaves, arrives in zip(stop[:-1], stop[1:], end[:-1], begin[1:], strict=True):
         run = slice(leaves, arrives + 1)
@@ -44,7 +47,8 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
         wanted = _wanted(toolpath, first, last)
         of_run = times[first : last + 1]
         of_run[0] = motion.t[leaves]
-        _pass(seen, wanted, of_run, 1, 0.0, True)
+        latest = _latest(seen, wanted, toolpath.tolerance[first : last + 1])
+        _pass(seen, wanted, latest, of_run, 1, 0.0, True)
         of_run[-1] = motion.t[arrives]
     return times
 
@@ -53,7 +57,7 @@ def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatA
     """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one
     before."""
     times = np.empty(len(toolpath) + 1)
-    wanted = _wanted(toolpath, 0, len(toolpath))
+    wanted, latest = _wanted(toolpath, 0, len(toolpath)), np.full(len(toolpath) + 1, np.inf)
     seen: tuple[FloatArray, ...] | None = None
     done, share = 1, 0.0
     for chunk in chunks:
@@ -63,10 +67,10 @@ def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatA
         else:
             fresh = int(np.searchsorted(chunk.t, seen[2][-1], side="right"))
             seen = tuple(np.concatenate([old, more[fresh:]]) for old, more in zip(seen, new, strict=True))
-        done, k, share = _pass(seen, wanted, times, done, share, False)
+        done, k, share = _pass(seen, wanted, latest, times, done, share, False)
         seen = tuple(column[k:].copy() for column in seen)
     assert seen is not None
-    _pass(seen, wanted, times, done, share, True)
+    _pass(seen, wanted, latest, times, done, share, True)
     return times
 
 
@@ -104,7 +108,42 @@ def _wanted(toolpath: Toolpath, first: int, last: int) -> tuple[FloatArray, Floa
 
 
 @njit(cache=True, error_model="numpy")
-def _pass(seen, wanted, times, i, share, last_part):
+def _foot(position, n, vertex, least):
+    """Of chord n the share at which it is nearest to a vertex, `least` or more, and the square of the distance there."""
+    along, size = 0.0, 0.0
+    for axis in range(position.shape[1]):
+        step = position[n + 1, axis] - position[n, axis]
+        along += (vertex[axis] - position[n, axis]) * step
+        size += step * step
+    q = max(min(max(along / size, 0.0), 1.0) if size > 0.0 else 0.0, least)
+    apart = 0.0
+    for axis in range(position.shape[1]):
+        there = position[n, axis] + q * (position[n + 1, axis] - position[n, axis])
+        apart += (vertex[axis] - there) ** 2
+    return q, apart
+
+
+@njit(cache=True, error_model="numpy")
+def _latest(seen, wanted, within):
+    """(M+1,) the way run [mm] up to which a motion has to pass each vertex so that it still passes all that follow
+    within their tolerances, `within` (M+1,) [mm]; seen, wanted as of `_pass`. Of vertices that it does not pass so it
+    is that of the next one."""
+    position, s, _ = seen
+    vertex, length, slack = wanted
+    latest, n = np.full(len(vertex), s[-1]), len(s) - 2
+    for i in range(len(vertex) - 2, 0, -1):
+        latest[i], k, least = latest[i + 1], n, latest[i + 1] - length[i] - slack[i]
+        while k >= 0 and s[k + 1] >= least:
+            q, apart = _foot(position, k, vertex[i], 0.0)
+            if apart <= within[i] ** 2:
+                latest[i], n = min(latest[i], s[k] + q * (s[k + 1] - s[k])), k
+                break
+            k -= 1
+    return latest
+
+
+@njit(cache=True, error_model="numpy")
+def _pass(seen, wanted, latest, times, i, share, last_part):
     """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as
     it goes; of the last part to the end. The place reached is at the `share` of the first chord.
 
@@ -112,6 +151,7 @@ def _pass(seen, wanted, times, i, share, last_part):
              [mm] and times (T,) [s]
     wanted : vertices (M+1, A) [mm], lengths (M,) of the segments after them, and by how much the way run may
              differ (M,) [mm]
+    latest : (M+1,) the way run at which a vertex is passed at most [mm]
 
     Returns the next vertex, and the place reached: chord and share of it.
     """
@@ -124,23 +164,13 @@ def _pass(seen, wanted, times, i, share, last_part):
         begin, end = here + length[i - 1] - slack[i - 1], here + length[i - 1] + slack[i - 1]
         if s[last + 1] <= end and not last_part:
             break
+        begin, end = min(begin, latest[i]), min(end, latest[i])
         while k < last and s[k + 1] < begin:
             k, share = k + 1, 0.0
         nearest, best, best_share = np.inf, k, share
         n = k
         while n <= last and (n == k or s[n] <= end):
-            along, size = 0.0, 0.0
-            for axis in range(position.shape[1]):
-                step = position[n + 1, axis] - position[n, axis]
-                along += (vertex[i, axis] - position[n, axis]) * step
-                size += step * step
-            q = min(max(along / size, 0.0), 1.0) if size > 0.0 else 0.0
-            if n == k:
-                q = max(q, share)
-            apart = 0.0
-            for axis in range(position.shape[1]):
-                there = position[n, axis] + q * (position[n + 1, axis] - position[n, axis])
-                apart += (vertex[i, axis] - there) ** 2
+            q, apart = _foot(position, n, vertex[i], share if n == k else 0.0)
             if apart < nearest:
                 nearest, best, best_share = apart, n, q
             n += 1

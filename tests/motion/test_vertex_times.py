@@ -56,3 +56,17 @@ def test_a_joint_that_is_cut_is_not_looked_for_behind_the_next_full_stop() -> No
     times = passing_times(motion_through(places), toolpath)
     assert 0 < times[1] < 1
     assert np.allclose(times[[0, 2, 3, 4]], np.arange(len(places)))
+
+
+def test_a_joint_is_passed_so_early_that_those_after_it_are_passed_within_their_tolerances() -> None:
+    """A motion up to (1.2, 0.5) and back: it is nearest to the first corner on its way back, when it has left the second one."""
+    places = np.array([[0.0, 0.0], [1.0, 0.3], [1.2, 0.5], [1.0, 0.0], [0.2, 0.0]])
+    text = "G21 G90 F600 G64 P0.35\nG1 X1\nG1 X1.2 Y0.7\nG1 X1.1 Y0.3\nG1 X0.2 Y0\nM2\n"
+    toolpath = toolpath_from_program(parse_program(text, MACHINE), MACHINE)
+    motion = motion_through(places)
+    times = passing_times(motion, toolpath)
+    vertex = np.vstack([toolpath.start, toolpath.end[-1:]])
+    at = np.stack([np.interp(times, motion.t, column) for column in motion.position.T], axis=1)
+    assert (np.diff(times) >= 0.0).all()
+    assert (np.linalg.norm(at - vertex, axis=1) <= 0.36).all()
+    assert times[1] < times[2] < 2.5

@@ -1,32 +1,35 @@
 """Single corners instead of splines, on the runs between full stops where they are faster.
 
-A closed form (corner_times.py) and, on shorter paths, the motion without jerk limits on a coarse grid give a
-lower bound on the time of single corners. If the bound is above the time of the splines, there is nothing to
-compare. Otherwise the corners are planned, by themselves: on the grid of the rounds, those that are still
-close to the splines on the final one, and those that win with the whole path. That takes at least the points
-of their own grid, of which corners of a few um need 200 each if jerks are low; runs are therefore compared in
-the order of their possible gain per point, up to `COMPARED_POINTS`, and the notes say which runs were left
-out.
+The motion without jerk limits on a coarse grid gives a lower bound on the time of single corners. If the bound
+is above the time of the splines, there is nothing to compare. Otherwise the corners are planned, by
+themselves: on the grid of the rounds, those that are still close to the splines on the final one, and those
+that win with the whole path. That takes at least the points of their own grid, of which corners of a few um
+need 200 each if jerks are low; runs are therefore compared in the order of their possible gain per point, up
+to `COMPARED_POINTS`, and the notes say which runs were left out.
 """
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.samples import RESOLUTION, sample_path
+from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.planning.job.job import Job
-from planner.planning.optimal.corner_times import CornerBounds, corner_times
 from planner.planning.optimal.effort import Grids
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, second_order
 from planner.smoothing.spline_path import with_spline
 
 COMPARED_POINTS = SIZES.corners_compared
+# Points on a grid of the usual resolution, about: of a corner (98 on chords of 0.3 mm, 213 on chords of 20
+# um, at a/j = 40 ms), and of the rest of a leg.
+CORNER_POINTS, LEG_POINTS = 100.0, 10.0
 # On a grid of so many times the usual resolution the second-order time on corners comes out too long (9 % on
 # chords of 0.1 mm): this share of it is less than what corners take (tested). The errors of a grid go with
 # the square of its intervals: it has a tenth of the usual one's points (22.7 and 213 for each corner on
@@ -41,29 +44,35 @@ FASTER = (
 )
 
 
-def corner_bounds(
-    path: SmoothPath, machine: Machine, jerk_limited: bool = True, most: float = COMPARED_POINTS
-) -> CornerBounds:
-    """The closed form (corner_times.py); of paths of up to `most` points also from the motion without jerk
-    limits on a coarse grid, the larger of both. Of a motion without a solution there nothing is known: no
-    time at all, so that the corners are planned to see. Corners that no grid follows have no motion: their
-    runs take forever.
+class CornerBounds(NamedTuple):
+    """Of a motion on corners between G full stops: time (G,) that it takes at least [s], points (G,) of its
+    grid, about."""
+
+    time: FloatArray
+    points: FloatArray
+
+
+def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
+    """Bounds from the motion without jerk limits on a coarse grid. Of paths of more than `COMPARED_POINTS`
+    points, and of a motion without a solution there, nothing is known: no time at all, so that the corners
+    are planned to see. Corners that no grid follows have no motion: their runs take forever.
     """
-    bounds = corner_times(path, machine, jerk_limited=jerk_limited)
-    if bounds.points.sum() > most:
-        return bounds
+    stop = np.flatnonzero(path.joint == Joint.STOP)
+    points = np.add.reduceat(LEG_POINTS + CORNER_POINTS * (path.d[:-1] > 0.0), stop[:-1])
+    if points.sum() > COMPARED_POINTS:
+        return CornerBounds(np.zeros(len(points)), points)
     samples = sample_path(path, machine, COARSER * RESOLUTION, third_order=True)
     points = FEWER * np.diff(samples.piece)
     followed = np.maximum.reduceat(samples.margin, samples.piece[:-1]) < 1.0
     if not followed.all():
         time = np.full(len(points), np.inf)
         if followed.any():
-            time[followed] = corner_bounds(path.part(followed), machine, jerk_limited, most).time
+            time[followed] = corner_bounds(path.part(followed), machine).time
         return CornerBounds(time, points)
     planned = second_order(path, samples, machine, Reachability())
     if not planned.solution.solved:
         return CornerBounds(np.zeros(len(points)), points)
-    return CornerBounds(np.maximum(bounds.time, COARSE_SHARE * planned.stop_to_stop()), points)
+    return CornerBounds(COARSE_SHARE * planned.stop_to_stop(), points)
 
 
 def with_corners(

@@ -109,7 +109,7 @@ def time_optimal(job: Job, settings: Settings) -> OnPath:
     # Single corners between full stops where they are faster.
     if settings.corner == AUTO:
         with job.stage("solve"):
-            bounds = corner_bounds(rounded, machine, order.jerk_limited)
+            bounds = corner_bounds(rounded, machine)
         best, left = with_corners(rounded, best, bounds, job, order, grids)
         notes = not_compared_note(rounded, left, bounds.points)
 

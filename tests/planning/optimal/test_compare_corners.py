@@ -24,8 +24,12 @@ from planner.nc.reader import parse_program
 from planner.planning.job.trace import tell_nobody
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.optimal import compare_corners
-from planner.planning.optimal.compare_corners import COMPARED_POINTS, corner_bounds, with_corners
-from planner.planning.optimal.corner_times import CornerBounds, corner_times
+from planner.planning.optimal.compare_corners import (
+    COMPARED_POINTS,
+    CornerBounds,
+    corner_bounds,
+    with_corners,
+)
 from planner.planning.optimal.effort import COARSE, Grids
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import second_order
@@ -80,28 +84,34 @@ def test_auto_is_never_slower_than_single_corners(name):
 )
 @pytest.mark.usual_sizes
 def test_bounds_are_less_than_what_corners_take(program, limited):
-    """What `auto` does not even try could not have been faster: neither the closed form nor the coarse time is above the exact one."""
+    """What `auto` does not even try could not have been faster: the coarse time is not above the exact one."""
     rounded = round_corners(toolpath_from_program(program, MACHINE, None), MACHINE, BezierCorner())
     if limited:
         rounded = round_corners(rounded.toolpath, MACHINE, BezierCorner(), blend_tangents=True)
         exact = planned_on(rounded)
     else:
         exact = second_order(rounded, sample_path(rounded, MACHINE), MACHINE, Reachability())
-    for bounds in (
-        corner_times(rounded, MACHINE, jerk_limited=limited),
-        corner_bounds(rounded, MACHINE, limited),
-    ):
-        assert (bounds.time < exact.stop_to_stop()).all()
-        grid = sample_path(rounded, MACHINE, third_order=True)
-        assert 0.3 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
+    bounds = corner_bounds(rounded, MACHINE)
+    assert (bounds.time < exact.stop_to_stop()).all()
+    grid = sample_path(rounded, MACHINE, third_order=True)
+    assert 0.3 * len(grid) < bounds.points.sum() < 3.0 * len(grid)
 
 
-def test_the_closed_form_rules_out_corners_on_dense_chords():
-    """On a relief of 60 chords single corners take longer than splines by what the closed form says alone."""
+def test_the_bound_rules_out_corners_on_dense_chords():
+    """On a relief of 60 chords single corners take longer than splines by what the bound says."""
     program = parse_program(relief(60), MACHINE)
     rounded, shape = shaped(program)
     splines = planned_on(with_spline(rounded, shape), shape=shape)
-    assert corner_times(rounded, MACHINE).time.sum() > splines.solution.cycle_time
+    assert corner_bounds(rounded, MACHINE).time.sum() > splines.solution.cycle_time
+
+
+def test_of_corners_on_too_many_points_nothing_is_known(monkeypatch):
+    rounded, _ = shaped(problems.zigzag())
+    known = corner_bounds(rounded, MACHINE)
+    monkeypatch.setattr(compare_corners, "COMPARED_POINTS", 10)
+    bounds = corner_bounds(rounded, MACHINE)
+    assert (bounds.time == 0.0).all()
+    assert 0.3 * known.points.sum() < bounds.points.sum() < 3.0 * known.points.sum()
 
 
 def test_corners_that_win_are_planned_by_themselves_on_both_grids_and_then_with_the_whole_path():

@@ -69,10 +69,9 @@ class Sizes:
     convolved_at_once: int = _size(PARTS, 50_000, 40)  # setpoints, for the planner: 5 MB
     stops_at_once: int = _size(PARTS, 500, 2)  # 5 MB an array
 
-    # Splines. Ranges cost a window more for each of them.
+    # Splines.
     relaxed_window: int = _size(ROUTES, 240, 120)  # control points relaxed at a time ...
     relaxed_overlap: int = _size(ROUTES, 30, 30)  # ... and of them again with the next window
-    relaxed_range: int = _size(ROUTES, 4_000, 140)  # runs of fewer than two are relaxed as one
     laid_range: int = _size(ROUTES, 4_000, 20)  # vertices; runs of fewer than two are laid as a whole
 
     # The feedrate along a path, and the search for path and feedrate together.

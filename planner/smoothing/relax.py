@@ -6,11 +6,6 @@ is known yet.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are
 tightened by as much as the bound is too large, and relaxed again.
-
-A long run is relaxed in ranges, side by side, with `DEGREE` control points between them that stay; then in
-one window around each gap. Control points further away than that are none of a range's business, so that it
-does not matter which one is first. The ranges depend on the run alone: the result is the same on any number
-of threads.
 """
 
 from typing import NamedTuple
@@ -38,9 +33,7 @@ from planner.smoothing.sites import (
 )
 from planner.smoothing.windows import (
     AGAIN,
-    REACH,
     Reach,
-    in_ranges,
     in_shares,
     next_window,
     tighten_window,
@@ -56,7 +49,6 @@ USED = 0.9995  # of the tolerance that sites may use at first [-]: the relaxatio
 # spline.
 ROUNDS = 20
 SPANS_SHARED = SIZES.relaxed_shared
-RANGE = SIZES.relaxed_range
 
 
 class Goal(NamedTuple):
@@ -110,32 +102,15 @@ def _relaxed_window(window, run, control, radius, goal):
     return found.control[lo - a : hi - a] + origin
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def relax_range(run, goal, begin, end, control):
-    """Relax the control points begin .. end - 1 of a run, window by window, where they are (n, A). Reads
-    `DEGREE` control points more on both sides."""
-    done, nothing = begin, np.zeros(len(run.sites.span))
-    while done < end:
-        lo, hi, _ = next_window(0, done, 0, begin, end, run.sites.span, nothing, goal.reach)
-        control[lo:hi] = _relaxed_window(window_of(run, lo, hi), run, control, run.sites.radius, goal)
-        done = hi
-
-
 @njit(cache=True, error_model="numpy")
-def _relax_run(run, start, goal, only_outside):
-    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites, or
-    only in windows around the sites where it has no certificate; returns whether the result has a
-    certificate, and the rest of `Relaxed`."""
+def _relax_run(run, start, goal):
+    """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites;
+    returns whether the result has a certificate, and the rest of `Relaxed`."""
     control, radius = start.copy(), run.sites.radius.copy()
     ratio_site = np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
     end = len(control) - run.fixed_last
-    if only_outside:
-        certificate = certify(run.corridor, run.knots, run.sites.place, control)
-        ratio_site, left = certificate.site, certificate.left
-        if certificate.span.max() <= 1.0:
-            return True, control, radius, left
-    for attempt in range(int(only_outside), ROUNDS):
+    for attempt in range(ROUNDS):
         done, site = run.fixed_first, 0
         while True:
             lo, hi, site = next_window(
@@ -172,41 +147,16 @@ def _begin(q, corridor, splines, runs, used, goal):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _finish(q, run, start, splines, goal, only_outside, found):
-    """Relax run q and write it into the columns of `Relaxed`, which hold what was before."""
-    certified, control, radius, left = found
-    certified[q], moved, smaller, kept = _relax_run(run, start, goal, only_outside)
-    if certified[q]:
-        control[control_first(splines, q) : control_first(splines, q + 1)] = moved
-        radius[splines.site_first[q] : splines.site_first[q + 1]] = smaller
-    left[splines.span_first[q] : splines.span_first[q + 1]] = kept
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
 def _relax(corridor, splines, runs, used, goal, own, found):
-    """Write the runs `own` (k,) into the columns of `Relaxed`, which hold what was before."""
+    """Write the runs `own` (k,), relaxed, into the columns of `Relaxed`, which hold what was before."""
+    certified, control, radius, left = found
     for q in own:
         run, start = _begin(q, corridor, splines, runs, used, goal)
-        _finish(q, run, start, splines, goal, False, found)
-
-
-def _relax_long(
-    q: int,
-    corridor: Corridor,
-    splines: Splines,
-    runs: SplineRuns,
-    used: FloatArray,
-    goal: Goal,
-    found: Relaxed,
-) -> None:
-    """Write run q, relaxed in ranges (module text), into the columns of `Relaxed`."""
-    run, control = _begin(q, corridor, splines, runs, used, goal)
-
-    def work(begin: int, beyond: int) -> None:
-        relax_range(run, goal, begin, beyond, control)
-
-    in_ranges(int(run.fixed_first), len(control) - int(run.fixed_last), RANGE, REACH.window, work)
-    _finish(q, run, control, splines, goal, True, found)
+        certified[q], moved, smaller, kept = _relax_run(run, start, goal)
+        if certified[q]:
+            control[control_first(splines, q) : control_first(splines, q + 1)] = moved
+            radius[splines.site_first[q] : splines.site_first[q + 1]] = smaller
+        left[splines.span_first[q] : splines.span_first[q + 1]] = kept
 
 
 def relax(
@@ -231,9 +181,6 @@ def relax(
     )
     fitting = np.flatnonzero(splines.fits)
     size = np.diff(splines.span_first)[fitting]
-    for q in fitting[size >= 2 * RANGE].tolist():
-        _relax_long(q, corridor, splines, runs, used, goal, found)
-    fitting, size = fitting[size < 2 * RANGE], size[size < 2 * RANGE]
 
     def work(own: Array) -> None:
         _relax(corridor, splines, runs, used, goal, own, found)

@@ -1,7 +1,6 @@
 """From a path with rounded corners to one with splines in their place."""
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.smoothing.basis import DEGREE, ORDER, derivatives
+from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
 from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
@@ -44,11 +43,9 @@ class SplineShape:
     used: FloatArray  # (J,) radius that each site may use [mm]
 
 
-def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None = None) -> SplineShape:
+def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed
     with a certificate (relax.py), and without a cusp. A run that gets none has `fits` False.
-
-    known : the splines of the same legs with other full stops: runs that are the same are taken over
 
     Raises InputError if the machine lacks an axis of the path.
     """
@@ -70,49 +67,13 @@ def spline_shape(path: SmoothPath, machine: Machine, known: SplineShape | None =
     weights = (jerk.min() / jerk) ** 2
     goal = Goal(third_derivative_bands(splines, weights), RELATIVE_GAP, weights, REACH)
     left = np.full(splines.span_first[-1], np.inf)
-    same = None if known is None else _same_runs(runs, known)
-    if same is not None:
-        splines.fits[same.new] = False  # not to be relaxed again
     relaxed = relax(corridor, splines, runs, USED * splines.sites.radius, left, goal)
     control, used, left = relaxed.control, relaxed.used, relaxed.left
     splines = splines._replace(control=control)
     fits = relaxed.certified & ~cusps(splines)
-    if same is not None and known is not None:
-        old = known.splines
-        same.put(control, splines.span_first, old.control, old.span_first, DEGREE)
-        same.put(used, splines.site_first, known.used, old.site_first)
-        same.put(left, splines.span_first, known.left, old.span_first)
-        fits[same.new] = True
-    splines = splines._replace(control=control, fits=fits)
+    splines = splines._replace(fits=fits)
     reserve = float((tolerance - tol).min())
     return SplineShape(runs=runs, corridor=corridor, splines=splines, left=left, reserve=reserve, used=used)
-
-
-class _Same(NamedTuple):
-    """Runs new (n,) of one path that are the runs old (n,) of another."""
-
-    new: Array
-    old: Array
-
-    def put(
-        self, into: FloatArray, first: Array, values: FloatArray, old_first: Array, more: int = 0
-    ) -> None:
-        """Copy the rows of these runs from `values` to `into`; run q holds first[q] + more q : first[q+1] +
-        more (q+1) of them."""
-        for q, k in zip(self.new, self.old, strict=True):
-            begin = old_first[k] + more * k
-            into[first[q] + more * q : first[q + 1] + more * (q + 1)] = values[
-                begin : old_first[k + 1] + more * (k + 1)
-            ]
-
-
-def _same_runs(runs: SplineRuns, known: SplineShape) -> _Same:
-    """The runs that replace the same parts of the same legs, with the same ends, as some that have a
-    spline."""
-    found = {one: k for k, one in enumerate(zip(*known.runs, strict=True)) if known.splines.fits[k]}
-    pairs = [(q, found[one]) for q, one in enumerate(zip(*runs, strict=True)) if one in found]
-    new, old = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    return _Same(new, old)
 
 
 def cusps(splines: Splines) -> Array:

@@ -1,9 +1,8 @@
-"""Windows and ranges of a long spline: which of its control points are relaxed at a time, and how those
+"""Windows of a long spline: which of its control points are relaxed at a time, and how those
 around a site are tightened (relax.py)."""
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -96,18 +95,6 @@ def tighten_window(window, sites, control, middle, ratio_site, overlap):
         elif ratio_site[j] > 1.0:
             radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
     return near[lo - begin : hi - begin], radius
-
-
-def in_ranges(begin: int, end: int, size: int, window: int, work: Callable[[int, int], None]) -> None:
-    """Work on the control points begin .. end - 1 of a long run in ranges of about `size`, side by side, with
-    `DEGREE` control points between them that stay; then in one window around each of these gaps."""
-    count = (end - begin) // size
-    cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
-    ranges = [(a, b - DEGREE) for a, b in pairwise(cuts)]
-    ranges[-1] = (cuts[-2], end)
-    gaps = [(b - window // 2, b + window // 2) for b in cuts[1:-1]]
-    for batch in (ranges, gaps):
-        side_by_side([partial(work, *own) for own in batch], lambda: None, lambda: None)
 
 
 def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None]) -> None:

@@ -296,26 +296,3 @@ def test_tightening_leaves_every_site_inside_and_widens_those_that_the_taper_pus
     np.testing.assert_allclose(used[wider], WIDER * distances()[wider])
     assert wider.sum() <= 1
     assert used[worst] < 0.995 * given[worst]
-
-
-def test_runs_that_stay_the_same_are_taken_over_to_the_last_digit():
-    toolpath = toolpath_from_program(problems.star_spiral(300), MACHINE)
-
-    def rounded(stops):
-        stopping = toolpath.with_joints(stops, Joint.STOP)
-        return round_corners(stopping, MACHINE, BezierCorner(), blend_tangents=True)
-
-    known = spline_shape(rounded([60, 150]), MACHINE)
-    whole = spline_shape(rounded([60, 150, 220]), MACHINE)
-    taken = spline_shape(rounded([60, 150, 220]), MACHINE, known)
-    assert len(whole.splines.fits) == len(known.splines.fits) + 1
-    for name in ("control", "fits"):
-        assert np.array_equal(getattr(whole.splines, name), getattr(taken.splines, name))
-    assert np.array_equal(whole.used, taken.used)
-    assert np.array_equal(whole.left, taken.left)
-    # and the others are not: with other control points known, only those of the first two runs are others
-    moved = dataclasses.replace(known, splines=known.splines._replace(control=known.splines.control + 1.0))
-    other = spline_shape(rounded([60, 150, 220]), MACHINE, moved)
-    first = whole.splines.span_first[2] + 2 * DEGREE
-    np.testing.assert_allclose(other.splines.control[:first] - whole.splines.control[:first], 1.0)
-    assert np.array_equal(other.splines.control[first:], whole.splines.control[first:])

@@ -14,10 +14,7 @@ from planner.geometry.toolpath import Joint
 from planner.smoothing import initial as initial_module
 from planner.smoothing import relax as relax_module
 from planner.smoothing.basis import DEGREE, derivatives, knots_at
-from planner.smoothing.forms import third_derivative_energy
-from planner.smoothing.sites import run_control, run_knots
 from planner.smoothing.spline_path import CUSP, spline_shape, turns_little
-from planner.smoothing.windows import REACH
 
 MACHINE = problems.machine()
 
@@ -76,43 +73,6 @@ def long_run():
     return round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
 
 
-def energy(shape):
-    """Integral of the squared third derivatives of all runs."""
-    total = 0.0
-    for q in range(len(shape.splines.fits)):
-        knots = run_knots(shape.splines, q)
-        total += third_derivative_energy(
-            knots, np.ones(2), run_control(shape.splines, q), 0, len(knots.breaks) - 1
-        )
-    return total
-
-
-def test_a_run_in_ranges_is_as_smooth_as_one_relaxed_as_a_whole(long_run, monkeypatch):
-    whole = spline_shape(long_run, MACHINE)
-    assert whole.splines.fits.all()
-    monkeypatch.setattr(relax_module, "RANGE", 300)
-    windows = []
-    sweep = relax_module.relax_range
-    monkeypatch.setattr(
-        relax_module, "relax_range", lambda *given: (windows.append(given[3:5]), sweep(*given))[1]
-    )
-    shapes = []
-    try:
-        for threads in (1, 3):
-            use_threads(threads)
-            shapes.append(spline_shape(long_run, MACHINE))
-    finally:
-        use_threads(None)
-    one, many = shapes
-    assert len(windows) == 2 * (4 + 3)
-    assert one.splines.fits.all()
-    assert one.left.min() >= 0.0  # the certificate
-    np.testing.assert_array_equal(one.splines.control, many.splines.control)
-    np.testing.assert_array_equal(one.used, many.used)
-    assert (one.splines.control != whole.splines.control).any()
-    assert energy(one) < 1.02 * energy(whole)
-
-
 def test_knots_of_a_run_laid_in_ranges_are_as_dense(long_run, monkeypatch):
     whole = spline_shape(long_run, MACHINE).splines
     monkeypatch.setattr(initial_module, "RANGE", 100)
@@ -125,7 +85,3 @@ def test_knots_of_a_run_laid_in_ranges_are_as_dense(long_run, monkeypatch):
     assert len(laid) == 4
     assert not ranges.outside.any()
     assert abs(len(ranges.breaks) / len(whole.breaks) - 1.0) < 0.02
-
-
-def test_ranges_are_further_apart_than_their_gaps_are_wide():
-    assert REACH.window + 2 * DEGREE < relax_module.RANGE

@@ -49,9 +49,9 @@ def splined_with_stops(
         at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
             break
-        stopping, legs = rounded.toolpath.with_joints(at, Joint.STOP), rounded.legs
+        stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
-        shape = spline_shape(rounded, machine, shape if len(rounded.legs) == len(legs) else None)
+        shape = spline_shape(rounded, machine)
         _tell_of(shape, tell, len(at))
     return rounded, shape
 

@@ -7,8 +7,10 @@ on straight legs are added and the problem is solved once more, so that every sw
 """
 
 import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,31 +27,39 @@ from planner.planning.job.job import Job
 from planner.planning.optimal.on_path import OnPath
 
 
-class Order(Protocol):
-    """Which limits a motion keeps, and the solver for them."""
+@dataclass(frozen=True)
+class Order(ABC):
+    """Which limits a motion keeps, and the `solver` of the feed along a path for them."""
+
+    solver: FeedrateSolver
 
     jerk_limited: ClassVar[bool]
 
-    @property
-    def solver(self) -> FeedrateSolver:
-        """The solver of the feed along a path."""
-        ...
+    def solve(self, path: SmoothPath, job: Job, resolution: float) -> OnPath:
+        """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py); a
+        failure is the status of its solution. Raises NotSolvedError where no grid follows the path."""
+        with job.stage("geometry"):
+            samples = sample_path(path, job.machine, resolution, third_order=self.jerk_limited)
+        with job.stage("solve") as progress:
+            planned = self._solved(path, samples, job.machine, progress)
+        facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
+        facts["resolution"] = resolution
+        if planned.solution.iterations:
+            facts["iterations"] = planned.solution.iterations
+        facts |= {name: count for name, count in planned.solution.effort.items() if count}
+        job.tell("solve", found=planned.solution.cycle_time, **facts)
+        return planned
 
-    def solve(
-        self,
-        path: SmoothPath,
-        job: Job,
-        resolution: float,
-        samples: PathSamples | None = None,
+    @abstractmethod
+    def _solved(
+        self, path: SmoothPath, samples: PathSamples, machine: Machine, progress: Callable[[float], None]
     ) -> OnPath:
-        """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py),
-        which may be given."""
-        ...
+        """The motion on a grid, with the points that it needs besides."""
 
 
 @dataclass(frozen=True)
-class ThirdOrder:
-    """All limits with jerk; multipliers come with the solution.
+class ThirdOrder(Order):
+    """All limits with jerk, on a grid with points where jerk needs them; multipliers come with the solution.
 
     Limits are kept at the grid points. What the motion exceeds between them is measured afterwards, and made
     good where it is (tighten.py): to leave a margin for it everywhere costs 3e-4 of the time on the usual
@@ -60,54 +70,33 @@ class ThirdOrder:
 
     jerk_limited: ClassVar[bool] = True
 
-    def solve(
-        self,
-        path: SmoothPath,
-        job: Job,
-        resolution: float,
-        samples: PathSamples | None = None,
+    def _solved(
+        self, path: SmoothPath, samples: PathSamples, machine: Machine, progress: Callable[[float], None]
     ) -> OnPath:
-        """The time-optimal motion with jerk limits, on a grid with points where jerk needs them; arguments as
-        of `Order`."""
-        samples = _sampled(self, path, job, resolution, samples)
-        with job.stage("solve") as progress:
-            samples = refine_for_jerk(samples, job.machine)
-            problem = feedrate_problem(samples, job.machine, measured=True)
-            problem = dataclasses.replace(problem, margin=np.zeros(len(samples)))
-            solution = self.solver.solve(problem, progress)
-        planned = OnPath(path=path, samples=samples, problem=problem, solution=solution)
-        _tell(job, planned, resolution)
-        return planned
+        samples = refine_for_jerk(samples, machine)
+        problem = feedrate_problem(samples, machine, measured=True)
+        problem = dataclasses.replace(problem, margin=np.zeros(len(samples)))
+        solution = self.solver.solve(problem, progress)
+        return OnPath(path=path, samples=samples, problem=problem, solution=solution)
 
 
 @dataclass(frozen=True)
-class SecondOrder:
-    """All limits but jerk.
+class SecondOrder(Order):
+    """All limits but jerk, on a grid with points where the profile switches.
 
     to_tighten : limits will be tightened in places, on straight elements too, which then need points inside
     """
 
-    solver: FeedrateSolver
     to_tighten: bool = False
 
     jerk_limited: ClassVar[bool] = False
 
-    def solve(
-        self,
-        path: SmoothPath,
-        job: Job,
-        resolution: float,
-        samples: PathSamples | None = None,
+    def _solved(
+        self, path: SmoothPath, samples: PathSamples, machine: Machine, progress: Callable[[float], None]
     ) -> OnPath:
-        """The time-optimal motion without jerk limits, on a grid with points where the profile switches;
-        arguments as of `Order`."""
-        samples = _sampled(self, path, job, resolution, samples)
-        with job.stage("solve"):
-            if self.to_tighten:
-                samples = refine_for_jerk(samples, job.machine)
-            planned = second_order(path, samples, job.machine, self.solver)
-            _tell(job, planned, resolution)
-        return planned
+        if self.to_tighten:
+            samples = refine_for_jerk(samples, machine)
+        return second_order(path, samples, machine, self.solver)
 
 
 def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolver) -> OnPath:
@@ -125,22 +114,3 @@ def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solve
         problem = feedrate_problem(samples, machine, measured=True)
         solution = solver.solve(problem)
     return OnPath(path=path, samples=samples, problem=problem, solution=solution)
-
-
-def _sampled(
-    order: Order, path: SmoothPath, job: Job, resolution: float, given: PathSamples | None
-) -> PathSamples:
-    """The samples that are given, or new ones."""
-    if given is not None:
-        return given
-    with job.stage("geometry"):
-        return sample_path(path, job.machine, resolution, third_order=order.jerk_limited)
-
-
-def _tell(job: Job, planned: OnPath, resolution: float) -> None:
-    facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
-    facts["resolution"] = resolution
-    if planned.solution.iterations:
-        facts["iterations"] = planned.solution.iterations
-    facts |= {name: count for name, count in planned.solution.effort.items() if count}
-    job.tell("solve", found=planned.solution.cycle_time, **facts)

@@ -53,7 +53,7 @@ class Done:
 
     @property
     def outcome(self) -> str:
-        """In words."""
+        """The outcome by its exit code: "passed", "failed", "refused" ..."""
         return OUTCOMES.get(self.code, "a bug")
 
 

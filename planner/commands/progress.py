@@ -73,7 +73,7 @@ class ProgressBar(kernels.Compilation):
         self._show(f"{COMPILING}: kernel {self._compiled}{f', {KEPT}' if is_kept else ''}", 0.0)
 
     def ends(self) -> None:
-        """Go on."""
+        """A kernel is compiled; the next stage shows itself."""
 
     def _show(self, text: str, fraction: float, stage: str = "") -> None:
         now = time.monotonic()

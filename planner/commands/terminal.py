@@ -172,7 +172,7 @@ _LIBRARY = 256 << 20  # bytes: more than the largest library that planning loads
 
 
 def is_of_memory(fault: BaseException) -> bool:
-    """Whether an exception, or one that it came of, is of too little memory."""
+    """True if an exception, or one that it came of, is of too little memory."""
     seen: list[BaseException] = []
     one: BaseException | None = fault
     while one is not None and one not in seen:

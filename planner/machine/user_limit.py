@@ -151,7 +151,7 @@ class ScaledLimit:
         self._limit, self._which, self._factor = limit, QUANTITIES.index(quantity), factor
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
-        """Those of the limit, one of them times the factor."""
+        """Velocity, acceleration and jerk of the limit at the places, the scaled one times `factor`."""
         velocity, acceleration, jerk = (
             bound * self._factor if k == self._which else bound
             for k, bound in enumerate(self._limit.bounds(at))
@@ -159,7 +159,7 @@ class ScaledLimit:
         return velocity, acceleration, jerk
 
     def value(self, at: Place) -> Any:
-        """That of the limit."""
+        """q of the limit at the places; scaling does not change it."""
         return self._limit.value(at)
 
 

@@ -196,7 +196,7 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
 
 
 def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
-    """G4. Raises WordFault."""
+    """G4: a dwell of P seconds, of S on printers. Raises WordFault without a time, or for a negative one."""
     seconds = block.value.get("P")
     if seconds is not None and ignored.printer:
         seconds *= MILLISECOND

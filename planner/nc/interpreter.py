@@ -90,7 +90,7 @@ class Interpreter:
 
     @property
     def table(self) -> BlockTable:
-        """The blocks so far."""
+        """The blocks and events that have been made so far."""
         return self.mover.table
 
     def program(self, frames: Sequence[Frame] = ()) -> Program:

@@ -318,7 +318,7 @@ class MadeWhenAsked(Sequence[One]):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EventTable(MadeWhenAsked[Event]):
-    """E events."""
+    """The E events of a program in arrays; an `Event` is made when it is looked at."""
 
     block: Array  # (E,) the block before which it happens
     line: Array  # (E,) 1-based source line

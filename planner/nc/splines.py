@@ -87,7 +87,7 @@ class SplineReader:
             raise
 
     def keep(self, words: Words) -> None:
-        """The chunk `words` was executed."""
+        """Keep the chunk that was executed, if the curve that is open begins in it: its fault names a word."""
         if self.open is None:
             self._words = None
         elif self._words is None:

@@ -55,7 +55,7 @@ class System:
     rotation: float = 0.0
 
     def turn(self, vector: FloatArray, sign: float = 1.0) -> FloatArray:
-        """A vector, x and y first, of the system in the machine's axes; with sign -1 the other way."""
+        """A vector (A,) or (3,) of the system in the machine's axes; with sign -1 the other way."""
         if self.rotation == 0.0:
             return vector
         cosine, sine = _QUARTERS.get(self.rotation % 360.0) or (  # type: ignore[call-overload]

@@ -62,7 +62,7 @@ class ToolPointSwitch:
 
     @classmethod
     def of(cls, machine: Machine | None) -> ToolPointSwitch:
-        """That of a machine."""
+        """The switch of a machine, with its kinematics if it has any."""
         return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
 
     def take(self, state: State, table: BlockTable, block: Block) -> None:
@@ -224,7 +224,7 @@ class _Pieces:
         return found
 
     def program(self) -> Program:
-        """The program of the pieces."""
+        """The program with these ends, its rapid moves of the joints in chords."""
         whole = self.whole
         rapids = np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist()
         if not rapids:

@@ -88,7 +88,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
 
 
 class _SourceRows:
-    """What the source says on its R rows.
+    """Units, F words and feed modes on the R rows of the source.
 
     unit      : (R,) length unit in force before the row [mm]: what its F word is read in
     f_word    : (R,) index of its F word, or -1

@@ -50,7 +50,7 @@ class Kinematics(Protocol):
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Letters."""
+        """Letters of the rotary and linear axes."""
         ...
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:

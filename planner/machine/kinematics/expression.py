@@ -27,7 +27,7 @@ class Expression:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Letters."""
+        """Letters of the axes that it is a function of."""
         return self._axes
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:

@@ -55,7 +55,7 @@ class ContourWay:
             raise ValueError(f"{name} LCT needs its radius R, above 0")
 
     def rest(self, *, feed: bool) -> TravelRow:
-        """The words beside a move."""
+        """The row of a move without its motion code and coordinates: with `feed` the F of the block."""
         words = [(_F, self.feed, self.at)] if feed and self.feed is not None else []
         return TravelRow(words, self.line, self.frame)
 

@@ -283,10 +283,6 @@ class Endless(ValueError):
         )
 
 
-class TooDeep(ValueError):
-    """Too many calls are open."""
-
-
 def sentence(fault: Exception) -> str:
     """The message for a Python error of the compiled program."""
     text = str(fault)

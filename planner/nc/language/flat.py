@@ -38,7 +38,7 @@ class Flat:
         ]
 
     def add(self, words: Words) -> None:
-        """The rows of a chunk."""
+        """Write the rows of a chunk as lines, which are added to `lines`."""
         letters, values, first = words.letter.tolist(), words.value.tolist(), words.first.tolist()
         known: dict[float, str] = {}
         dwells = set(self._dwells.find(words)) if self.points else set()

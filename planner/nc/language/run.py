@@ -17,7 +17,6 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import (
     Compiled,
     Endless,
-    TooDeep,
     last_statement,
     sentence,
     statement_of,
@@ -73,7 +72,6 @@ class ProgramRun:
         self._depth = 0
         self._known_frames: dict[tuple[int, int, int, str], int] = {}
         self._saved: list[Modes | None] = [None]
-        self._entries: dict[tuple[object, object], int] = {}  # rows that restore modes
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
         self.makers: Mapping[str, Maker] = {}  # of the rows of `tree.MadeRows`
@@ -115,7 +113,7 @@ class ProgramRun:
         return None
 
     def add(self, compiled: Compiled, marker: str) -> None:
-        """Take in compiled procedures."""
+        """Take in the compiled procedures of a file, under the marker of their source."""
         self.units[marker] = compiled
         for name, function in compiled.functions.items():
             self.functions.setdefault(name, function)
@@ -138,7 +136,7 @@ class ProgramRun:
         self.interpreter.execute(words)
 
     def tick(self) -> None:
-        """Look at the limits."""
+        """Raise Endless if the program has passed a limit; execute what is pending once that is long."""
         if self.turns > TURNS_MAX:
             raise Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
@@ -166,7 +164,9 @@ class ProgramRun:
         """Run a procedure; its value, if it has one, is `_value` afterwards."""
         function = self._function(str(name), word)
         if self._depth >= DEPTH_MAX:
-            raise TooDeep(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time")
+            raise ValueError(
+                f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time"
+            )
         count, numbered, locals_ = whole(times), self.numbered, self.language.locals
         caller, self._frame = self._frame, self._frame_of(place, str(name))
         self._depth += 1
@@ -243,13 +243,8 @@ class ProgramRun:
             self._saved[-1] = self.system.modes()
             self._restored_at_return[-1] |= action == "save until return"
         elif self._saved[-1] is not None:
-            for words in self._saved[-1]:
-                row = (place, words)
-                if row not in self._entries:
-                    at_place = [(ord(letter), place[2], value) for letter, value in words]
-                    self._entries[row] = self.rows.add_row(place[1], at_place)
-                self.rows.pending.append(self._entries[row])
-            self.flush()
+            rows = ([(ord(letter), value, place[2]) for letter, value in row] for row in self._saved[-1])
+            self._execute_made([TravelRow(words, place[1], self._frame) for words in rows])
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 

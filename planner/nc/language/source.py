@@ -69,7 +69,7 @@ class Source:
         return lines
 
     def line(self, row: int) -> SourceLine:
-        """The text of a row."""
+        """A row as the source line that it comes from."""
         words = self.words
         at = int(words.at[words.first[row]])
         start, end = words.line_at(at)
@@ -156,9 +156,9 @@ class LineParser(Statements):
                 self.faults.append(fault)
 
     def take_plain(self, rows: PlainRows) -> None:
-        """Rows of plain words."""
+        """Add rows of plain words to the statements."""
         raise NotImplementedError
 
     def take_line(self, line: SourceLine) -> None:
-        """A line of the language."""
+        """Add the statements of a line of the language. Raises ProgramFault."""
         raise NotImplementedError

@@ -84,11 +84,12 @@ class Exists(Value):
 Expression = Number | Numbered | Named | Operation | Exists
 Parameter = Numbered | Named
 Assignments = tuple[tuple[Parameter, Expression], ...]
+NESTED_MAX = 100  # loops and branches in each other
 ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
 
 
 def op(name: str, *operands: Value) -> Operation:
-    """An operation of the language."""
+    """An operation by its name, on its operands."""
     return Operation(name, operands)  # type: ignore[arg-type]
 
 
@@ -127,7 +128,7 @@ class Line(NamedTuple):
 
 
 def word(letter: str, at: int, value: Expression | float) -> Word:
-    """A word of a row."""
+    """A word of a row, whose value may be a number."""
     return Word(letter, at, value if isinstance(value, Value) else Number(value))
 
 
@@ -137,7 +138,7 @@ def row(place: SourcePlace, *words: tuple[str, Expression | float], assigned: As
 
 
 def assign(place: SourcePlace, *assigned: tuple[Parameter, Expression]) -> Line:
-    """Values of parameters."""
+    """A row that only gives parameters their values, all of which are computed before."""
     return Line(place, (), assigned)
 
 
@@ -270,7 +271,10 @@ class Statements:
         self.faults: list[ProgramFault] = []
 
     def begin(self, opened: OpenStatement) -> OpenStatement:
-        """What follows stands in this statement."""
+        """Open a statement, in whose body the next ones go. Raises ProgramFault for too many in each other."""
+        if len(self.open) >= NESTED_MAX:
+            text = f"more than {NESTED_MAX} loops and branches in each other"
+            raise ProgramFault(opened.place, text)
         self.open.append(opened)
         self.body = opened.body
         return opened
@@ -282,7 +286,7 @@ class Statements:
         return closed
 
     def add_loop(self, closed: OpenStatement, condition: Expression, kind: str = "while") -> None:
-        """A loop that has ended."""
+        """Add the loop of an open statement that has been closed."""
         self.body.append(Loop(closed.place, kind, f"{closed.kind} {closed.place.at}", condition, closed.body))
 
 

@@ -26,7 +26,7 @@ _INCREMENT = tree.Number(1e-4) + (tree.Numbered(tree.Number(4006.0)) - tree.Numb
 
 
 class LatheParser(LatheWords):
-    """Statements of a lathe's program."""
+    """Makes statements of a lathe's file, and a procedure of each profile that a cycle names."""
 
     def __init__(self, source: Source):
         super().__init__(source)

@@ -185,7 +185,7 @@ class LatheCycles:
 
     @property
     def _of_radius(self) -> float:
-        """What X words are of a radius."""
+        """X words per radius: 2 where they are diameters, else 1."""
         return 2.0 if self._state.diameters else 1.0
 
     def _rows(self, legs: Iterable[Leg], start: complex | None = None) -> list[Row]:

@@ -21,7 +21,7 @@ _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
 class FanucParser(FanucControl):
-    """Statements of one file."""
+    """Makes statements of one file: a procedure for each of its programs (O numbers)."""
 
     def __init__(self, source: Source):
         super().__init__(source)

@@ -28,7 +28,7 @@ TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
 
 
 class Moves:
-    """Rows of path functions."""
+    """Makes the rows of the path functions of one program."""
 
     def __init__(self, feed_scale: float):
         # what F is multiplied with: 1, or 0.1 in inch programs, where F is in tenths of an inch per minute

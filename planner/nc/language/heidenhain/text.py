@@ -253,7 +253,7 @@ def items(block: Block, turning: bool = False) -> Items:
 
 
 def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
-    """The absolute coordinate."""
+    """An absolute coordinate for a value and whether that is incremental (IX)."""
     return POSITION[axis] + given[0] if given[1] else given[0]
 
 

@@ -33,7 +33,6 @@ LANGUAGE = Language(
     system_names=LinuxcncVariables.names,
     keywords=frozenset(map(str.upper, KEYWORDS)),
 )
-_NESTED_MAX = 100  # loops and branches in each other
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _FLOW = frozenset(("98", "99", *map(str, _MODES)))  # numbers of M codes that are statements
@@ -51,7 +50,7 @@ def _needed(condition: tree.Expression | None, keyword: str, line: SourceLine) -
 
 
 class LinuxcncParser(LineParser):
-    """Statements of one file."""
+    """Makes statements of one file: the main program, and its subprograms by their labels."""
 
     def __init__(self, source: Source):
         super().__init__(source)
@@ -92,8 +91,6 @@ class LinuxcncParser(LineParser):
     def _begin(self, keyword: str, label: str, condition: tree.Expression | None, line: SourceLine) -> None:
         if keyword == "sub" and self.open:
             raise line.fault(f"a subprogram begins inside {self.open[-1].kind}; write its end before it")
-        if len(self.open) >= _NESTED_MAX:
-            raise line.fault(f"more than {_NESTED_MAX} loops and branches in each other")
         if keyword not in ("sub", "do"):
             _needed(condition, keyword, line)
         opened = self.begin(tree.OpenStatement(keyword, line.place, condition, label))

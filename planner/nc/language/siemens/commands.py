@@ -70,7 +70,7 @@ _NAMES_MAX = 32  # parameters of a subprogram
 
 
 class Commands(SiemensControl):
-    """Settings by commands."""
+    """Statements of commands: cycles, frames, variables, messages, calls."""
 
     def __init__(self, source: Source):
         super().__init__(source)

@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
 class SiemensParser(BlockWords):
-    """Statements of one file."""
+    """Makes statements of one file, a main program or a subprogram; each line by its first word."""
 
     def parse(self) -> list[Procedure]:
         """The main program, under the empty name."""

@@ -34,7 +34,6 @@ LANGUAGE = tree.Language(
 )
 _TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values, by their names in the tree
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
-_NESTED_MAX = 100  # loops and branches in each other
 
 
 def position(axis: str) -> tree.Numbered:
@@ -139,7 +138,7 @@ class LineTokens(TokenReader):
 
 
 class SiemensControl(LineParser):
-    """Control statements."""
+    """Statements that decide what comes next: branches, loops, jumps, repeated sections."""
 
     def __init__(self, source: Source):
         super().__init__(source)
@@ -154,8 +153,6 @@ class SiemensControl(LineParser):
         return self.labels.setdefault(label, len(self.labels) + 1)
 
     def _begin(self, kind: str, reader: LineTokens, condition: tree.Expression | None) -> tree.OpenStatement:
-        if len(self.open) >= _NESTED_MAX:
-            raise reader.fault(f"more than {_NESTED_MAX} loops and branches in each other", 0)
         return self.begin(tree.OpenStatement(kind, reader.place, condition))
 
     def _close(self, kind: str, reader: LineTokens) -> tree.OpenStatement:

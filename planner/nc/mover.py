@@ -227,7 +227,8 @@ class Mover:
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
         if kind == Kind.LINE:
             auxiliary.check_feed(state, block)
-            auxiliary.feed_of_time(state, block, offsets.length_moved(state, target), self.findings)
+            if state.feed_mode == "inverse time":
+                auxiliary.feed_of_time(state, block, offsets.length_moved(state, target), self.findings)
         if kind == Kind.LINE and auxiliary.on_surface(state):
             offsets.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]

@@ -7,6 +7,7 @@ engraving). It follows the same rules as the interpreter: feed first, then S, th
 is not certainly right is left to the interpreter, which says what is wrong.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -75,11 +76,11 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     if not state.is_plain:
         return row
     rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
-    axis = np.full(256, -1)
-    axis[[ord(letter) for letter in state.letters]] = np.arange(len(state.letters))
-    wrapped = np.array([state.absolute and letter in state.wrapped for letter in state.letters])
+    wrapped = np.zeros(len(state.letters), dtype=np.bool_)
+    for letter in state.wrapped if state.absolute else "":
+        wrapped[state.letters.index(letter)] = True
     path = state.feed_factor, int(state.path_control), state.tolerance, state.offset
-    fixed = _Fixed(state.absolute, state.unit, *path, axis, state.scale, state.turns, wrapped)
+    fixed = _Fixed(state.absolute, state.unit, *path, _axes(state.letters), state.scale, state.turns, wrapped)
     stored = table.blocks, table.events, table.refusals
     begin = _Counts(row, *stored, state.motion, state.feed, state.feed_unit)
     others = _Others(ignored.treatment, ignored.parked)
@@ -91,6 +92,14 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     table.blocks, table.events, table.refusals = end.blocks, end.events, end.refusals
     state.motion, state.feed, state.feed_unit = end.motion, end.feed, end.feed_unit
     return int(end.row)
+
+
+@cache
+def _axes(letters: str) -> Array:
+    """(256,) index of a letter's axis by its code, -1 for other letters."""
+    axis = np.full(256, -1)
+    axis[[ord(letter) for letter in letters]] = np.arange(len(letters))
+    return axis
 
 
 @njit(cache=True)

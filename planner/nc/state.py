@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,11 @@ FURTHER_MAX = 300
 FeedMode = Literal["per minute", "inverse time", "per turn"]
 LETTERS = "ABCUVW"  # of axes beside x, y and z
 DEGREES = "ABC"  # of rotary axes, whose places are in degrees
+
+
+@cache
+def _turns(letters: str) -> Array:
+    return np.array([letter in DEGREES for letter in letters])
 
 
 def rotary_feed(feed: float, unit: float) -> float:
@@ -144,7 +150,7 @@ class State:
     @property
     def turns(self) -> Array:
         """(A,) True for rotary axes."""
-        return np.array([letter in DEGREES for letter in self.letters])
+        return _turns(self.letters)
 
     @property
     def scale(self) -> FloatArray:

@@ -5,39 +5,21 @@ import dataclasses
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import compile_procedures
-from planner.nc.language.fanuc import calls
-from planner.nc.language.fanuc.calls import fanuc_files
-from planner.nc.language.fanuc.lathe import LatheParser
-from planner.nc.language.fanuc.lathe_cycles import LatheCycles
-from planner.nc.language.fanuc.lathe_words import LatheVariables
-from planner.nc.language.fanuc.parser import FanucParser
-from planner.nc.language.heidenhain import text as heidenhain_text
-from planner.nc.language.heidenhain.flow import files as heidenhain_files
-from planner.nc.language.heidenhain.parser import HeidenhainParser
-from planner.nc.language.linuxcnc import parser
-from planner.nc.language.linuxcnc.parser import LinuxcncParser
-from planner.nc.language.makers import with_makers
+from planner.nc.language.fanuc import lathe
+from planner.nc.language.fanuc import parser as fanuc
+from planner.nc.language.heidenhain import parser as heidenhain
+from planner.nc.language.linuxcnc import parser as linuxcnc
 from planner.nc.language.rows import AppendedRows
-from planner.nc.language.run import ProgramRun
-from planner.nc.language.siemens import text as siemens_text
-from planner.nc.language.siemens.commands import siemens_files
-from planner.nc.language.siemens.parser import SiemensParser
+from planner.nc.language.run import Dialect, ProgramRun
+from planner.nc.language.siemens import parser as siemens
 from planner.nc.language.source import Source
-from planner.nc.language.system_variables import (
-    FanucVariables,
-    LinuxcncVariables,
-    PositionVariables,
-    SystemVariables,
-)
-from planner.nc.language.tree import Language, ProgramFault
+from planner.nc.language.tree import ProgramFault
 from planner.nc.lexer import Words, split_words
 from planner.nc.program import Expansion, Program
 from planner.nc.reading import FANUC, HEIDENHAIN, LATHE, LINUXCNC, SIEMENS
@@ -61,11 +43,9 @@ def expand(
     Nothing is run if a line cannot be read; otherwise the program is run to its end, or to what stops it.
     """
     rows = AppendedRows()
-    front = _FRONTS[dialect]
-    run = ProgramRun(interpreter, rows, front.language, front.variables(interpreter))
+    run = ProgramRun(interpreter, rows, DIALECTS[dialect])
     run.tee = tee or run.tee
-    front.set_up(run)
-    files = _Files(run, rows, front, integers)
+    files = _Files(run, rows, DIALECTS[dialect], integers)
     found = files.read(words, interpreter.source)
     if not found:
         stopped = run.start()
@@ -85,33 +65,20 @@ def expand(
     return program, [*faults, *interpreter.faults()]
 
 
-@dataclass(frozen=True)
-class _Front:
-    language: Language
-    variables: type[SystemVariables]
-    parser: Callable[[Source], Any]  # with `parse`, that gives procedures, and `faults`
-    files: Callable[[str], frozenset[str]]  # names, in small letters, of the file that holds a subprogram
-    set_up: Callable[[ProgramRun], object] = lambda run: None  # gives a run the makers of its rows
-
-
-_FRONTS = {
-    LINUXCNC: _Front(
-        parser.LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"})
-    ),
-    FANUC: _Front(calls.LANGUAGE, FanucVariables, FanucParser, fanuc_files),
-    LATHE: _Front(calls.LANGUAGE, LatheVariables, LatheParser, fanuc_files, LatheCycles),
-    HEIDENHAIN: _Front(
-        heidenhain_text.LANGUAGE, PositionVariables, HeidenhainParser, heidenhain_files, with_makers
-    ),
-    SIEMENS: _Front(siemens_text.LANGUAGE, PositionVariables, SiemensParser, siemens_files, with_makers),
+DIALECTS: dict[str, Dialect] = {
+    LINUXCNC: linuxcnc.DIALECT,
+    FANUC: fanuc.DIALECT,
+    LATHE: lathe.DIALECT,
+    HEIDENHAIN: heidenhain.DIALECT,
+    SIEMENS: siemens.DIALECT,
 }
 
 
 class _Files:
     """The files of a program: its own, and those in its folder that it calls."""
 
-    def __init__(self, run: ProgramRun, rows: AppendedRows, front: _Front, integers: Integers):
-        self.run, self.rows, self.front, self.integers = run, rows, front, integers
+    def __init__(self, run: ProgramRun, rows: AppendedRows, dialect: Dialect, integers: Integers):
+        self.run, self.rows, self.dialect, self.integers = run, rows, dialect, integers
         self.sources: list[Source] = []
         run.load = self.load
 
@@ -123,20 +90,20 @@ class _Files:
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)
-        parser = self.front.parser(source)
+        parser = self.dialect.parser(source)
         procedures = parser.parse()
         if parser.faults:
             return sorted(parser.faults, key=lambda fault: fault.place.line)
         marker = f"<nc {source.file}>"  # the name of the file in Python's tracebacks
         try:
-            self.run.add(compile_procedures(procedures, self.front.language, self.rows, marker), marker)
+            self.run.add(compile_procedures(procedures, self.dialect.language, self.rows, marker), marker)
         except ProgramFault as fault:
             return [fault]
         return []
 
     def load(self, name: str) -> bool:
         """Read a subprogram in the program's folder or below; False for none. Raises ProgramFault."""
-        program, wanted = Path(self.run.interpreter.source), self.front.files(name)
+        program, wanted = Path(self.run.interpreter.source), self.dialect.files(name)
         if not program.is_file() or not _CALLED.fullmatch(name):
             return False
         found = (path for path in _below(program.parent) if path.name.lower() in wanted and path.is_file())

@@ -11,6 +11,8 @@ calls, with a sentence that names the line.
 import contextlib
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
@@ -24,6 +26,7 @@ from planner.nc.language.compiled import (
 )
 from planner.nc.language.making import Maker, Making
 from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.source import Source
 from planner.nc.language.system_variables import Modes, SystemVariables
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import TravelRow, words_of
@@ -43,6 +46,24 @@ _MESSAGES_MAX = 1_000  # different messages that are kept
 Load = Callable[[str], bool]
 
 
+@dataclass(frozen=True)
+class Dialect:
+    """All that is known of a dialect: the table that a new one fills.
+
+    language  : its operators, functions and parameters
+    variables : its parameters that hold the state of the control
+    parser    : of a file: `parse` gives procedures, `faults` are those of its lines
+    files     : names, in small letters, of the file that holds a subprogram
+    set_up    : gives a run the makers of its rows
+    """
+
+    language: Language
+    variables: type[SystemVariables]
+    parser: Callable[[Source], Any]
+    files: Callable[[str], frozenset[str]]
+    set_up: Callable[["ProgramRun"], object] = lambda run: None
+
+
 class Ended(Exception):
     """The program has come to its end."""
 
@@ -50,12 +71,11 @@ class Ended(Exception):
 class ProgramRun:
     """One run of a compiled program."""
 
-    def __init__(
-        self, interpreter: Interpreter, rows: AppendedRows, language: Language, system: SystemVariables
-    ):
-        self.interpreter, self.rows, self.language, self.system = interpreter, rows, language, system
+    def __init__(self, interpreter: Interpreter, rows: AppendedRows, dialect: Dialect):
+        self.interpreter, self.rows, self.language = interpreter, rows, dialect.language
+        self.system = dialect.variables(interpreter)
         # values of the numbered parameters, by number
-        self.numbered: list[float | None] = [language.vacant] * (language.largest + 1)
+        self.numbered: list[float | None] = [self.language.vacant] * (self.language.largest + 1)
         self.shared: dict[str, float] = {}  # values of the named parameters that all calls share
         self.turns = 0
         self.resume: float | None = None  # the label where the caller of a procedure goes on, or None
@@ -79,7 +99,8 @@ class ProgramRun:
         self.leave_profile: Callable[[], SourcePlace | None] = lambda: None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
-        system.travel = self.travel
+        self.system.travel = self.travel
+        dialect.set_up(self)
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""

@@ -11,7 +11,10 @@ import numpy as np
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language import tree
-from planner.nc.language.fanuc.lathe_words import LatheWords, absolute, of_shared, shared
+from planner.nc.language.fanuc.calls import LANGUAGE, fanuc_files
+from planner.nc.language.fanuc.lathe_cycles import LatheCycles
+from planner.nc.language.fanuc.lathe_words import LatheVariables, LatheWords, absolute, of_shared, shared
+from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source, SourceLine
 
 _CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+).*?P(\d+)")
@@ -209,3 +212,6 @@ def _no_profile(pair: tuple[int, int]) -> str:
 
 def _profile_name(pair: tuple[int, int]) -> str:
     return f"profile N{pair[0]} to N{pair[1]}"
+
+
+DIALECT = Dialect(LANGUAGE, LatheVariables, LatheParser, fanuc_files, LatheCycles)

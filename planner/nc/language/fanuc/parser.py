@@ -11,8 +11,10 @@ import re
 from planner.nc.language import tree
 from planner.nc.language.fanuc import calls
 from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
+from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
+from planner.nc.language.system_variables import FanucVariables
 
 _PROGRAM = re.compile(r"[O:](\d+)")
 _GOTO = re.compile(r"GOTO(\d+)?")
@@ -208,3 +210,6 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
         if ("M99" in text or "M97" in text) and "P" in text:
             return None
     return frozenset(used)
+
+
+DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files)

@@ -11,9 +11,12 @@ from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
-from planner.nc.language.heidenhain.flow import called_file, procedure_name
+from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
 from planner.nc.language.heidenhain.moves import COMPENSATES, approach_rows, datum_rows
+from planner.nc.language.makers import with_makers
+from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
+from planner.nc.language.system_variables import PositionVariables
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
@@ -240,3 +243,6 @@ _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "STOP": HeidenhainParser._stop,
     "M": HeidenhainParser._code,
 }
+
+
+DIALECT = Dialect(text.LANGUAGE, PositionVariables, HeidenhainParser, files, with_makers)

@@ -10,6 +10,7 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
+from planner.nc.language.run import Dialect
 from planner.nc.language.source import LineParser, Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import LinuxcncVariables
@@ -251,3 +252,6 @@ def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:
             name = re.sub(r"\s", "", found.group(1)).lower()
             pieces.append(tree.Named(name, name.startswith("_")))
     return (*pieces, text[done:])
+
+
+DIALECT = Dialect(LANGUAGE, LinuxcncVariables, LinuxcncParser, lambda name: frozenset({f"{name}.ngc"}))

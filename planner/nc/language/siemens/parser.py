@@ -9,11 +9,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.nc.language.makers import SIEMENS
+from planner.nc.language.makers import SIEMENS, with_makers
+from planner.nc.language.run import Dialect
 from planner.nc.language.siemens import commands, cycles
 from planner.nc.language.siemens.block_words import EACH_LINE, BlockWords
-from planner.nc.language.siemens.text import LineTokens, variable
+from planner.nc.language.siemens.text import LANGUAGE, LineTokens, variable
 from planner.nc.language.source import SourceLine
+from planner.nc.language.system_variables import PositionVariables
 from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
@@ -135,3 +137,6 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     "RET": SiemensParser._return,
     **dict.fromkeys(commands.REFUSED, SiemensParser._refused),
 }
+
+
+DIALECT = Dialect(LANGUAGE, PositionVariables, SiemensParser, commands.siemens_files, with_makers)

@@ -38,34 +38,23 @@ _HPGL = re.compile(_BEHIND_CONTROL + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"
 _NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
 _CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
+# name, what only such a file starts with, what to do
 _MODELS = (
-    # name, what only such a file starts with, what to do
     (
         "a drawing (DXF)",
-        re.compile(rb"\A\s*+(?>999[^\S\n]*\n[^\n]*\n\s*)*+0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF"),
+        rb"\A\s*+(?>999[^\S\n]*\n[^\n]*\n\s*)*+0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF",
         _CAM,
     ),
-    ("a model (STL)", re.compile(rb"\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", re.IGNORECASE), _CAM),
-    ("a model (STEP)", re.compile(rb"\A\s*ISO-10303-21\s*;"), _CAM),
-    (
-        "a drawing (SVG)",
-        re.compile(rb"\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", re.DOTALL),
-        _CAM,
-    ),
-    ("a document (PDF)", re.compile(rb"\A%PDF-\d"), _CAM),
-    ("an archive (ZIP, 3MF)", re.compile(rb"\APK\x03\x04"), "unpack it and give the program in it"),
-    (
-        "a machine file",
-        re.compile(rb"^\[axes\.[a-z]\]", re.MULTILINE),
-        "give the program, and the machine file as -m FILE",
-    ),
+    ("a model (STL)", rb"(?i)\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", _CAM),
+    ("a model (STEP)", rb"\A\s*ISO-10303-21\s*;", _CAM),
+    ("a drawing (SVG)", rb"(?s)\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", _CAM),
+    ("a document (PDF)", rb"\A%PDF-\d", _CAM),
+    ("an archive (ZIP, 3MF)", rb"\APK\x03\x04", "unpack it and give the program in it"),
+    ("a machine file", rb"(?m)^\[axes\.[a-z]\]", "give the program, and the machine file as -m FILE"),
     (
         "a file of a control's settings",
         # settings of grbl stand in programs too: a line with a G code makes it one
-        re.compile(
-            rb"^\[(?:EMC\w*|TRAJ|printer)\]|\A(?!(?:.*+\n)*?[ \t]*+(?:N\d++[ \t]*+)?G\d)(?:.*+\n)*?\$1[12]\d=",
-            re.MULTILINE,
-        ),
+        rb"(?m)^\[(?:EMC\w*|TRAJ|printer)\]|\A(?!(?:.*+\n)*?[ \t]*+(?:N\d++[ \t]*+)?G\d)(?:.*+\n)*?\$1[12]\d=",
         "make a machine file of it (planner machine import) and give that as -m FILE",
     ),
 )
@@ -106,7 +95,7 @@ def refuse_models(data: bytes, source: str) -> None:
     if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
         raise InputError(f"this is a model (STL), not a program; {_CAM}", source=source)
     for name, mark, remedy in _MODELS:
-        if mark.search(head):
+        if re.search(mark, head):
             raise InputError(f"this is {name}, not a program; {remedy}", source=source)
 
 

@@ -140,10 +140,11 @@ class HolePlan:
     retract: float
     feed: float | None = 0.0  # None for that of the program
     dwell: float = 0.0
+    what: str = "hole"  # for messages
 
     def __post_init__(self) -> None:
         if self.bottom >= self.top:
-            raise ValueError("the bottom of the hole lies at or above its surface")
+            raise ValueError(f"the bottom of the {self.what} lies at or above its surface")
 
 
 def coarse_lead(size: float, unit: float) -> float:

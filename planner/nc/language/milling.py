@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.making import Row, equal_steps
+from planner.nc.language.making import HolePlan, Row, equal_steps
 from planner.nc.turning import Leg
 
 _SHORT = 1e-9  # relative length of a leg that is left out
@@ -149,11 +149,7 @@ def loops(shape: PocketShape, outermost: float, step: float, turning: int) -> li
 class PocketPlan:
     """How a pocket is cut; lengths in the program's unit, feeds per minute."""
 
-    # clear, top, bottom and retract: z of the clearance, the surface, the bottom, and the end
-    clear: float
-    top: float
-    bottom: float
-    retract: float
+    depth: HolePlan  # z of the clearance, the surface, the bottom, and the end
     radius: float  # of the tool
     infeed: float  # most per pass, 0 for one pass
     step: float  # most between two paths
@@ -174,9 +170,7 @@ class PocketPlan:
 
     def check(self) -> None:
         """Raises ValueError for values that make no sense."""
-        if self.bottom >= self.top:
-            raise ValueError("the bottom of the pocket lies at or above its surface")
-        if self.top - self.bottom <= self.floor:
+        if self.depth.top - self.depth.bottom <= self.floor:
             raise ValueError("the finishing allowance at the bottom is the whole depth")
         if min(self.side, self.floor, self.infeed, self.step, self.finish_infeed) < 0.0:
             raise ValueError("an infeed or allowance of the pocket is negative")
@@ -191,19 +185,19 @@ def pocket_rows(shape: PocketShape, plan: PocketPlan, at: complex, angle: float)
     cut = _Cutting(plan, at, cmath.rect(1.0, math.radians(angle)) if angle else 1 + 0j)
     step = min(plan.step or math.inf, CORNERS_CLEAR * plan.radius)
     start, _ = shape.core()
-    yield cut.rapid(z=max(plan.clear, plan.retract))
+    yield cut.rapid(z=max(plan.depth.clear, plan.depth.retract))
     yield cut.rapid(start)
-    yield cut.rapid(z=plan.clear)
+    yield cut.rapid(z=plan.depth.clear)
     if plan.rough:
         paths = loops(shape, plan.radius + plan.side, step, plan.turning)
-        yield from _passes(cut, shape, paths, plan.bottom + plan.floor, plan.infeed, plan.feed)
+        yield from _passes(cut, shape, paths, plan.depth.bottom + plan.floor, plan.infeed, plan.feed)
     if plan.walls:
         paths = [(start, shape.to_wall()), _wall(shape, plan)]
-        yield from _passes(cut, shape, paths, plan.bottom, plan.finish_infeed, plan.finish_feed)
+        yield from _passes(cut, shape, paths, plan.depth.bottom, plan.finish_infeed, plan.finish_feed)
     if plan.base:
         paths = loops(shape, plan.radius, step, plan.turning)
-        yield from _passes(cut, shape, paths, plan.bottom, 0.0, plan.finish_feed)
-    yield cut.rapid(z=max(plan.clear, plan.retract))
+        yield from _passes(cut, shape, paths, plan.depth.bottom, 0.0, plan.finish_feed)
+    yield cut.rapid(z=max(plan.depth.clear, plan.depth.retract))
 
 
 def _wall(shape: PocketShape, plan: PocketPlan) -> Path:
@@ -279,12 +273,12 @@ def _passes(
     plan, start = cut.plan, paths[0][0]
     out = shape.to_wall()
     back = backwards(start, out)
-    count = equal_steps(plan.top - bottom, infeed)
-    begin = plan.clear
-    yield cut.rapid(z=plan.clear)
+    count = equal_steps(plan.depth.top - bottom, infeed)
+    begin = plan.depth.clear
+    yield cut.rapid(z=plan.depth.clear)
     yield cut.rapid(start)
     for k in range(1, count + 1):
-        z = bottom if k == count else plan.top + (bottom - plan.top) * k / count
+        z = bottom if k == count else plan.depth.top + (bottom - plan.depth.top) * k / count
         yield from cut.plunge(start, begin, z)
         for first, legs in paths:
             if legs:
@@ -293,4 +287,4 @@ def _passes(
         yield cut.line(feed, out[-1].end if out else start)
         yield from cut.legs(out[-1].end if out else start, back, feed)
         begin = z
-    yield cut.rapid(z=plan.clear)
+    yield cut.rapid(z=plan.depth.clear)

@@ -324,13 +324,13 @@ class Language:
     ranks: Mapping[str, int]  # of operators; those of a higher rank bind first
     functions: frozenset[str]  # of one value
     conditions: frozenset[str]  # those among them that are true or false rather than a number
-    locals: int  # parameters 1 to `locals` are a call's own
-    largest: int  # largest number of a parameter
-    # the value of a parameter that was never assigned; None where "no value" differs from 0
-    vacant: float | None
     # system_numbers and system_names: parameters that hold the state of the control
     system_numbers: frozenset[int]
     system_names: frozenset[str] = frozenset()
+    largest: int = 0  # largest number of a parameter
+    locals: int = 0  # parameters 1 to `locals` are a call's own
+    # the value of a parameter that was never assigned; None where "no value" differs from 0
+    vacant: float | None = 0.0
     read: str = "{0}"  # the Python text of a parameter's value in an expression, with {0} for what was stored
     raw: frozenset[str] = frozenset()  # operators that tell a parameter without a value from 0
     meant: Mapping[str, str] = field(

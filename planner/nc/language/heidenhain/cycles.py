@@ -63,10 +63,10 @@ PATTERNS = (220, 221)
 _TURN = 360.0  # [degrees]
 
 
-def _hole(given: Given, feed: float = 0.0) -> HolePlan:
+def _hole(given: Given, feed: float = 0.0, what: str = "hole") -> HolePlan:
     top = given["Q203"]
     clear, second = top + given["Q200"], top + max(given["Q200"], given["Q204"])
-    return HolePlan(clear, top, top - abs(given["Q201"]), second, feed, given["Q211"])
+    return HolePlan(clear, top, top - abs(given["Q201"]), second, feed, given["Q211"], what)
 
 
 def _end(hole: HolePlan) -> Iterator[Row]:
@@ -179,12 +179,8 @@ def _plan(making: Making, given: Given) -> PocketPlan:
         text = "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
         making.assume(text)
     making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
-    top = given["Q203"]
     return PocketPlan(
-        clear=top + given["Q200"],
-        top=top,
-        bottom=top - abs(given["Q201"]),
-        retract=top + max(given["Q204"], given["Q200"]),
+        depth=_hole(given, what="pocket"),
         radius=radius,
         infeed=given["Q202"],
         step=(given["Q370"] or _OVERLAP) * radius,

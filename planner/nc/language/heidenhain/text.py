@@ -28,9 +28,7 @@ LANGUAGE = tree.Language(
     functions=names("SIN COS TAN ASIN ACOS ATAN SQRT ABS INT FRAC LN LOG EXP"),
     constants={"PI": math.pi},
     conditions=COMPARISONS,
-    locals=0,
     largest=FIRST_POSITION + 2,
-    vacant=0.0,
     system_numbers=PositionVariables.numbers,
 )
 Rows = list[tree.Statement]

@@ -29,7 +29,6 @@ LANGUAGE = Language(
     conditions=COMPARISONS | LOGICAL,
     locals=ARGUMENTS_MAX,
     largest=5601,
-    vacant=0.0,
     system_numbers=LinuxcncVariables.numbers,
     system_names=LinuxcncVariables.names,
     keywords=frozenset(map(str.upper, KEYWORDS)),

@@ -283,11 +283,9 @@ def _plan(making: Making, name: str, given: Mapping[str, float], radius: float) 
     helix = (given.get("RAD1", 0.0), given.get("DP1", 0.0))
     if plunge == 2 and helix[0] > _shape(name, given, radius).room - radius - side:
         raise ValueError(f"the helix of RAD1 {helix[0]:g} has no room beside the tool in {name}")
+    top = given["RFP"]
     return PocketPlan(
-        clear=given["RFP"] + abs(given["SDIS"]),
-        top=given["RFP"],
-        bottom=given["DP"],
-        retract=given["RTP"],
+        depth=HolePlan(top + abs(given["SDIS"]), top, given["DP"], given["RTP"], what="pocket"),
         radius=radius,
         infeed=given.get("MID", 0.0),
         step=given.get("MIDA", 0.0) or _OVERLAP * 2.0 * radius,

@@ -26,9 +26,7 @@ LANGUAGE = tree.Language(
     meant={"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"},
     functions=names("SIN COS TAN ASIN ACOS SQRT ABS POT TRUNC ROUND LN EXP"),
     conditions=COMPARISONS | LOGICAL,
-    locals=0,
     largest=FIRST_POSITION + 2,
-    vacant=0.0,
     system_numbers=PositionVariables.numbers,
     constants={"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi},
 )

@@ -42,6 +42,14 @@ def plan_rows(plan: Plan) -> Rows:
         if plan.method != "stop" and np.isfinite(plan.stop_time):
             times = f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
             rows.append(("stopping at every block", times))
+        if plan.least_time is not None:
+            above = 100.0 * (time / plan.least_time - 1.0)
+            rows.append(
+                (
+                    "fastest possible",
+                    f"{plan.least_time:.4f} s or more; this motion is {above:.2g} % above that",
+                )
+            )
         rows += beside_rows(plan.beside, time, float(plan.program.dwell.sum()))
     if plan.verdict is not None:
         rows += verdict_rows(plan.verdict)

@@ -42,6 +42,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
             "beside_motion": beside_summary(plan),
             "stop_time_s": plan.stop_time,
+            "least_time_s": plan.least_time,
             "tolerance_mm": uniform(plan.toolpath.tolerance),
             "verdict": verdict_summary(verdict) if verdict is not None else None,
             "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from planner.base.errors import NotSolvedError
@@ -17,6 +18,7 @@ from planner.planning.job.beside import Beside, beside_motion
 from planner.planning.job.made import Delivered
 from planner.planning.job.shown import Shown
 from planner.planning.optimal.on_path import OnPath
+from planner.sensitivity.least_time import least_time
 from planner.sensitivity.records import GridHistory, PriceList
 from planner.verifier import CornerCheck, Verdict
 
@@ -137,6 +139,15 @@ class Plan(Shown):
         """The plan without its motion, which is not delivered."""
         gone = dict.fromkeys(("trajectory", "verdict", "grid", "prices", "making"))
         return replace(self, status=Status.INFEASIBLE, sentence=why, **gone)  # type: ignore[arg-type]
+
+    @cached_property
+    def least_time(self) -> float | None:
+        """A time that no motion within the tolerance, the feed and the limits of the axes falls short of [s]
+        (sensitivity/least_time.py); None unless solved, behind filters, and for axes of which it is not known."""
+        if self.verdict is None or self.program.tool_point is not None:
+            return None
+        free = {name.partition(".")[0] for name, check in self.verdict.limits.items() if not check.limited}
+        return least_time(self.toolpath, self.machine, tuple(sorted(free)))
 
     @property
     def solved(self) -> bool:

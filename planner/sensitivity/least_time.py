@@ -1,0 +1,211 @@
+"""A time that no motion falls short of: a bound for every motion that keeps the limits of the axes, the feed and the
+tolerance, however it was found.
+
+A motion passes the waypoints P_k of the path (vertices, and points on arcs and curves) in order, each within its
+tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Four facts:
+
+**Feed.** For any vectors y_k whose product with a velocity that leg k allows is at most 1,
+
+    T >= sum y_k.(P_{k+1} - P_k) - sum e_k |y_k - y_{k-1}|,
+
+since each term is y_k.(q_{k+1} - q_k) but for what the q_k are off, and that product is the time at least. y_k is the
+tangent over the feed; where an axis is slower than the feed, its unit vector over its velocity.
+
+**Corners.** Until t_k the motion is within e of leg k - 1, behind it of leg k. A coordinate with |f| <= e for long enough
+has |f'| <= min(sqrt(4 A e), (243/8 e2 J)^(1/3)) at the end (a parabola; Landau's inequality of third order on a half line,
+Matorin 1955). So at t_k both components across the legs are small, and so are those along, u.v <= (|cos| n1 + n2)/sin of
+the turn: from there to the next corner leg k takes what a straight way takes between ends with these speeds
+(straight_time.py), which is longer than at its feed. Where the path turns back by more than 90 degrees the component
+along is confined on one side: at most sqrt(4 A e).
+
+**Ends.** From rest, the first legs are taken as one straight way in whatever direction counts most; the last ones too.
+
+**Turning back.** Between a maximum of n.q and the next minimum, for any direction n, n.v is 0 at both and the way is
+n.(P_a - P_b) - 2 e at least. Such parts, from one extreme to a later one, stand for all legs between the vertices beside
+them where that is more.
+
+What is added belongs to parts of the motion that have no time in common; the best division is found from the start to
+the end. All limits but those of axes, feed and tolerance are left out, so the bound holds with them too.
+"""
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.sensitivity.straight_time import TINY, UNLIMITED, Bounds, End, straight_time
+from planner.sensitivity.turning_back import turns_of
+from planner.sensitivity.waypoints import Way, way_of
+
+ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
+HEADS = 60  # numbers of legs that are tried as one straight way from rest, evenly in their logarithm
+RUNS = 1000  # of which ends and turning back are looked at, the longest ones
+LONG = 20.0  # tolerances: of lines whose y stays their tangent, for what their corners add
+ROUNDS, LARGE, ROUNDS_OF_LARGE = 100, 100_000, 30  # of fitting y, and for more legs than so many
+LINEAR = "xyz"
+
+
+def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...] = ()) -> float | None:
+    """A time that no motion falls short of [s], dwells included; None behind filters and for axes other than x, y and z,
+    of which the feed counts otherwise.
+
+    not_limited : of velocity, acceleration and jerk, what the motions need not keep
+    """
+    if machine.fir is not None or not set(toolpath.axes) <= set(LINEAR):
+        return None
+    way = way_of(toolpath, machine, not_limited)
+    bounds, y = way.along(way.tangent, way.feed)
+    more = _beside_feed(way, bounds)
+    stops = np.flatnonzero(way.stop)
+    of_run, y, leg = _best_of_runs(way, y, more, stops[:-1])
+    longest = np.argsort(-of_run)[:RUNS]
+    for k in longest[np.diff(stops)[longest] > 1]:
+        begin, end = stops[k], stops[k + 1]
+        run = way.part(begin, end)
+        of_run[k] = max(of_run[k], _with_turns(run, *_with_ends(run, y[begin:end], leg[begin:end])))
+    return float(of_run.sum() * (1.0 - ROUNDING) + toolpath.dwell.sum())
+
+
+def _best_of_runs(
+    way: Way, y: FloatArray, more: FloatArray, runs: Array
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(Q,) what the legs of each run take at least, its y (N, A), and what each leg adds (N,): of tangents, of y that fit
+    the tolerance, and of these but on long lines with corners; `runs` (Q,) begin at these legs."""
+    fitted, step = _fitted(way, y), np.diff(way.point, axis=0)
+    clear = (more > 0.0) & (way.length > LONG * np.maximum(way.tolerance[:-1], way.tolerance[1:]))
+    mixed = np.where(clear[:, None], y, fitted)
+    of_legs = ((y, more), (fitted, 0.0 * more), (mixed, np.where(clear, more, 0.0)))
+    legs = [(one * step).sum(axis=1) + added for one, added in of_legs]
+    jumps = [np.append(_jumps(way, one), 0.0) for one, _ in of_legs]
+    values = np.array([np.add.reduceat(leg - jump, runs) for leg, jump in zip(legs, jumps, strict=True)])
+    which = values.argmax(axis=0)
+    of_leg = np.repeat(which, np.diff(np.append(runs, len(step))))
+    rows = np.arange(len(step))
+    return values.max(axis=0), np.stack([y, fitted, mixed])[of_leg, rows], np.stack(legs)[of_leg, rows]
+
+
+def _fitted(way: Way, y: FloatArray) -> FloatArray:
+    """Vectors y that cost less at corners: nearer to the best ones, whose legs are the shortest way through the
+    tolerances, by the method of Chambolle and Pock (2011) with steps as long as each leg allows."""
+    most = 1.0 / way.feed
+    fixed = np.linalg.norm(y, axis=1) > most * (1.0 + 1e-9)  # where an axis is slower than the feed
+    weight = most / np.maximum((way.tolerance[:-1] + way.tolerance[1:]) / 2.0, TINY + 1e-9 * way.length)
+    place = ahead = way.point
+    y, begun = y.copy(), y
+    per_node = 1.0 / (np.append(weight, 0.0) + np.append(0.0, weight))[:, None]
+    for _ in range(ROUNDS if len(y) <= LARGE else ROUNDS_OF_LARGE):
+        y += 0.5 * weight[:, None] * np.diff(ahead, axis=0)
+        y *= np.minimum(most / np.maximum(np.linalg.norm(y, axis=1), TINY), 1.0)[:, None]
+        y[fixed] = begun[fixed]
+        pull = np.diff(y, axis=0, prepend=0.0, append=0.0)
+        off = place + per_node * pull - way.point
+        off *= np.minimum(way.tolerance / np.maximum(np.linalg.norm(off, axis=1), TINY), 1.0)[:, None]
+        place, ahead = way.point + off, 2.0 * (way.point + off) - place
+    return y
+
+
+def _jumps(way: Way, y: FloatArray) -> FloatArray:
+    """(N-1,) what a change of y costs at the inner waypoints [s]; nothing at stops, which are passed exactly."""
+    return way.tolerance[1:-1] * np.linalg.norm(np.diff(y, axis=0), axis=1)
+
+
+def _beside_feed(way: Way, bounds: Bounds) -> FloatArray:
+    """(N,) what each line takes longer than at its feed, because of the corners and stops at its ends [s]."""
+    u, corner = way.tangent, way.vertex[1:-1] & way.line[:-1] & way.line[1:]
+    least = np.maximum(way.length - way.tolerance[:-1] - way.tolerance[1:], 0.0)
+    within = np.maximum(way.tolerance[:-1], way.tolerance[1:])
+    lasting = least / bounds.speed
+    cosine = np.clip((u[:-1] * u[1:]).sum(axis=1), -1.0, 1.0)
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, TINY))
+    of_before = confined(way, u[1:] - cosine[:, None] * u[:-1], within[:-1], lasting[:-1])
+    of_after = confined(way, u[:-1] - cosine[:, None] * u[1:], within[1:], lasting[1:])
+    before = (np.abs(cosine) * of_before + of_after) / sine
+    after = (np.abs(cosine) * of_after + of_before) / sine
+    back = np.where(cosine < 0.0, 4.0 * np.maximum(within[:-1], within[1:]), np.inf)
+    before = np.minimum(before, np.sqrt(bounds.acceleration[:-1] * back))
+    after = np.minimum(after, np.sqrt(bounds.acceleration[1:] * back))
+    begin = np.append(np.inf, np.where(corner, after, np.inf))
+    end = np.append(np.where(corner, before, np.inf), np.inf)
+    at_begin = End(np.where(way.stop[:-1], 0.0, np.minimum(begin, bounds.speed)), way.stop[:-1])
+    at_end = End(np.where(way.stop[1:], 0.0, np.minimum(end, bounds.speed)), way.stop[1:])
+    return np.where(way.line, straight_time(least, at_begin, at_end, bounds) - lasting, 0.0)
+
+
+def confined(way: Way, across: FloatArray, within: FloatArray, lasting: FloatArray) -> FloatArray:
+    """(n,) the largest speed across a leg at its end [mm/s], UNLIMITED where the time is too short to tell.
+
+    across  : (n, A) the direction, of any length
+    within  : (n,) how far from the leg motions are at most [mm]
+    lasting : (n,) for how long before at least [s]
+    """
+    size = np.maximum(np.linalg.norm(across, axis=1), TINY)
+    direction = np.abs(across) / size[:, None]
+    push, jerk = (np.maximum(direction @ limit, TINY) for limit in way.limit[1:])
+    by_push, by_jerk = np.sqrt(4.0 * push * within), np.cbrt(243.0 / 8.0 * within**2 * jerk)
+    by_push = np.where(lasting * push >= by_push, by_push, UNLIMITED)
+    return np.minimum(by_push, np.where(lasting >= 2.0 * np.cbrt(24.0 * within / jerk), by_jerk, UNLIMITED))
+
+
+def _with_ends(run: Way, y: FloatArray, leg: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """y and what each leg adds, where the first legs of a run and the last ones are taken as one straight way if that
+    is more."""
+    y, leg = y.copy(), leg.copy()
+    first = _from_rest(run, y, leg, len(leg))
+    if first < len(leg):
+        y, leg = -y[::-1], leg[::-1].copy()
+        _from_rest(run.backwards(), y, leg, len(leg) - first)
+        y, leg = -y[::-1], leg[::-1].copy()
+    return y, leg
+
+
+def _from_rest(run: Way, y: FloatArray, leg: FloatArray, most: int) -> int:
+    """Put the first legs of a run, at most so many, as one straight way into y and `leg`; returns how many."""
+    count = len(leg)
+    m = np.unique(np.geomspace(1, most, HEADS).astype(int))
+    way = run.point[m] - run.point[0]
+    size = np.linalg.norm(way, axis=1)
+    all_of_it, rests = m == count, run.stop[m]
+    bounds, heads = run.along(way / np.maximum(size, TINY)[:, None], np.maximum.accumulate(run.feed)[m - 1])
+    least = np.maximum(size - run.tolerance[m], 0.0)
+    begin = End(np.zeros(len(m)), np.ones(len(m), dtype=bool))
+    end = End(np.where(rests, 0.0, bounds.speed), rests)
+    longer = straight_time(least, begin, end, bounds) - least / bounds.speed
+    after = np.where(all_of_it[:, None], 0.0, y[np.minimum(m, count - 1)])
+    jumps = np.append(_jumps(run, y), 0.0)
+    gain = (heads * way).sum(axis=1) + longer - run.tolerance[m] * np.linalg.norm(after - heads, axis=1)
+    gain -= np.cumsum(leg - jumps)[m - 1]
+    best = int(gain.argmax())
+    if gain[best] <= 0.0:
+        return 0
+    first = int(m[best])
+    y[:first] = heads[best]
+    leg[:first] = (heads[best] * np.diff(run.point[: first + 1], axis=0)).sum(axis=1)
+    leg[0] += longer[best]
+    return first
+
+
+def _with_turns(run: Way, y: FloatArray, leg: FloatArray) -> float:
+    """The bound of a run: its legs, or parts that turn back where these take longer.
+
+    Up to waypoint k the legs take total[k], with what y jumps by there. They may end there and a part begin, or begin
+    there behind a part; then y ends or begins at 0. `gain` is what parts up to where the scan is have been worth.
+    """
+    size, within = np.linalg.norm(y, axis=1), run.tolerance
+    jump = np.concatenate([[0.0], _jumps(run, y), [0.0]])
+    total = np.append(0.0, np.cumsum(leg)) - np.cumsum(jump)
+    ended = total + jump - within * np.append(0.0, size)
+    begun = total + within * np.append(size, 0.0)
+    turns = turns_of(run)
+    reached = [np.zeros(len(one.begin)) for one in turns]  # the best up to each extreme
+    events = [(int(k), 1, d, n) for d, one in enumerate(turns) for n, k in enumerate(one.begin) if n]
+    events += [
+        (int(k), 0, d, n) for d, one in enumerate(turns) for n, k in enumerate(one.end) if n and k >= 0
+    ]
+    gain = 0.0
+    for k, begins, d, n in sorted(events):
+        if begins:
+            entered = ended[k] + gain if turns[d].stands_out[n] else 0.0
+            reached[d][n] = max(reached[d][n - 1] + turns[d].time[n - 1], entered)
+        else:
+            gain = max(gain, reached[d][n] - begun[k])
+    return float(total[-1] + gain)

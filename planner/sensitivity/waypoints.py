@@ -1,0 +1,111 @@
+"""The waypoints of a job: vertices, and points on arcs and curves, that every motion within the tolerance passes in order."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.feedrate.constraints.limits import Limits
+from planner.geometry.chords import polyline
+from planner.geometry.toolpath import Joint, Toolpath
+from planner.machine import Machine
+from planner.sensitivity.straight_time import TINY, UNLIMITED, Bounds
+
+TURN = 0.05  # of a chord of an arc or a curve at most [rad]: their lengths are 1e-4 short
+NODES = ("point", "tolerance", "stop", "vertex")
+LEGS = ("tangent", "length", "feed", "line")
+
+
+class Way(NamedTuple):
+    """The waypoints of a job, and the N legs between them.
+
+    point, tolerance, stop, vertex : (N+1, A) [mm], (N+1,) [mm], whether it is a full stop, or a corner
+    tangent, length                : (N, A), (N,) [mm]
+    feed, line                     : (N,) [mm/s], whether the leg is a line
+    limit                          : (3, A) of velocity, acceleration and jerk
+    """
+
+    point: FloatArray
+    tolerance: FloatArray
+    stop: Array
+    vertex: Array
+    tangent: FloatArray
+    length: FloatArray
+    feed: FloatArray
+    line: Array
+    limit: FloatArray
+
+    def part(self, begin: int, end: int) -> "Way":
+        """The legs `begin` to `end` - 1."""
+        nodes, legs = slice(begin, end + 1), slice(begin, end)
+        return self._replace(
+            **{name: getattr(self, name)[nodes] for name in NODES},
+            **{name: getattr(self, name)[legs] for name in LEGS},
+        )
+
+    def backwards(self) -> "Way":
+        """From the end to the start."""
+        turned = self._replace(**{name: getattr(self, name)[::-1] for name in (*NODES, *LEGS)})
+        return turned._replace(tangent=-turned.tangent)
+
+    def along(self, direction: FloatArray, feed: FloatArray) -> tuple[Bounds, FloatArray]:
+        """The limits of the coordinates along directions, and the vectors y (n, A) whose product with a velocity is then
+        at most 1 and most along them.
+
+        direction : (n, A) unit vectors
+        feed      : (n,) that holds meanwhile [mm/s]
+        """
+        size, velocity = np.maximum(np.abs(direction), TINY), self.limit[0]
+        of_axis = velocity / size
+        slowest = of_axis.argmin(axis=1)
+        rows = np.arange(len(direction))
+        speed = np.minimum(feed, of_axis[rows, slowest])
+        y = direction / speed[:, None]
+        axis = np.zeros_like(y)
+        axis[rows, slowest] = np.sign(direction[rows, slowest]) / velocity[slowest]
+        y = np.where((speed < feed)[:, None], axis, y)
+        return Bounds(speed, size @ self.limit[1], size @ self.limit[2]), y
+
+
+def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -> Way:
+    """The waypoints of a toolpath and the legs between them; lines that go straight on at the same feed are one leg.
+
+    not_limited : of velocity, acceleration and jerk, what has no limit
+    """
+    limits = Limits.of(machine, toolpath.axes)
+    of_axes = np.minimum(limits.of_axes, UNLIMITED)
+    for k, name in enumerate(("velocity", "acceleration", "jerk")):
+        if name in not_limited:
+            of_axes[k] = UNLIMITED
+    line = (toolpath.arc < 0) & (toolpath.curve < 0)
+    turn = np.where(line, 0.0, toolpath.curvature * toolpath.length)
+    count = np.maximum(np.ceil(turn / TURN), 1).astype(int)
+    point, segment = polyline(toolpath, count)
+    last = np.append(np.diff(segment) > 0, True)  # of a segment: its end is a joint
+    joint = segment + 1
+    tolerance = np.where(
+        last, toolpath.tolerance[joint], np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
+    )
+    kind = np.where(last, toolpath.joint[joint], Joint.SMOOTH)
+    point = np.vstack([toolpath.start[:1], point])
+    feed = np.where(toolpath.rapid, np.inf, np.minimum(toolpath.feed, machine.feed_max or np.inf))[segment]
+    feed = np.minimum(feed, np.linalg.norm(of_axes[0]))
+    straight = (kind[:-1] == Joint.SMOOTH) & line[segment[:-1]] & line[segment[1:]] & (feed[:-1] == feed[1:])
+    keep = np.append(~straight, True)
+    point, tolerance, kind = point[np.append(True, keep)], tolerance[keep], kind[keep]
+    tolerance, kind = np.append(toolpath.tolerance[0], tolerance), np.append(Joint.STOP, kind)
+    way = np.diff(point, axis=0)
+    length = np.linalg.norm(way, axis=1)
+    stop = kind == Joint.STOP
+    tangent = way / np.maximum(length, TINY)[:, None]
+    return Way(
+        point=point,
+        tolerance=np.where(stop, 0.0, tolerance),
+        stop=stop,
+        vertex=kind == Joint.CORNER,
+        tangent=tangent,
+        length=length,
+        feed=feed[keep],
+        line=line[segment[keep]],
+        limit=of_axes,
+    )

@@ -1,10 +1,10 @@
 """The planned motion as a polyline: setpoints between which straight moves miss no other setpoint by more
 than a given distance.
 
-A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the
-path is (kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers; where
-the chords then miss by more, which is measured, the density is raised and all is done again. The ends of
-rapid moves, standstills and places where something else happens (an M word) are vertices in any case.
+A chord of length l over curvature kappa misses by kappa l^2 / 8. So the density of the vertices along the path is
+(kappa / 8 miss)^(1/2), and they are the setpoints at which its integral passes whole numbers. Chords that miss by
+more, which is measured, are divided, and their parts are measured again. The ends of rapid moves, standstills and
+places where something else happens (an M word) are vertices in any case.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from planner.nc import codes
 from planner.nc.program import Kind, Program
 from planner.planning.job.plan import Plan
 
-ROUNDS = 30  # of raising the density, each by a tenth at least: far more than curvature between setpoints can ask for
+DENSER = 1.2  # than for an even curvature: chords that miss by a little more are halved
 DECIMALS = 4  # of a coordinate in mm
 LINEAR = 3  # axes that chords have: x, y, z
 PLACES = 5  # of a chord at which its distance from the path is measured
@@ -62,19 +62,8 @@ def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> 
     assert trajectory is not None
     if breaks is None:
         breaks = np.unique([event.block for event in plan.program.events]).astype(np.int64)
-    fixed = _fixed(plan, trajectory, breaks)
-    density = _density(trajectory, within)
-    for _ in range(ROUNDS):
-        along = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s))])
-        chosen = np.append(True, np.diff(np.floor(along)) > 0) | fixed
-        rows = np.flatnonzero(chosen)
-        points = _rounded(trajectory.position[rows])
-        misses = _misses(trajectory.position, rows, points)
-        if (misses <= within).all() or chosen.all():
-            break
-        worse = np.maximum.reduceat(misses, rows[:-1])
-        more = np.where(worse > within, np.maximum(np.sqrt(worse / within), 1.1), 1.0)
-        density = density * np.repeat(more, np.append(np.diff(rows)[:-1], len(density) - rows[-2]))
+    rows, miss = _vertices(trajectory, _fixed(plan, trajectory, breaks), within)
+    points = _rounded(trajectory.position[rows])
     feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
     block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
     moves = (np.diff(points, axis=0) != 0).any(axis=1)
@@ -84,7 +73,7 @@ def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> 
         feed=feed[moves],
         block=block[moves],
         rapid=plan.program.kind[block[moves]] == Kind.RAPID,
-        miss=float(misses.max()),
+        miss=miss,
     )
 
 
@@ -236,16 +225,47 @@ def _density(trajectory: Trajectory, within: float) -> FloatArray:
     return density
 
 
-def _misses(position: FloatArray, rows: Array, points: FloatArray) -> FloatArray:
-    """(T,) distance of the setpoints (T, A) from the straight move that belongs to them, between points (n+1,
-    A) at `rows`; or how far they go back along it, if that is more: a way there and back lies on the chord,
-    which would leave it out."""
-    move = np.clip(np.searchsorted(rows, np.arange(len(position)), side="right") - 1, 0, len(rows) - 2)
-    a, b = points[move], points[move + 1]
-    chord = b - a
-    size = (chord * chord).sum(axis=1)
-    u = np.divide(((position - a) * chord).sum(axis=1), size, out=np.zeros(len(position)), where=size > 0)
-    off: FloatArray = np.linalg.norm(position - a - np.clip(u, 0.0, 1.0)[:, None] * chord, axis=1)
+def _vertices(trajectory: Trajectory, fixed: Array, within: float) -> tuple[Array, float]:
+    """(n+1,) the setpoints between which chords miss no other by more than `within` [mm], and by how much at most; those
+    that are `fixed` (T,) are among them."""
+    density = DENSER * _density(trajectory, within)
+    along = np.append(0.0, np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s)))
+    rows = np.flatnonzero(np.append(True, np.diff(np.floor(along)) > 0) | fixed)
+    found, miss = [rows], 0.0
+    begin, end = rows[:-1], rows[1:]
+    while len(begin):
+        off = _misses(trajectory.position, begin, end)
+        divided = (off > within) & (end - begin > 1)
+        miss = max(miss, float(off[~divided].max(initial=0.0)))
+        begin, end = begin[divided], end[divided]
+        parts = np.minimum(np.maximum(np.ceil(np.sqrt(off[divided] / within)), 2), end - begin).astype(
+            np.int64
+        )
+        of = np.repeat(np.arange(len(begin)), parts - 1)
+        number = np.arange(len(of)) - np.repeat(np.cumsum(parts - 1) - parts + 1, parts - 1) + 1
+        target = along[begin[of]] + (along[end[of]] - along[begin[of]]) * number / parts[of]
+        found.append(np.clip(np.searchsorted(along, target), begin[of] + 1, end[of] - 1))
+        nodes = np.unique(np.append(begin, found[-1]))
+        chord = np.searchsorted(begin, nodes, side="right") - 1
+        last = np.append(np.diff(chord) > 0, True) if len(nodes) else np.zeros(0, dtype=bool)
+        begin, end = nodes, np.where(last, end[chord], np.append(nodes[1:], 0))
+    return np.unique(np.concatenate(found)), miss
+
+
+def _misses(position: FloatArray, begin: Array, end: Array) -> FloatArray:
+    """(n,) how far chords miss the setpoints (T, A) from `begin` (n,) to before `end` (n,) at most, or how far these go
+    back along them, if that is more: a way there and back lies on the chord, which would leave it out."""
+    count = end - begin
+    first = np.cumsum(count) - count
+    move = np.repeat(np.arange(len(begin)), count)
+    seen = position[np.arange(len(move)) - np.repeat(first - begin, count)]
+    a = _rounded(position[begin])
+    chord = _rounded(position[end]) - a
+    size = (chord * chord).sum(axis=1)[move]
+    from_start = seen - a[move]
+    u = np.divide((from_start * chord[move]).sum(axis=1), size, out=np.zeros(len(move)), where=size > 0)
+    off = np.linalg.norm(from_start - np.clip(u, 0.0, 1.0)[:, None] * chord[move], axis=1)
     along = u * np.sqrt(size)
     along += move * 2.0 * float(np.abs(along).max(initial=1.0))  # each move above all before it
-    return np.maximum(off, np.maximum.accumulate(along) - along)
+    worst: FloatArray = np.maximum.reduceat(np.maximum(off, np.maximum.accumulate(along) - along), first)
+    return worst

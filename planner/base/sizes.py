@@ -55,8 +55,6 @@ class Sizes:
     points_shared: int = _size(PARTS, 3_000, 0)  # fewer are solved by one thread
     relaxed_shared: int = _size(PARTS, 2_000, 0)  # spans; fewer are relaxed by one thread
     read_shared: int = _size(PARTS, 65_536, 0)  # samples; fewer are judged by one thread
-    # grid points; more are priced while the motion is judged, by another thread
-    priced_beside: int = _size(PARTS, 30_000, 0)
     # steps of a run that is divided into windows enough for itself, and of windows that are worth threads
     searched_shared: int = _size(PARTS, 3_000, 0)
     windows_shared: int = _size(PARTS, 1_000, 0)

@@ -2,13 +2,8 @@
 
 import functools
 import os
-import threading
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TypeVar
-
-Here = TypeVar("Here")
-There = TypeVar("There")
 
 PERIOD = 0.1  # [s]
 _given: int | None = None
@@ -72,27 +67,3 @@ def in_parts(count: int, least: int, work: Callable[[int, int], None]) -> None:
     ends = [count * k // parts for k in range(parts + 1)]
     tasks = [functools.partial(work, *own) for own in pairwise(ends)]
     side_by_side(tasks, lambda: None, lambda: None)
-
-
-def beside(here: Callable[[], Here], there: Callable[[], There]) -> tuple[Here, There]:
-    """The results of `here`, which runs in this thread, and of `there`, which runs in another one meanwhile;
-    without another thread, one after the other. What is raised here is raised at once, what is raised there
-    when `here` has ended."""
-    if threads() == 1:
-        return here(), there()
-    found: list[There] = []
-    raised: list[BaseException] = []
-
-    def run() -> None:
-        try:
-            found.append(there())
-        except BaseException as fault:
-            raised.append(fault)
-
-    other = threading.Thread(target=run, daemon=True)  # does not keep an interrupted program alive
-    other.start()
-    own = here()
-    other.join()
-    if raised:
-        raise raised[0]
-    return own, found[0]

@@ -15,8 +15,6 @@ import dataclasses
 
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, QUICK, SPLINE
-from planner.base.sizes import SIZES
-from planner.base.threads import beside, threads
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
@@ -30,11 +28,9 @@ from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
 from planner.planning.optimal.geometry import corner_shape, splined_with_stops
 from planner.planning.optimal.notes import no_spline_note, not_compared_note
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.result import plan_of_solution, priced, prices_of
+from planner.planning.optimal.result import plan_of_solution, priced
 from planner.planning.optimal.tighten import within_limits
 from planner.smoothing.spline_path import with_spline
-
-PRICED_BESIDE = SIZES.priced_beside
 
 
 def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
@@ -76,14 +72,8 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
         best, motion, filtered = within_filters(best, motion, settings.order, job)
     if motion.end > job.most:
         return plan_of_solution(job, best, None, settings)
-    if priced(best, job.machine) and len(best.samples) > PRICED_BESIDE and threads() > 1:
-        made, prices = beside(
-            lambda: job.deliver(motion, settings.not_limited), lambda: prices_of(best, job.machine)
-        )
-        tables = Tables(prices=prices)
-    else:
-        made = job.deliver(motion, settings.not_limited)
-        tables = Tables(priced=best if priced(best, job.machine) else None)
+    made = job.deliver(motion, settings.not_limited)
+    tables = Tables(priced=best if priced(best, job.machine) else None)
     return plan_of_solution(job, best, made._replace(filtered=filtered), settings, tables)
 
 

@@ -57,7 +57,7 @@ def test_words_of_names_are_told_apart() -> None:
     assert wrong_words("StraightCourse", "baselines/fir/guide.py") == {"course"}
     assert (
         wrong_words("per_stretch", "baselines/fir/guide.py")
-        == wrong_words("STRETCHES", "feedrate/sampling/calm.py")
+        == wrong_words("STRETCHES", "feedrate/sampling/feed_limited.py")
         == {"stretch"}
     )
     assert (

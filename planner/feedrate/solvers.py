@@ -1,10 +1,9 @@
-"""The solvers by their names: two of the problem without jerk limits, four of the problem with them.
+"""The solvers by their names: two of the problem without jerk limits, three of the problem with them.
 
     second order   reachability        our kernel (feedrate/reachability.py)
                    toppra              the package of that name, to compare with (feedrate/toppra_adapter.py)
     third order    own                 our interior-point kernel (feedrate/jerk/)
                    ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
-                                       (exact_motion.py)
 
 A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one
 method:
@@ -14,8 +13,8 @@ method:
 Sizes up to which each is sensible: docs/methods.md.
 """
 
-from collections.abc import Callable, Iterable
-from typing import Protocol
+from collections.abc import Callable, Container, Mapping
+from typing import Protocol, TypeVar
 
 from planner.base.errors import InputError
 from planner.feedrate.constraints.problem import FeedrateProblem
@@ -24,6 +23,8 @@ from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import FeedrateSolution, FeedrateSolver
 from planner.feedrate.toppra_adapter import ToppraSolver
+
+Solver = TypeVar("Solver")
 
 REACHABILITY, OWN = "reachability", "own"  # the usual ones
 
@@ -53,25 +54,17 @@ THIRD_ORDER: dict[str, ThirdOrderSolver] = {
 def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
     """The solver without jerk limits of that name, or the solver given. Raises InputError for a name that is
     none of them."""
-    if not isinstance(solver, str):
-        return solver
-    if solver not in SECOND_ORDER:
-        raise InputError(_unknown(solver, "second-order", SECOND_ORDER, THIRD_ORDER))
-    return SECOND_ORDER[solver]
+    return _named(solver, SECOND_ORDER, "second-order", THIRD_ORDER) if isinstance(solver, str) else solver
 
 
 def third_order_solver(solver: str | ThirdOrderSolver) -> ThirdOrderSolver:
     """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is
     none of them."""
-    if not isinstance(solver, str):
-        return solver
-    if solver not in THIRD_ORDER:
-        raise InputError(_unknown(solver, "optimal", THIRD_ORDER, SECOND_ORDER))
-    return THIRD_ORDER[solver]
+    return _named(solver, THIRD_ORDER, "optimal", SECOND_ORDER) if isinstance(solver, str) else solver
 
 
-def _unknown(solver: str, method: str, names: Iterable[str], others: Iterable[str]) -> str:
-    said = (
-        f"solver = {solver}: method {method} does not use it" if solver in others else f"no solver '{solver}'"
-    )
-    return f"{said}; there are {', '.join(names)}"
+def _named(name: str, solvers: Mapping[str, Solver], method: str, others: Container[str]) -> Solver:
+    if name in solvers:
+        return solvers[name]
+    said = f"solver = {name}: method {method} does not use it" if name in others else f"no solver '{name}'"
+    raise InputError(f"{said}; there are {', '.join(solvers)}")

@@ -24,7 +24,7 @@ tool. Along a path r(s), with ' for d/ds,
 
 the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (base/series.py). The length of
 the path is such a q with q' = 1. Between grid points the same measures hold as for the axes: points where the
-rows are not close to linear and a margin (feedrate/sampling/own_rows.py), tightening
+rows are not close to linear and a margin (feedrate/sampling/user_rows.py), tightening
 (planning/optimal/tighten.py). Methods `optimal` and `second-order` plan with these limits; the verdict judges
 the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
 """

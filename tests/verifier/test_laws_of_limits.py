@@ -29,7 +29,7 @@ from planner.feedrate.constraints.limits import (
     Limits,
 )
 from planner.feedrate.constraints.on_grid import OnGrid
-from planner.feedrate.constraints.own_axes import own_inside
+from planner.feedrate.constraints.user_limits import user_inside
 from planner.feedrate.sampling.samples import sample_path
 from planner.motion.limits_used import ratios
 from planner.verifier import verify
@@ -259,7 +259,7 @@ def test_the_judge_finds_limits_of_ones_own_used_up(own):
     machine = machine_with().with_own([own])
     toolpath = circle().toolpath(machine)
     grid = on_grid(toolpath, machine)
-    speed = float(np.sqrt(own_inside(grid.samples, Limits.of(machine, grid.axes)).min()))
+    speed = float(np.sqrt(user_inside(grid.samples, Limits.of(machine, grid.axes)).min()))
     verdict = judge(steady(speed), toolpath, machine)
     check = verdict.limits[f"velocity.{own.name}"]
     assert check.ratio == pytest.approx(1.0, abs=CLOSE)

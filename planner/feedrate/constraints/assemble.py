@@ -11,8 +11,8 @@ from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limit import Cap, Limit
 from planner.feedrate.constraints.limits import LIMITS, Limits
 from planner.feedrate.constraints.on_grid import OnGrid
-from planner.feedrate.constraints.own_axes import own_inside, with_own_axes
 from planner.feedrate.constraints.problem import FeedrateProblem
+from planner.feedrate.constraints.user_limits import user_inside, with_user_limits
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
@@ -62,7 +62,7 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         feed_sq_start=np.zeros(pieces),
         feed_sq_end=np.zeros(pieces),
     )
-    return with_own_axes(problem, samples, limits) if limits.along else problem
+    return with_user_limits(problem, samples, limits) if limits.along else problem
 
 
 def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
@@ -71,7 +71,7 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
     found = [bound for limit in LIMITS if (bound := limit.inside(grid)) is not None]
     feed_sq = np.min(found, axis=0)
     limits = Limits.of(machine, grid.axes)
-    return np.minimum(feed_sq, own_inside(samples, limits)) if limits.along else feed_sq
+    return np.minimum(feed_sq, user_inside(samples, limits)) if limits.along else feed_sq
 
 
 def bounds_of(samples: PathSamples, machine: Machine, limits: Sequence[Limit]) -> FloatArray:

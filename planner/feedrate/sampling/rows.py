@@ -14,7 +14,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.search import last_not_after
 from planner.corners.blend import corner_point, shape_at
-from planner.feedrate.sampling.calm import SWITCHING_WAY, interval_ends
+from planner.feedrate.sampling.feed_limited import SWITCHING_WAY, interval_ends
 from planner.geometry.legs import leg_point
 
 # Arcs start with intervals of at most this angle [rad], so that no full turn hides between two equal points.
@@ -68,10 +68,10 @@ class Joints(NamedTuple):
 
 
 class Longest(NamedTuple):
-    """How long the intervals on curves may be (feedrate/sampling/calm.py)."""
+    """How long the intervals on curves may be (feedrate/sampling/feed_limited.py)."""
 
     duration: float  # at the fastest feed [s]; inf for second-order solvers, where the rest is not looked at
-    busy: FloatArray  # (B, 2) ranges of the path that are not calm [mm]
+    busy: FloatArray  # (B, 2) ranges of the path that are not feed-limited [mm]
     feed_sq: FloatArray  # (R+S,) bound of feed^2 by the curvature of each leg and span [mm2/s2]
     quiet: FloatArray  # (M,) `quiet_way` at each segment's feed [mm]
 
@@ -182,7 +182,7 @@ def _cut_corner(rows, n, corners, k, seg, between, vertex, breaks):
 
 @njit(cache=True, error_model="numpy")
 def _base(longest, feed, feed_sq, acceleration):
-    """Longest interval on a curve [mm] that switches of the acceleration allow (feedrate/sampling/calm.py):
+    """Longest interval on a curve [mm] that switches of the acceleration allow (feedrate/sampling/feed_limited.py):
     `longest` [s] at the fastest feed, or by the time to change the speed where feed^2 is at least `feed_sq`
     by its curvature."""
     return max(longest * feed, SWITCHING_WAY * min(feed * feed, feed_sq) / acceleration)

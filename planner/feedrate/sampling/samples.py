@@ -30,11 +30,11 @@ from planner.base.sizes import SIZES
 from planner.corners.elements import element_table
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.constraints.limits import Limits
-from planner.feedrate.sampling.calm import Calm, calm, quiet_way
+from planner.feedrate.sampling.feed_limited import FeedLimited, feed_limited, quiet_way
 from planner.feedrate.sampling.grid import Intervals, divide, evaluate, grade
-from planner.feedrate.sampling.own_rows import own_rows
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.rows import Joints, Longest, PathLimits, cut_path
+from planner.feedrate.sampling.user_rows import user_rows
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 
@@ -46,7 +46,7 @@ RESOLUTION = 2e-3
 # the memory.
 MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
 # For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis
-# needs for its acceleration [-], where feedrate/sampling/calm.py does not say that it may last longer.
+# needs for its acceleration [-], where feedrate/sampling/feed_limited.py does not say that it may last longer.
 ARC_PERIOD = 0.5
 # ... and the first interval after a full stop is what the jerk makes of this share of a/j [-].
 REST_PERIOD = 0.25
@@ -80,9 +80,9 @@ def sample_path(
         longest = ARC_PERIOD * delay
         shortest = float(jerk.min()) * (REST_PERIOD * delay) ** 3 / 6.0
     acceleration = np.minimum(acceleration, of_machine.normal)
-    where_calm = Calm(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
+    where_calm = FeedLimited(np.array([[-np.inf, np.inf]]), np.zeros(len(table.legs) + len(table.spans)))
     if third_order:
-        where_calm = calm(path, table, (velocity, acceleration, jerk))
+        where_calm = feed_limited(path, table, (velocity, acceleration, jerk))
     limits = PathLimits(path.toolpath.feed, velocity, acceleration, jerk)
     quiet = quiet_way(path.toolpath.feed, acceleration, jerk)
     rows = cut_path(table, _joints(path), limits, Longest(longest, *where_calm, quiet))
@@ -103,7 +103,7 @@ def sample_path(
     )
     if of_machine.along:
         for _ in range(HALVINGS_OF_OWN):
-            coarse = own_rows(samples, of_machine, resolution).coarse
+            coarse = user_rows(samples, of_machine, resolution).coarse
             if not coarse.any():
                 break
             samples = _halved(samples, np.flatnonzero(coarse), limits)

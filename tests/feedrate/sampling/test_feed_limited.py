@@ -14,7 +14,7 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.elements import element_table
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling import samples as path_module
-from planner.feedrate.sampling.calm import GROWTH, calm, interval_ends, quiet_way
+from planner.feedrate.sampling.feed_limited import GROWTH, feed_limited, interval_ends, quiet_way
 from planner.geometry.build import toolpath_from_program
 from planner.nc.reader import parse_program
 from planner.planning.methods.optimal import OptimalMethod
@@ -50,7 +50,7 @@ def test_corners_stops_feed_changes_and_tight_arcs_are_not_calm():
     )
     path = round_corners(toolpath_from_program(program, SHORT), SHORT, BezierCorner(), blend_tangents=True)
     limits = tuple(SHORT.limits(q, path.toolpath.axes) for q in ("velocity", "acceleration", "jerk"))
-    found = calm(path, element_table(path), limits)
+    found = feed_limited(path, element_table(path), limits)
     assert (found.busy[1:, 0] > found.busy[:-1, 1]).all()
 
     def busy(place):
@@ -89,10 +89,10 @@ def test_short_a_over_j_needs_no_more_points_and_no_more_time(corner, monkeypatc
     few = method.plan(program, SHORT)
 
     def nowhere(path, table, limits):
-        none = calm(path, table, limits)
+        none = feed_limited(path, table, limits)
         return none._replace(busy=EVERYWHERE, feed_sq=np.zeros(len(none.feed_sq)))
 
-    monkeypatch.setattr(path_module, "calm", nowhere)
+    monkeypatch.setattr(path_module, "feed_limited", nowhere)
     many = method.plan(program, SHORT)
     assert few.verdict.passed, few.verdict.faults
     assert many.grid_points > 10 * few.grid_points

@@ -38,7 +38,7 @@ FAR = 4.0  # caps of feed^2 beyond so many times those of the axes are as good a
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class OwnRows:
+class UserRows:
     """Rows of V limits at P grid points."""
 
     names: tuple[str, ...]  # of the limits
@@ -74,7 +74,7 @@ def _points(legs, corners, spans, element, w, axes):
     return out
 
 
-def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> OwnRows:
+def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> UserRows:
     """The rows of the limits `along`; `resolution` is the share of the limits that they may leave the chord
     by (module text)."""
     axes = samples.path.toolpath.axes
@@ -101,7 +101,7 @@ def own_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -
         error[at] = np.maximum(error[at], column.error)
         coarse[at] |= column.coarse(resolution)
     coarse[at] &= samples.s[at + 1] - samples.s[at] > LEAST
-    return OwnRows(
+    return UserRows(
         names=tuple(limit.name for limit in limits.along),
         least=np.stack([column.least for column in columns], axis=1),
         error=error,

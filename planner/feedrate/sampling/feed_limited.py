@@ -8,10 +8,10 @@ bounds say where they are not needed:
 * An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds.
   With h = 0.03 v/a that is 1e-4 of v/a, the time which lies between two such switches because the speed has
   to change between them.
-* A curve is calm where the programmed feed F is the smallest bound, and leaves half of the axes'
+* A curve is feed-limited where the programmed feed F is the smallest bound, and leaves half of the axes'
   accelerations and jerks free:
 
-      F <= v_k,    |r''_k| F^2 <= a_k/2,    |r'''_k| F^3 <= j_k/2                                    for all axes k.
+      F <= v_k,    |r''_k| F^2 <= a_k/2,    |r'''_k| F^3 <= j_k/2        for all axes k.
 
   A time-optimal motion runs there at F, but where it still comes from, or already prepares for, something
   else. Half of acceleration and jerk change the speed by F within 2 F/a + a/j [s], so within `quiet_way` of
@@ -29,21 +29,25 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.toolpath import Joint
 
 SWITCHING_WAY = 0.03  # h above [v/a]
-FREE_FRACTION = 0.5  # of accelerations and jerks, on calm curves [-]
-GROWTH = 0.25  # of intervals by their distance from what is not calm [-]: as on straight elements (feedrate/grid.py, STEP/NEAR)
+FREE_FRACTION = 0.5  # of accelerations and jerks, on feed-limited curves [-]
+# Of intervals by their distance from what is not feed-limited [-]: as on straight elements (feedrate/grid.py,
+# STEP/NEAR).
+GROWTH = 0.25
 PLACES = 9  # on every curve, at which it is looked at
 
 
-class Calm(NamedTuple):
-    """busy (B, 2) ascending ranges of the path that are not calm, counted along the legs [mm]; feed_sq (R+S,)
-    a lower bound of feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
+class FeedLimited(NamedTuple):
+    """busy (B, 2) ascending ranges of the path that are not feed-limited, counted along the legs [mm]; feed_sq
+    (R+S,) a lower bound of feed^2 that each leg's and span's curvature leaves, inf where it is straight."""
 
     busy: FloatArray
     feed_sq: FloatArray
 
 
-def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray]) -> Calm:
-    """Where the path is calm (module text).
+def feed_limited(
+    path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatArray, FloatArray]
+) -> FeedLimited:
+    """Where the path is feed-limited (module text).
 
     table  : of the path's elements
     limits : velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3] of the axes, (A,) each
@@ -71,12 +75,12 @@ def calm(path: SmoothPath, table: ElementTable, limits: tuple[FloatArray, FloatA
         np.stack([joint[:-1], joint[1:]], axis=1)[leg],
         np.stack([span["begin"], span["begin"] + span["width"]], axis=1),
     ]
-    return Calm(busy=_merged(np.concatenate(ranges)), feed_sq=feed_sq)
+    return FeedLimited(busy=_merged(np.concatenate(ranges)), feed_sq=feed_sq)
 
 
 def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(M,) how far from what is not calm a motion at `feed` (M,) [mm/s] may still change its speed [mm]
-    (module text).
+    """(M,) how far from what is not feed-limited a motion at `feed` (M,) [mm/s] may still change its speed
+    [mm] (module text).
 
     acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
     """
@@ -129,12 +133,12 @@ def _merged(ranges: FloatArray) -> FloatArray:
 @njit(cache=True, error_model="numpy")
 def interval_ends(start, left, right, base, most, quiet, busy):
     """Ends (n+1,) of the intervals of a row from `left` to `right`: of `base` at most, longer ones, up to
-    `most`, where the path is calm and `quiet` away from what is not.
+    `most`, where the path is feed-limited and `quiet` away from what is not.
 
     start                     : place that left and right are counted from [mm]
     left, right, base, most   : [mm]
     quiet                     : `quiet_way` [mm]
-    busy                      : (B, 2) ranges that are not calm [mm]
+    busy                      : (B, 2) ranges that are not feed-limited [mm]
     """
     middle = start + 0.5 * (left + right)
     gap = np.searchsorted(busy[:, 0], middle, side="right") - 1

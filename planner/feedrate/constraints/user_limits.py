@@ -1,5 +1,5 @@
 """Limits of one's own in the feedrate problem: each is an axis more (own.py says what they are,
-feedrate/sampling/own_rows.py makes their rows).
+feedrate/sampling/user_rows.py makes their rows).
 
 The axes are scaled by 1/max |q'|, so that none of them moves faster than the path; whatever unit a limit is
 in, solvers see numbers like those of the machine's axes. Rows are shares of limits, so that scaling changes
@@ -14,17 +14,17 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limits import VELOCITY, Limits
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.sampling.own_rows import own_rows
 from planner.feedrate.sampling.path_samples import PathSamples
+from planner.feedrate.sampling.user_rows import user_rows
 
 
-def with_own_axes(problem: FeedrateProblem, samples: PathSamples, limits: Limits) -> FeedrateProblem:
+def with_user_limits(problem: FeedrateProblem, samples: PathSamples, limits: Limits) -> FeedrateProblem:
     """The problem with the limits `along` as further axes; the margin says what is found between the points.
 
     Raises NotSolvedError where a limit changes faster than the grid follows, InputError for a bound that is
     not positive and for a joint without derivatives.
     """
-    rows = own_rows(samples, limits)
+    rows = user_rows(samples, limits)
     if rows.margin.max() >= 1.0:
         line = int(samples.path.toolpath.line[samples.segment[int(rows.margin.argmax())]])
         all_names = ", ".join(rows.names)
@@ -65,11 +65,11 @@ def with_own_axes(problem: FeedrateProblem, samples: PathSamples, limits: Limits
     )
 
 
-def own_inside(samples: PathSamples, limits: Limits) -> FloatArray:
+def user_inside(samples: PathSamples, limits: Limits) -> FloatArray:
     """(P,) what the limits `along` allow of feed^2 inside the interval to the right of each point; inf where
     nothing limits, and where a piece ends [mm2/s2]."""
     at = samples.intervals
-    own = own_rows(samples, limits).feed_sq_max.min(axis=1)
+    own = user_rows(samples, limits).feed_sq_max.min(axis=1)
     inside = np.full(len(samples), np.inf)
     inside[at] = np.maximum(own[at], own[at + 1])
     return inside

@@ -1,4 +1,5 @@
-"""What the default loses without each of its retries, those of the table of planner/planning/attempts.py.
+"""What the default loses without each of its retries, those of the table of planner/planning/attempts.py, and without
+single numbers of the joint search and of shaping (`NUMBERS`).
 
     python -m benchmarks.net.ablation ROWS --net NET [--without NAME] [--most 60]     plan without one of them, or all in turn
     python -m benchmarks.net.ablation ROWS --net NET --report                         into results/ablation.json and .md
@@ -24,6 +25,7 @@ from benchmarks.net.golden_net import SAME, Row, jobs, read, row_of
 from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
 from planner.delivery import mending
+from planner.joint import normal_rows, own, refine, run
 from planner.planning import attempts, joint_search
 from planner.planning.attempt import Attempt
 from planner.planning.attempts import RETRIES
@@ -63,9 +65,11 @@ def _no_corners(rounded: Any, best: Any, *more: Any) -> Any:
 def _not_in_long_steps() -> None:
     inner = joint_search.joint_plan
 
-    def joint_plan(job: Any, settings: Any, planned: Any, search: Any, alone: Any, motion: Any = None) -> Any:
-        again = motion is None and not search.finer and settings.effort.search.finer
-        return joint_search.Joint(None, 0) if again else inner(job, settings, planned, search, alone, motion)
+    def joint_plan(job: Any, settings: Any, planned: Any, search: Any, *more: Any, **named: Any) -> Any:
+        again = len(more) < 2 and not search.finer and settings.effort.search.finer
+        if again:
+            return joint_search.Joint(None, 0)
+        return inner(job, settings, planned, search, *more, **named)
 
     joint_search.joint_plan = joint_plan
 
@@ -91,8 +95,27 @@ SWITCHES: dict[str, Switch] = {
 }
 
 
+def _stay_free() -> None:
+    """A change of the velocity by itself costs nothing."""
+    normal_rows.STAY = normal_rows.STAY_PRICED = 0.0
+
+
+# Numbers, by the trace's step of the jobs in which they count: what is planned without them.
+NUMBERS: dict[str, tuple[str, Switch]] = {
+    "STAY, STAY_PRICED": ("search", _stay_free),
+    "MOST": ("search", _set(refine, "MOST", run.HALF)),
+    "PASSED": ("search", _set(run, "PASSED", 0.0)),
+    "SHORTENED": ("search", _set(own, "SHORTENED", np.inf)),
+    "SEARCHED": ("shaped", _set(shaped, "SEARCHED", np.inf)),
+    "NOT_SEARCHED": ("shaped", _set(shaped, "NOT_SEARCHED", np.inf)),
+}
+SWITCHES |= {name: switch for name, (_, switch) in NUMBERS.items()}
+
+
 def fires(name: str, row: Row) -> bool:
-    """Whether a plan took a step of the retry."""
+    """Whether a plan took a step of the retry, or one in which the number counts."""
+    if name in NUMBERS:
+        return NUMBERS[name][0] in row.get("steps", {})
     steps = next(retry.steps for retry in RETRIES if retry.steps[0] == name)
     least = 2 if name == "search" else 1  # one search is no retry
     return sum(n for step, n in row.get("steps", {}).items() if step.startswith(steps)) >= least

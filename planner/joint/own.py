@@ -59,7 +59,8 @@ START = (0.3, 0.05)
 # Where one is exceeded it is lowered by what it was above, and a little more [-], at most so many times.
 TIGHTENED, TIGHTER = 3, 1.002
 # Where steps want to be shorter than they may become (problem.py) a window is searched once more from what was found,
-# if that is worth this share of the time [-].
+# if that is worth this share of the time [-]
+# (`python -m benchmarks.net.ablation ROWS --net NET --without SHORTENED`).
 SHORTENED = 1e-3
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9

@@ -51,7 +51,8 @@ ARC_FRACTION, TURN_MAX = 0.005, 0.5
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
 # axis by the budget [-]: finer ones take more steps and end hardly sooner.
 SHARP = 0.25
-# An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`).
+# An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`;
+# `python -m benchmarks.net.ablation ROWS --net NET --without PASSED`).
 PASSED = 2.0
 # Of the tolerance that chords and filters take at most, as long as nothing tells better: where a corner is as fast as
 # can be, eq. (20) [-].

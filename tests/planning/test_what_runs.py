@@ -49,7 +49,7 @@ def test_the_table_has_exactly_the_retries_that_a_trace_can_show() -> None:
 
 
 def test_each_of_them_can_be_switched_off() -> None:
-    assert set(ablation.SWITCHES) == {retry.steps[0] for retry in RETRIES}
+    assert set(ablation.SWITCHES) - set(ablation.NUMBERS) == {retry.steps[0] for retry in RETRIES}
 
 
 def steps_of(text: str, **settings) -> list[str]:

@@ -58,7 +58,8 @@ from planner.planning.page import tolerant
 SHARP = float(np.deg2rad(20.0))
 # What the shaper may take of the tolerance at the largest acceleration for p to be searched with it in one,
 # at least for it to be planned in other ways too, at most for it to be searched [-]: of a pentagon, a zig-zag
-# and an arc at 400 to 9 Hz the search was faster in all with less, and in none with more.
+# and an arc at 400 to 9 Hz the search was faster in all with less, and in none with more
+# (`python -m benchmarks.net.ablation ROWS --net NET --without SEARCHED`, or NOT_SEARCHED).
 SEARCHED, NOT_SEARCHED = 1.0, 10.0
 
 

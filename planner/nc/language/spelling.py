@@ -25,8 +25,8 @@ LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, 
 
 @cache
 def _pattern(names: tuple[str, ...]) -> re.Pattern[str]:
-    known = "|".join(sorted(names, key=len, reverse=True))
-    text = rf"(?P<number>{_NUMBER})|(?P<text><[^<>#()\n]+>)|(?P<name>(?i:{known}))|(?P<letter>[A-Za-z])"
+    known, begin = "|".join(sorted(names, key=len, reverse=True)), "".join({name[0] for name in names})
+    text = rf"(?P<number>{_NUMBER})|(?P<text><[^<>#()\n]+>)|(?P<name>(?i:(?=[{begin}])(?:{known})))|(?P<letter>[A-Za-z])"
     return re.compile(rf"{text}|(?P<sign>\*\*|.)", re.DOTALL)
 
 
@@ -42,14 +42,16 @@ class LineReader(TokenReader):
         )
         self.comments: list[str] = []
         self.places: list[int] = []  # of the characters that are left, in the line
+        text = ""
         for piece in _PIECE.finditer(line.text):
             if piece["kept"]:
                 self.places += range(*piece.span())
+                text += piece["kept"]
             elif piece["open"]:
                 raise self._comment_fault(piece.start())
             else:
                 self.comments.append(piece["inner"] or piece["rest"] or "")
-        super().__init__("".join([line.text[k] for k in self.places]))
+        super().__init__(text)
 
     def _comment_fault(self, at: int) -> tree.ProgramFault:
         inner, closed, _ = self.line.text[at + 1 :].partition(")")
@@ -142,7 +144,8 @@ class LineReader(TokenReader):
         words: list[tree.Word] = []
         assignments: list[tuple[tree.Parameter, tree.Expression]] = []
         while not self.ended:
-            if self.kind() == "name":  # a letter and what its value begins with: ASIN[30] is A and SIN[30]
+            kind = self.kind()
+            if kind == "name":  # a letter and what its value begins with: ASIN[30] is A and SIN[30]
                 at = self.column()
                 self.tokens[self.next :] = [Token("letter", self.peek()[0], at), *self.split(at + 1)]
             at, letter = self.column(), self.peek()
@@ -150,7 +153,7 @@ class LineReader(TokenReader):
                 target = self.parameter()
                 self.expect("=", "the parameter")
                 assignments.append((target, self.expression() if self.language.long_values else self.value()))
-            elif self.kind() == "letter":
+            elif kind in ("letter", "name"):
                 self.next += 1
                 value = self.value()
                 is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.column()]

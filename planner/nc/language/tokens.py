@@ -3,7 +3,7 @@
 functions and constants stand in its table (`tree.Language`)."""
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from planner.nc.language.tree import Expression, Language, Number, Operation, ProgramFault
 
@@ -21,13 +21,15 @@ def names(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """A piece of a line."""
 
     kind: str  # "word" (a letter and its number), "letter", "number", "name", "text" or "sign"
     text: str  # as it is written, in capitals; a text as it stands
     at: int  # where it begins in the line
+
+
+_END = Token("", "", 0)
 
 
 class TokenReader:
@@ -53,15 +55,15 @@ class TokenReader:
     def split(self, at: int) -> list[Token]:
         """The tokens from a character on. Raises the fault of one that begins none."""
         tokens, end = [], len(self.text.rstrip())
-        while at < end:
-            match = self.pattern.match(self.text, at)
-            if match is None:
-                at += len(self.text[at:]) - len(self.text[at:].lstrip())
-                raise self.fault(f"{self.text[at]!r} is not part of the language", at)
-            kind = str(match.lastgroup)
-            word = match.group(kind)
-            tokens.append(Token(kind, word if kind == "text" else word.upper(), match.start(kind)))
-            at = match.end()
+        for match in self.pattern.finditer(self.text, at):
+            if match.start() != at:
+                break
+            group, kind, at = match.lastindex or 0, str(match.lastgroup), match.end()
+            word = match[group]
+            tokens.append(Token(kind, word if kind == "text" else word.upper(), match.start(group)))
+        if at < end:
+            at += len(self.text[at:]) - len(self.text[at:].lstrip())
+            raise self.fault(f"{self.text[at]!r} is not part of the language", at)
         return tokens
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
@@ -132,22 +134,25 @@ class TokenReader:
 
     def value(self) -> Expression:
         """A number, parameter, function or bracket, with signs before it."""
-        if self.kind() == "number":
-            return Number(self.number(self.pop().text))
+        token = self.tokens[self.next] if self.next < len(self.tokens) else _END
+        if token.kind == "number":
+            self.next += 1
+            return Number(self.number(token.text))
         self.nested += 1
         if self.nested > NESTED_MAX:
             text = f"more than {NESTED_MAX} brackets in each other; write the expression in several {self.pieces}"
             raise self.fault(text)
         found: Expression | None = None
-        if self.take("+", "-"):
-            negative = self.peek(-1) == "-"
-            found = -self.value() if negative else self.value()
-        elif self.peek() == self.opening:
+        if token.text == self.opening:
             found = self.bracket()
-        elif self.peek() in self.language.constants:
-            found = Number(self.language.constants[self.pop().text])
-        elif not self.ended:
-            found = self.operand(self.pop())
+        elif token is not _END:
+            self.next += 1
+            if token.text in ("+", "-"):
+                found = -self.value() if token.text == "-" else self.value()
+            elif token.text in self.language.constants:
+                found = Number(self.language.constants[token.text])
+            else:
+                found = self.operand(token)
             self.next -= found is None
         if found is None:
             raise self.no_value()

@@ -115,4 +115,8 @@ def model_of_rows(W, G, legs, limits, lin, i, barrier, of):
         for k in range(axes):
             G[m, k, k] += flat
     for m in range(VECTORS):
-        add_vector(W, axes, lin.alpha[i, m], lin.e[i, m], G[m])
+        trace = 0.0
+        for k in range(axes):
+            trace += G[m, k, k]
+        if trace != 0.0:  # or there is nothing of that vector
+            add_vector(W, axes, lin.alpha[i, m], lin.e[i, m], G[m])

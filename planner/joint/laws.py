@@ -121,17 +121,28 @@ def through(x, u, of_w, of_b, by, out):
 def put_along(w, rest, value, of_w):
     """Add the ordinates of v.e but the last, by those of the velocity w (3, A), to value (3,), and their derivatives
     by w to of_w (3, 3, A): the directions e turn with w0 and w2. Returns the speeds at the ends together."""
-    axes = w.shape[1]
-    e, of_e, size = np.empty((2, axes)), np.zeros((3, 2, axes)), np.empty(2)
-    for end in range(2):
-        size[end] = np.sqrt(rest * rest + (w[2 * end] ** 2).sum())
-        e[end] = w[2 * end] / size[end]
-    multiply(PRODUCT, e, w, value, of_e, of_w)
-    for r in range(3):
-        for end in range(2):
-            along = (of_e[r, end] * e[end]).sum()
-            of_w[r, 2 * end] += (of_e[r, end] - along * e[end]) / size[end]
-    return size[0] + size[1]
+    axes, first, last = w.shape[1], rest * rest, rest * rest
+    for k in range(axes):
+        first, last = first + w[0, k] * w[0, k], last + w[2, k] * w[2, k]
+    first, last = np.sqrt(first), np.sqrt(last)
+    w0_e0, w1_e0, w2_e0, w0_e1, w1_e1 = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(axes):
+        e0, e1 = w[0, k] / first, w[2, k] / last
+        w0_e0, w1_e0, w2_e0 = w0_e0 + w[0, k] * e0, w1_e0 + w[1, k] * e0, w2_e0 + w[2, k] * e0
+        w0_e1, w1_e1 = w0_e1 + w[0, k] * e1, w1_e1 + w[1, k] * e1
+    value[0] += w0_e0
+    value[1] += (w0_e1 + 2.0 * w1_e0) / 3.0
+    value[2] += (2.0 * w1_e1 + w2_e0) / 3.0
+    for k in range(axes):
+        e0, e1 = w[0, k] / first, w[2, k] / last
+        of_w[0, 0, k] += e0 + (w[0, k] - w0_e0 * e0) / first
+        of_w[1, 0, k] += (e1 + 2.0 * (w[1, k] - w1_e0 * e0) / first) / 3.0
+        of_w[1, 1, k] += 2.0 * e0 / 3.0
+        of_w[1, 2, k] += (w[0, k] - w0_e1 * e1) / last / 3.0
+        of_w[2, 0, k] += (w[2, k] - w2_e0 * e0) / first / 3.0
+        of_w[2, 1, k] += 2.0 * e1 / 3.0
+        of_w[2, 2, k] += (e0 + 2.0 * (w[1, k] - w1_e1 * e1) / last) / 3.0
+    return first + last
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)

@@ -25,7 +25,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.laws import PRODUCT, REST, multiply, ordinates, put_along, through
+from planner.joint.laws import REST, ordinates, put_along, through
 
 BETWEEN = 2  # ordinates between the nodes
 # What a change of the velocity by itself costs in one iteration: this, and so many times the multipliers of the
@@ -67,6 +67,25 @@ def _put_turning_rows(bound, x, u, g, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _factors(pace, x, u):
+    """Of a step the ordinates b (2, A); d (2,) of the rows, its derivatives of_d (2, 3, A) by w, and what is kept of it
+    at least; by_b (2, 2, A) and by_w (2, 3, A): c of a row is the sum of b_m x by_b_m, and of by_w_n x w_n."""
+    axes = len(u) - 1
+    room = np.zeros((26, axes))  # one piece of memory: asking for it takes as long as what is done with it
+    w, b, by_b, by_w, of_d = room[:3], room[3:5], room[5:9], room[9:15], room[15:24].reshape((3, 3, axes))
+    d, counts = np.zeros(3), room[24]
+    counts[:] = 1.0
+    ordinates(x, u, counts, w, b)
+    least = LEAST * put_along(w, REST * pace, d, of_d)
+    for k in range(axes):
+        by_b[0, k], by_b[1, k] = 2.0 * w[1, k] / 3.0, w[0, k] / 3.0
+        by_b[2, k], by_b[3, k] = w[2, k] / 3.0, 2.0 * w[1, k] / 3.0
+        by_w[0, k], by_w[1, k] = b[1, k] / 3.0, 2.0 * b[0, k] / 3.0
+        by_w[4, k], by_w[5, k] = 2.0 * b[1, k] / 3.0, b[0, k] / 3.0
+    return b, d[1:], of_d[1:], least, by_b.reshape((2, 2, axes)), by_w.reshape((2, 3, axes))
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_normal_rows(bound, pace, turns, x, u, g, out):
     """The rows of a step with the node x (3 A,) and the controls u (A+1,), whose normal acceleration is at most
     `bound`, into g (2,), and their derivatives by p, v, a, j and h into out (2, 4 A + 1)."""
@@ -74,33 +93,27 @@ def put_normal_rows(bound, pace, turns, x, u, g, out):
         _put_turning_rows(bound, x, u, g, out)
         return
     axes = len(u) - 1
-    b, w, c, d = np.empty((2, axes)), np.empty((3, axes)), np.empty((axes, axes)), np.zeros(3)
-    of_b, of_w, of_d = np.zeros((3, 2, axes)), np.zeros((3, 3, axes)), np.zeros((3, 3, axes))
-    by_b, by_w = np.empty((2, axes)), np.empty((3, axes))
-    ordinates(x, u, np.ones(axes), w, b)
-    multiply(PRODUCT, b, w, np.zeros(3), of_b, of_w)
-    least = LEAST * put_along(w, REST * pace, d, of_d)
+    b, d, of_d, least, times_b, times_w = _factors(pace, x, u)
+    slopes = np.zeros((5, axes))
+    by_w, by_b = slopes[:3], slopes[3:]
     out[:] = 0.0
     for r in range(BETWEEN):
-        along, square = d[r + 1], 0.0
-        times_b, times_w = of_b[r + 1], of_w[r + 1]  # c is the sum of b_m x times_b_m, and of times_w_n x w_n
+        square = 0.0
+        per = 1.0 / (bound * max(d[r], least)) ** 2
+        push = per * bound * bound * abs(d[r])
         for k in range(axes):
-            for m in range(axes):
-                c[k, m] = b[0, k] * times_b[0, m] - times_b[0, k] * b[0, m]
-                c[k, m] += b[1, k] * times_b[1, m] - times_b[1, k] * b[1, m]
-                square += 0.5 * c[k, m] ** 2
-        per = 1.0 / (bound * max(along, least)) ** 2
-        push = per * bound * bound * abs(along)
-        g[r] = 0.5 * (per * square - push * along)
-        by_b[:] = 0.0
-        for k in range(axes):
+            by_b[0, k], by_b[1, k] = 0.0, 0.0
             for m in range(3):
-                by_w[m, k] = -push * of_d[r + 1, m, k]
+                by_w[m, k] = -push * of_d[r, m, k]
             for n in range(axes):
+                c = b[0, k] * times_b[r, 0, n] - times_b[r, 0, k] * b[0, n]
+                c += b[1, k] * times_b[r, 1, n] - times_b[r, 1, k] * b[1, n]
+                square += 0.5 * c * c
                 for m in range(2):
-                    by_b[m, k] += per * c[k, n] * times_b[m, n]
+                    by_b[m, k] += per * c * times_b[r, m, n]
                 for m in range(3):
-                    by_w[m, k] -= per * c[k, n] * times_w[m, n]
+                    by_w[m, k] -= per * c * times_w[r, m, n]
+        g[r] = 0.5 * (per * square - push * d[r])
         through(x, u, by_w, by_b, 1.0, out[r])
 
 
@@ -120,27 +133,29 @@ def add_normal_curvature(W, bound, pace, turns, x, u, z):
                     for m in range(n + 1):
                         W[at[n], at[m]] += z[r] * per * by[n] * by[m]
         return
-    axes = len(u) - 1
-    b, w, d, slope = np.empty((2, axes)), np.empty((3, axes)), np.zeros(3), np.empty(4 * axes + 1)
-    of_b, of_w, of_d = np.zeros((3, 2, axes)), np.zeros((3, 3, axes)), np.zeros((3, 3, axes))
-    by_b, by_w, index = np.empty((2, axes)), np.empty((3, axes)), np.empty(7, np.int64)
-    ordinates(x, u, np.ones(axes), w, b)
-    multiply(PRODUCT, b, w, np.zeros(3), of_b, of_w)
-    least = LEAST * put_along(w, REST * pace, d, of_d)
+    axes, h = len(u) - 1, u[len(u) - 1]
+    _, d, _, least, times_b, times_w = _factors(pace, x, u)
+    slope = np.empty(7)  # the derivatives of c[k, m] by the axes m and k, and by h
+    index = np.empty(7, np.int64)
     index[6] = 4 * axes
     for r in range(BETWEEN):
-        by = z[r] / (bound * max(d[r + 1], least)) ** 2
+        by = z[r] / (bound * max(d[r], least)) ** 2
         for k in range(axes):
             for m in range(k):  # c[k, m]
-                slope[:], by_b[:], by_w[:] = 0.0, 0.0, 0.0
-                by_b[:, k], by_b[:, m] = of_b[r + 1, :, m], -of_b[r + 1, :, k]
-                by_w[:, k], by_w[:, m] = -of_w[r + 1, :, m], of_w[r + 1, :, k]
-                through(x, u, by_w, by_b, 1.0, slope)
-                for s in range(3):
-                    index[2 * s], index[2 * s + 1] = (s + 1) * axes + m, (s + 1) * axes + k
+                slope[6] = 0.0
+                for s in range(2):
+                    own, other, sign = (k, m, -1.0) if s else (m, k, 1.0)
+                    a, j = x[2 * axes + own], u[own]
+                    w0, w1, w2 = times_w[r, 0, other], times_w[r, 1, other], times_w[r, 2, other]
+                    b0, b1 = -times_b[r, 0, other], -times_b[r, 1, other]
+                    index[s], index[2 + s], index[4 + s] = axes + own, 2 * axes + own, 3 * axes + own
+                    slope[s] = sign * (w0 + w1 + w2)
+                    slope[2 + s] = sign * (h * (0.5 * w1 + w2) + b0 + b1)
+                    slope[4 + s] = sign * h * (0.5 * h * w2 + b1)
+                    slope[6] += sign * (0.5 * w1 * a + w2 * (a + h * j) + b1 * j)
                 for s in range(7):
                     for t in range(s + 1):
-                        W[index[s], index[t]] += by * slope[index[s]] * slope[index[t]]
+                        W[index[s], index[t]] += by * slope[s] * slope[t]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)

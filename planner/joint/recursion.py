@@ -75,7 +75,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     W, G = np.empty((size, size)), np.empty((VECTORS, axes, axes))
     of = np.array([vector_of(r, axes) for r in range(R)])
     PA, APA, PB, by_h = np.empty((S, S)), np.empty((S, S)), np.empty((S, C)), np.empty(S)
-    Hux, Huu = np.empty((C, S)), np.empty((C, C))
+    Hux, Huu, per = np.empty((C, S)), np.empty((C, C)), np.empty(C)
     P = factor.P
     P[N] = 0.0
     for k in range(S):
@@ -143,18 +143,19 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
                 for m in range(d):
                     total -= L[c, m] * L[d, m]
                 if c != d:
-                    L[c, d] = total / L[d, d]
+                    L[c, d] = total * per[d]
                 else:
                     if not total > 0.0:
                         return False
                     L[c, c] = np.sqrt(total)
+                    per[c] = 1.0 / L[c, c]
         K = factor.K[i]
         for s in range(S):
             for c in range(C):
                 total = -Hux[c, s]
                 for m in range(c):
                     total -= L[c, m] * K[m, s]
-                K[c, s] = total / L[c, c]
+                K[c, s] = total * per[c]
         # P = W_xx + A'PA - Y'Y with Y = L^-1 Hux (K holds -Y)
         for s in range(S):
             for t in range(s + 1):
@@ -168,7 +169,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
                 total = K[c, s]
                 for m in range(c + 1, C):
                     total -= L[m, c] * K[m, s]
-                K[c, s] = total / L[c, c]
+                K[c, s] = total * per[c]
     return True
 
 

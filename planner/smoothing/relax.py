@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
+from planner.base.threads import in_parts
 from planner.smoothing.basis import DEGREE, Knots
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
@@ -34,7 +35,6 @@ from planner.smoothing.sites import (
 from planner.smoothing.windows import (
     AGAIN,
     Reach,
-    in_shares,
     next_window,
     tighten_window,
     window_of,
@@ -180,10 +180,12 @@ def relax(
         left=left.copy(),
     )
     fitting = np.flatnonzero(splines.fits)
-    size = np.diff(splines.span_first)[fitting]
 
-    def work(own: Array) -> None:
-        _relax(corridor, splines, runs, used, goal, own, found)
+    def work(first: int, beyond: int) -> None:
+        _relax(corridor, splines, runs, used, goal, fitting[first:beyond], found)
 
-    in_shares(fitting, size, SPANS_SHARED, work)
+    if np.diff(splines.span_first)[fitting].sum() < SPANS_SHARED:
+        work(0, len(fitting))
+    else:
+        in_parts(len(fitting), 1, work)
     return found

@@ -1,17 +1,13 @@
 """Windows of a long spline: which of its control points are relaxed at a time, and how those
 around a site are tightened (relax.py)."""
 
-from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
 from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side, threads
 from planner.smoothing.basis import DEGREE, ORDER
 from planner.smoothing.sites import site_distance
 
@@ -95,26 +91,3 @@ def tighten_window(window, sites, control, middle, ratio_site, overlap):
         elif ratio_site[j] > 1.0:
             radius[j - site] = max(TIGHTENED / ratio_site[j] * used, min(needs, used))
     return near[lo - begin : hi - begin], radius
-
-
-def in_shares(runs: Array, size: Array, least: int, work: Callable[[Array], None]) -> None:
-    """Do `work` on lists of `runs` (k,), whose `size` (k,) is in spans, side by side; on one list if there
-    are less than `least`."""
-    shares = _shares(size, threads() if size.sum() >= least else 1)
-    tasks = [partial(work, runs[own]) for own in shares]
-    if len(tasks) > 1:
-        side_by_side(tasks, lambda: None, lambda: None)
-    elif tasks:
-        tasks[0]()
-
-
-def _shares(size: Array, count: int) -> list[Array]:
-    """The runs of these sizes (Q,) in `count` lists of about the same size: the longest first, to the list
-    that has least."""
-    lists: list[list[int]] = [[] for _ in range(count)]
-    total = [0] * count
-    for q in np.argsort(-size, kind="stable").tolist():
-        least = total.index(min(total))
-        lists[least].append(q)
-        total[least] += int(size[q])
-    return [np.array(sorted(own), dtype=np.int64) for own in lists if own]

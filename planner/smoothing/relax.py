@@ -62,13 +62,14 @@ class Goal(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """All runs relaxed. A run without a certificate, or that did not fit, has its control points and radii
-    from before."""
+    """All runs relaxed. A run without a certificate, or that did not fit, has its control points from
+    before."""
 
     certified: Array  # (Q,)
     control: FloatArray  # (n, A)
-    used: FloatArray  # (J,) radius that each site may use, smaller than before where the certificate asked for it [mm]
-    left: FloatArray  # (S,) what the certificate leaves of the tolerance, of the last try: negative where it fails [mm]
+    # (S,) what the certificate leaves of the tolerance, of the last try: negative where it fails [mm]; inf of
+    # runs that did not fit
+    left: FloatArray
 
 
 class Run(NamedTuple):
@@ -105,7 +106,7 @@ def _relaxed_window(window, run, control, radius, goal):
 @njit(cache=True, error_model="numpy")
 def _relax_run(run, start, goal):
     """One run relaxed window by window from control points `start` (n, A) inside the radii of its sites;
-    returns whether the result has a certificate, and the rest of `Relaxed`."""
+    returns whether the result has a certificate, its control points, and what the certificate leaves (S,)."""
     control, radius = start.copy(), run.sites.radius.copy()
     ratio_site = np.zeros(len(radius))
     left = np.empty(len(run.knots.breaks) - 1)
@@ -130,59 +131,41 @@ def _relax_run(run, start, goal):
         certificate = certify(run.corridor, run.knots, run.sites.place, control)
         ratio_site, left = certificate.site, certificate.left
         if certificate.span.max() <= 1.0:
-            return True, control, radius, left
-    return False, control, radius, left
+            return True, control, left
+    return False, control, left
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _begin(q, corridor, splines, runs, used, goal):
-    """Run q, its sites with the radii that they may use (J,), and its control points (n, A) to begin with, a
-    little further inside than they are."""
-    own, knots, start = run_corridor(corridor, q), run_knots(splines, q), run_control(splines, q).copy()
-    sites = with_radius(run_sites(splines, q), used[splines.site_first[q] : splines.site_first[q + 1]])
-    middle, H = greville_control(own, knots.breaks), goal.H[:, control_first(splines, q) :][:, : len(start)]
-    run = Run(own, knots, sites, H.copy(), middle, runs.fixed_first[q], runs.fixed_last[q])
-    start += (1.0 - AGAIN) * (middle - start)
-    return run, start
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _relax(corridor, splines, runs, used, goal, own, found):
-    """Write the runs `own` (k,), relaxed, into the columns of `Relaxed`, which hold what was before."""
-    certified, control, radius, left = found
+def _relax(corridor, splines, runs, goal, own, found):
+    """Write the runs `own` (k,), relaxed from a little further inside than they are, into the columns of
+    `Relaxed`, which hold what was before."""
+    certified, control, left = found
     for q in own:
-        run, start = _begin(q, corridor, splines, runs, used, goal)
-        certified[q], moved, smaller, kept = _relax_run(run, start, goal)
+        knots, start = run_knots(splines, q), run_control(splines, q).copy()
+        sites = run_sites(splines, q)
+        begin, along = control_first(splines, q), run_corridor(corridor, q)
+        middle, H = greville_control(along, knots.breaks), goal.H[:, begin : begin + len(start)].copy()
+        inside = with_radius(sites, USED * sites.radius)
+        run = Run(along, knots, inside, H, middle, runs.fixed_first[q], runs.fixed_last[q])
+        start += (1.0 - AGAIN) * (middle - start)
+        certified[q], moved, kept = _relax_run(run, start, goal)
         if certified[q]:
-            control[control_first(splines, q) : control_first(splines, q + 1)] = moved
-            radius[splines.site_first[q] : splines.site_first[q + 1]] = smaller
+            control[begin : begin + len(moved)] = moved
         left[splines.span_first[q] : splines.span_first[q + 1]] = kept
 
 
-def relax(
-    corridor: Corridor,
-    splines: Splines,
-    runs: SplineRuns,
-    used: FloatArray,
-    left: FloatArray,
-    goal: Goal,
-) -> Relaxed:
+def relax(corridor: Corridor, splines: Splines, runs: SplineRuns, goal: Goal) -> Relaxed:
     """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for
-    any number of threads.
-
-    used : (J,) radius that each site may use [mm], the present splines strictly inside
-    left : (S,) what the certificate leaves of the tolerance, of runs that do not fit [mm]
-    """
+    any number of threads."""
     found = Relaxed(
         certified=np.zeros(len(splines.fits), dtype=np.bool_),
         control=splines.control.copy(),
-        used=used.copy(),
-        left=left.copy(),
+        left=np.full(splines.span_first[-1], np.inf),
     )
     fitting = np.flatnonzero(splines.fits)
 
     def work(first: int, beyond: int) -> None:
-        _relax(corridor, splines, runs, used, goal, fitting[first:beyond], found)
+        _relax(corridor, splines, runs, goal, fitting[first:beyond], found)
 
     if np.diff(splines.span_first)[fitting].sum() < SPANS_SHARED:
         work(0, len(fitting))

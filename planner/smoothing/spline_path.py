@@ -15,7 +15,7 @@ from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
 from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
-from planner.smoothing.relax import USED, Goal, relax
+from planner.smoothing.relax import Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
 from planner.smoothing.sites import Splines, run_control, run_knots
 from planner.smoothing.windows import REACH
@@ -40,7 +40,6 @@ class SplineShape:
     # a run has none
     left: FloatArray
     reserve: float  # the part of the tolerance that it leaves to chord and filter errors [mm]
-    used: FloatArray  # (J,) radius that each site may use [mm]
 
 
 def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
@@ -66,14 +65,11 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
     goal = Goal(third_derivative_bands(splines, weights), RELATIVE_GAP, weights, REACH)
-    left = np.full(splines.span_first[-1], np.inf)
-    relaxed = relax(corridor, splines, runs, USED * splines.sites.radius, left, goal)
-    control, used, left = relaxed.control, relaxed.used, relaxed.left
-    splines = splines._replace(control=control)
-    fits = relaxed.certified & ~cusps(splines)
-    splines = splines._replace(fits=fits)
+    relaxed = relax(corridor, splines, runs, goal)
+    splines = splines._replace(control=relaxed.control)
+    splines = splines._replace(fits=relaxed.certified & ~cusps(splines))
     reserve = float((tolerance - tol).min())
-    return SplineShape(runs=runs, corridor=corridor, splines=splines, left=left, reserve=reserve, used=used)
+    return SplineShape(runs=runs, corridor=corridor, splines=splines, left=relaxed.left, reserve=reserve)
 
 
 def cusps(splines: Splines) -> Array:

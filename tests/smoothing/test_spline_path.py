@@ -203,8 +203,8 @@ def loose_knots(monkeypatch):
     monkeypatch.setattr(lay, "DENSER_MAX", 0)
     monkeypatch.setattr(lay, "ROOM", 0.3)
 
-    def certain(corridor, splines, runs, used, left, goal):  # as if all had certificates
-        return Relaxed(splines.fits, splines.control, used, left)
+    def certain(corridor, splines, runs, goal):  # as if all had certificates
+        return Relaxed(splines.fits, splines.control, np.full(splines.span_first[-1], np.inf))
 
     monkeypatch.setattr(spline_path, "relax", certain)
     return monkeypatch
@@ -280,7 +280,9 @@ def test_tightening_leaves_every_site_inside_and_widens_those_that_the_taper_pus
     def distances():
         return np.array([site_distance(sites, j, control, 0, e) for j in range(len(sites.span))])
 
-    given = np.maximum(1.0005 * distances(), 0.5 * shape.used)  # sites at their radii, as after an optimum
+    given = np.maximum(
+        1.0005 * distances(), 0.5 * shape.splines.sites.radius
+    )  # sites at their radii, as after an optimum
     used, ratio = given.copy(), np.ones(len(given))
     worst = int(np.argmax(distances() / given))
     ratio[worst] = 1.01

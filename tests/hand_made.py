@@ -140,6 +140,7 @@ def make_plan(
         trajectory=trajectory,
         verdict=make_verdict(passed=passed, turns=turns) if solved else None,
         stop_time=1.25,
+        least_time=None,
         grid_points=40,
         grid=GridHistory(
             t=t,

@@ -56,7 +56,7 @@ class Recorded:
     def __init__(self):
         self.paths = []
 
-    def solve(self, path, job, resolution, known=()):
+    def solve(self, path, job, resolution):
         self.paths.append(path)
         return planned_on(path)
 

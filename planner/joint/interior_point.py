@@ -24,7 +24,7 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.joint.curvature import Barrier
 from planner.joint.normal_rows import BETWEEN
-from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
+from planner.joint.recursion import END, Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.rows import TUBE_NODE, VECTORS, Linear, put_rows, slopes
 
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
@@ -43,6 +43,9 @@ PREDICTED = 0.3
 # Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up.
 # The last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
+# Where the last node's gap does not get less by this share in an iteration, once prox grows, its rho (recursion.py)
+# grows by so many times, up to a value at which the recursion still has four digits [-].
+SLOWLY, STIFFER, STIFFEST = 0.5, 10.0, 1e12
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule
 
@@ -153,6 +156,7 @@ def solve_window(legs, limits, x, u, place, tuning, at):
     time = u[:, axes].sum()
     rows = _start(on, lin.g, time, tuning, slacks)
     settled, prox, before, close, still = False, tuning.prox, time, 0, 0
+    last, off_before = END, np.inf
     # what the node's distance from its leg costs acts on it as a multiplier of its row does
     centred, tube = np.zeros(many), 8 * axes + TUBE_NODE
     for i in range(N):
@@ -176,12 +180,15 @@ def solve_window(legs, limits, x, u, place, tuning, at):
         if close and not settled:
             prox = min(prox, max(prox * MELT, tuning.least))
         if settled:
-            prox = min(prox * FREEZE, FROZEN)
+            prox, off = min(prox * FREEZE, FROZEN), np.abs(gap[N - 1]).max()
+            if max(SLOWLY * off_before, OFF) < off:
+                last = min(STIFFER * last, STIFFEST)
+            off_before = off
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF:
                 # what holds a node off its leg against the pull does so for the time, like the row itself
                 return True, iteration, z + centred * (1.0 + 2.0 * lin.g)
         if not products <= LOST * time or not factor_steps(
-            x, u, legs, limits, lin, Barrier(z + centred, ratio), tuning.pull + prox, factor
+            x, u, legs, limits, lin, Barrier(z + centred, ratio), tuning.pull + prox, last, factor
         ):
             return False, iteration, z
         second[:] = 0.0

@@ -10,7 +10,8 @@ d = (dx, du), and V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the 
     K = -(W_uu + B'PB)^-1 (W_ux + B'PA),      P_i = W_xx + A'PA + K'(W_ux + B'PA),      lambda = P dx + p.
 
 The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what
-is missing with every step (a method of multipliers).
+is missing with every step (a method of multipliers). Where active rows are as stiff as rho, as on hundreds of
+blocks far shorter than the tolerance, that takes hundreds of steps: there rho grows (interior_point.py).
 
 W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is positive.
 """
@@ -26,7 +27,7 @@ from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import BETWEEN, add_normal_curvature, stay_of
 from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
 
-END = 1e9  # rho [-]; with 1e6 the last node's gap stays at 1e-5 where prox has grown
+END = 1e9  # rho [-], at first; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 
 
 class NewtonStep(NamedTuple):
@@ -66,9 +67,9 @@ def _times_transposed(M, h, axes, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
-    """The recursion into `factor`, with a barrier (curvature.py) and the weight of (dh/limits.h)^2. False
-    where it breaks down."""
+def factor_steps(x, u, legs, limits, lin, barrier, pull, last, factor):
+    """The recursion into `factor`, with a barrier (curvature.py), the weight of (dh/limits.h)^2, and rho of the last
+    node. False where it breaks down."""
     N, axes = len(u), u.shape[1] - 1
     S, C = 3 * axes, axes + 1
     size, R = S + C, lin.g.shape[1]
@@ -79,7 +80,7 @@ def factor_steps(x, u, legs, limits, lin, barrier, pull, factor):
     P = factor.P
     P[N] = 0.0
     for k in range(S):
-        P[N, k, k] = END
+        P[N, k, k] = last
     for i in range(N - 1, -1, -1):
         h, own = u[i, axes], P[i + 1]
         model_of_rows(W, G, legs, limits, lin, i, barrier, of)

@@ -20,7 +20,7 @@ from planner.joint.motion import integrated
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
 from planner.joint.problem import window_of
-from planner.joint.recursion import Factor, NewtonStep, factor_steps, forces, gaps, newton_step
+from planner.joint.recursion import END, Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.run import tube_runs_of
 from planner.joint.solvers import SOLVERS
 from planner.motion.vertex_times import passing_times
@@ -118,7 +118,7 @@ def test_the_recursion_solves_the_system_of_all_steps():
         np.zeros((steps, controls, controls)),
         np.zeros((steps + 1, states, states)),
     )
-    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), 0.5, factor)
+    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), 0.5, END, factor)
     w, gap = np.zeros((steps, states + controls)), np.zeros((steps, states))
     forces(limits, lin, q, 0.5, u, w)
     gaps(x, u, gap)

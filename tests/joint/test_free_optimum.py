@@ -7,6 +7,8 @@ import pytest
 from rest_motion import along_x
 from whole_plans import dense_motion
 
+import planner
+from benchmarks.controls import planned_ngc
 from benchmarks.jobs import problems
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
@@ -16,6 +18,8 @@ from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
 from planner.joint.run import tube_runs_of
 from planner.motion.trajectory import joined
+from planner.nc.reader import parse_program
+from planner.planning.job.trace import Trace
 
 LENGTH, JERK = 0.3, 2e5  # [mm], [mm/s3]: so short that neither 100 mm/s nor 2000 mm/s2 is reached
 LEAST = 4.0 * np.cbrt(LENGTH / (2.0 * JERK))
@@ -79,3 +83,18 @@ def test_a_slower_guess_goes_the_same_way():
     for power in range(3):
         np.testing.assert_allclose(slow.state[:, power], guess.state[:, power] / 2.0**power)
     np.testing.assert_array_equal(slow.place, guess.place)
+
+
+@pytest.mark.slow
+@pytest.mark.usual_sizes
+def test_windows_of_blocks_far_shorter_than_the_tolerance_end() -> None:
+    """4,000 blocks of 1 um in 50 um: a last node held no more firmly than rows that are as stiff keeps a gap of 1e-6 to the last
+    iteration."""
+    told = Trace()
+    machine = problems.machine(tolerance=0.05)
+    program = parse_program(planned_ngc.micro_blocks(planned_ngc.loops, 1e-3, 4_000), machine)
+    plan = planner.plan(program, machine, effort="quick", log=told)
+    assert plan.verdict is not None
+    assert plan.verdict.passed
+    assert [step.kept for step in told.steps if step.name == "search"] == [True]
+    assert plan.cycle_time < 0.1716

@@ -30,7 +30,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.controls.export.models import along, move_times, reachable, stoppable
+from planner.controls.export.models import along, move_times, moving, reachable, stoppable
 from planner.machine import Machine
 
 NORMAL = np.sqrt(3.0) / 2.0  # share of the acceleration that an arc takes across, at most
@@ -79,12 +79,13 @@ def linuxcnc_time(
 ) -> float:
     """Time that LinuxCNC takes for straight moves with G64 P [s], from rest to rest.
 
-    points    : (n+1, A) vertices [mm], no two that follow each other alike
+    points    : (n+1, A) vertices [mm]
     feed      : (n,) programmed feed of each move [mm/s]; inf for rapid moves
     stop      : (n+1,) where the program has it stand still
     axes      : letters of the A axes; velocities, accelerations and the period are the machine's
     tolerance : P [mm]
     """
+    points, feed, stop = moving(points, feed, stop)
     ends = [0, *(np.flatnonzero(stop[1:-1]) + 1), len(points) - 1]
     return sum(
         _moving_time(points[first : last + 1], feed[first:last], machine, axes, tolerance)

@@ -94,6 +94,16 @@ def as_set(control: Control, machine: Machine) -> Control:
     return dataclasses.replace(control, **{key: value for key, value in values.items() if value is not None})
 
 
+def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array]:
+    """Vertices, feeds and stops (`predicted_time`) without the moves that move nothing: a stop between these belongs to the
+    vertex before. Raises InputError where there is no other."""
+    moves = (np.diff(points, axis=0) != 0.0).any(axis=1)
+    if not moves.any():
+        raise InputError("the path moves nowhere")
+    ends = np.append(0, np.flatnonzero(moves) + 1)
+    return points[ends], feed[moves], np.add.reduceat(stop, ends) > 0
+
+
 def predicted_time(
     points: FloatArray,
     feed: FloatArray,
@@ -111,16 +121,10 @@ def predicted_time(
 
     Raises InputError for vertices without a move between them.
     """
+    points, feed, stands = moving(points, feed, stop)
     step = np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
-    moves = length > 0
-    if not moves.any():
-        raise InputError("the path moves nowhere")
-    ends = np.append(
-        0, np.flatnonzero(moves) + 1
-    )  # vertices between moves; a stop without one belongs to the vertex before
-    stands = np.add.reduceat(stop, ends) > 0
-    way, length, feed = step[moves] / length[moves, None], length[moves], feed[moves]
+    way = step / length[:, None]
     control = as_set(control, machine)
     velocity, acceleration = (machine.limits(name, axes) for name in ("velocity", "acceleration"))
     speed, accel_max = _along_the_path(machine, control)

@@ -15,7 +15,7 @@ from planner.controls.export.program import write_program
 from planner.machine import Machine
 from planner.nc.program import Kind
 
-SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[3] / "shared"))
+SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[4] / "shared"))
 AXIS = {"velocity": 100.0, "acceleration": 2000.0, "jerk": 200000.0}
 MACHINE = Machine(name="m", dt=0.001, tolerance=0.05, axes={"x": AXIS, "y": AXIS, "z": AXIS})
 # Times of LinuxCNC 2.9's planner (Debian's tpmod.so, stepped period by period) on the machine `peers` [s], for P and Q [mm].
@@ -47,6 +47,12 @@ def test_a_straight_move_ends_with_half_of_the_acceleration() -> None:
     assert time_of(points) == pytest.approx(40 / 100 + 100 / (2 * a) + 100 / (2 * a))
     before = np.array([[-40.0, 0, 0], [0, 0, 0], [40, 0, 0]])
     assert time_of(before) == pytest.approx(80 / 100 + 100 / (2 * 0.9 * 2000) + 100 / (2 * 0.9 * a), rel=1e-9)
+
+
+def test_moves_that_move_nothing_take_no_time() -> None:
+    points = np.array([[0.0, 0, 0], [20, 0, 0], [20, 15, 0]])
+    twice = points[[0, 0, 1, 1, 1, 2, 2]]
+    assert time_of(twice) == pytest.approx(time_of(points), rel=1e-12)
 
 
 @pytest.mark.parametrize("turn", [0.0, 3.0, 90.0, 180.0])

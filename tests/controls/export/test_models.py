@@ -13,7 +13,7 @@ import planner
 from planner.controls.export.models import CONTROLS, Control, predicted_time
 from planner.machine import Machine
 
-SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[3] / "shared"))
+SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[4] / "shared"))
 AXIS = {"velocity": 100.0, "acceleration": 2000.0, "jerk": 200000.0}
 MACHINE = Machine(name="m", dt=0.001, tolerance=0.05, axes={"x": AXIS, "y": AXIS, "z": AXIS})
 # Times of grbl 1.1h and of Klipper's own motion code on the machine `peers` [s], from its README; junction deviation 0.01 mm, square

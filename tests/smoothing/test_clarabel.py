@@ -27,7 +27,7 @@ JOBS: dict[str, Callable[[], Program]] = {
     "spiral": functools.partial(problems.star_spiral, 40),
 }
 # Functions between a plan and the solver. Run as Python they call it through its module, where calls are recorded.
-ABOVE_CORRIDOR = ("_relax", "_finish", "_relax_run", "_relaxed_window")
+ABOVE_CORRIDOR = ("_relax", "_relax_run", "_relaxed_window")
 EACH = 5  # windows of a job that are compared: the first, the last, and some between
 SAME = 1e-7  # of the objective at the start [-]; found: 1.4e-8
 TIGHT = 0.1 * SAME

@@ -95,8 +95,13 @@ def as_set(control: Control, machine: Machine) -> Control:
 
 
 def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array]:
-    """Vertices, feeds and stops (`predicted_time`) without the moves that move nothing: a stop between these belongs to the
-    vertex before. Raises InputError where there is no other."""
+    """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing: a stop between these belongs to
+    the vertex before.
+
+    points, feed, stop : (n+1, A), (n,) and (n+1,), as of `predicted_time`
+
+    Raises InputError where nothing moves.
+    """
     moves = (np.diff(points, axis=0) != 0.0).any(axis=1)
     if not moves.any():
         raise InputError("the path moves nowhere")

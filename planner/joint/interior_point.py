@@ -43,9 +43,9 @@ PREDICTED = 0.3
 # Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up.
 # The last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
-# Where the last node's gap does not get less by this share in an iteration, once prox grows, its rho (recursion.py)
-# grows by so many times, up to a value at which the recursion still has four digits [-].
-SLOWLY, STIFFER, STIFFEST = 0.5, 10.0, 1e12
+# Where the last node's gap does not get less by this share in each of so many iterations in a row, once prox grows, its
+# rho (recursion.py) grows by so many times, up to a value at which the recursion still has four digits [-].
+SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e12
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule
 
@@ -156,7 +156,7 @@ def solve_window(legs, limits, x, u, place, tuning, at):
     time = u[:, axes].sum()
     rows = _start(on, lin.g, time, tuning, slacks)
     settled, prox, before, close, still = False, tuning.prox, time, 0, 0
-    last, off_before = END, np.inf
+    last, off_before, slow = END, np.inf, 0
     # what the node's distance from its leg costs acts on it as a multiplier of its row does
     centred, tube = np.zeros(many), 8 * axes + TUBE_NODE
     for i in range(N):
@@ -181,8 +181,9 @@ def solve_window(legs, limits, x, u, place, tuning, at):
             prox = min(prox, max(prox * MELT, tuning.least))
         if settled:
             prox, off = min(prox * FREEZE, FROZEN), np.abs(gap[N - 1]).max()
-            if max(SLOWLY * off_before, OFF) < off:
-                last = min(STIFFER * last, STIFFEST)
+            slow = slow + 1 if max(SLOWLY * off_before, OFF) < off else 0
+            if slow == SLOW_FOR:
+                last, slow = min(STIFFER * last, STIFFEST), 0
             off_before = off
             if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF:
                 # what holds a node off its leg against the pull does so for the time, like the row itself

@@ -41,8 +41,9 @@ def prefix(start: tuple[float, ...], offset: tuple[float, ...]) -> str:
 
 
 def readable(text: str, control: str = "") -> str:
-    """A program as the reader knows it: PAUSE is M0, milliseconds are seconds; without percent signs, and M400 at its end."""
-    if control in MILLISECONDS:
+    """A program as the reader knows it: PAUSE is M0, milliseconds are seconds, but where M82 or M83 tell the reader that it is a
+    printer's; without percent signs, and M400 at its end."""
+    if control in MILLISECONDS and not re.search(r"^M8[23]\b", text, flags=re.MULTILINE):
         text = re.sub(
             r"^G4 P([\d.]+)", lambda found: f"G4 P{float(found[1]) / 1e3:g}", text, flags=re.MULTILINE
         )

@@ -295,7 +295,8 @@ _PRINTERS = (
 _LINES = {
     "klipper": re.compile(f"PAUSE|{_PRINTERS}"),
     "marlin": re.compile(
-        rf"G[23]( [XYZIJREF]-?[\d.]+)+|M[01]|M(7[567]|155|20[135]|30[12]|420|900)\b.*|M[34]( S[\d.]+)?|M[5789]|M(17|18|84)\b.*|{_PRINTERS}"
+        r"G[23]( [XYZIJREF]-?[\d.]+)+|M[01]|M(7[567]|155|20[135]|30[12]|420|900)\b.*|"
+        rf"M[34]( S[\d.]+)?|M[5789]|M(17|18|84)\b.*|{_PRINTERS}"
     ),
 }
 MILLISECONDS = frozenset(_LINES)  # controls whose G4 P counts them

@@ -54,8 +54,9 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
     if machine.fir is not None or not set(toolpath.axes) <= set(LINEAR):
         return None
     way = way_of(toolpath, machine, not_limited)
-    bounds, y = way.along(way.tangent, way.feed)
-    more = _beside_feed(way, bounds)
+    direction, by_axis = way.coordinates()
+    bounds, y = way.along(direction, way.feed)
+    more = _beside_feed(way, bounds, (direction * np.diff(way.point, axis=0)).sum(axis=1), by_axis)
     stops = np.flatnonzero(way.stop)
     of_run, y, leg = _best_of_runs(way, y, more, stops[:-1])
     longest = np.argsort(-of_run)[:RUNS]
@@ -109,10 +110,11 @@ def _jumps(way: Way, y: FloatArray) -> FloatArray:
     return way.tolerance[1:-1] * np.linalg.norm(np.diff(y, axis=0), axis=1)
 
 
-def _beside_feed(way: Way, bounds: Bounds) -> FloatArray:
-    """(N,) what each line takes longer than at its feed, because of the corners and stops at its ends [s]."""
+def _beside_feed(way: Way, bounds: Bounds, length: FloatArray, by_axis: Array) -> FloatArray:
+    """(N,) what each line takes longer than at its feed, because of the corners and stops at its ends [s]; `length` (N,)
+    in the coordinate that bounds it, of which the speed at corners is not known where that is an axis."""
     u, corner = way.tangent, way.vertex[1:-1] & way.line[:-1] & way.line[1:]
-    least = np.maximum(way.length - way.tolerance[:-1] - way.tolerance[1:], 0.0)
+    least = np.maximum(length - way.tolerance[:-1] - way.tolerance[1:], 0.0)
     within = np.maximum(way.tolerance[:-1], way.tolerance[1:])
     lasting = least / bounds.speed
     cosine = np.clip((u[:-1] * u[1:]).sum(axis=1), -1.0, 1.0)
@@ -124,8 +126,8 @@ def _beside_feed(way: Way, bounds: Bounds) -> FloatArray:
     back = np.where(cosine < 0.0, 4.0 * np.maximum(within[:-1], within[1:]), np.inf)
     before = np.minimum(before, np.sqrt(bounds.acceleration[:-1] * back))
     after = np.minimum(after, np.sqrt(bounds.acceleration[1:] * back))
-    begin = np.append(np.inf, np.where(corner, after, np.inf))
-    end = np.append(np.where(corner, before, np.inf), np.inf)
+    begin = np.append(np.inf, np.where(corner & ~by_axis[1:], after, np.inf))
+    end = np.append(np.where(corner & ~by_axis[:-1], before, np.inf), np.inf)
     at_begin = End(np.where(way.stop[:-1], 0.0, np.minimum(begin, bounds.speed)), way.stop[:-1])
     at_end = End(np.where(way.stop[1:], 0.0, np.minimum(end, bounds.speed)), way.stop[1:])
     return np.where(way.line, straight_time(least, at_begin, at_end, bounds) - lasting, 0.0)

@@ -55,16 +55,19 @@ class Way(NamedTuple):
         direction : (n, A) unit vectors
         feed      : (n,) that holds meanwhile [mm/s]
         """
-        size, velocity = np.maximum(np.abs(direction), TINY), self.limit[0]
-        of_axis = velocity / size
-        slowest = of_axis.argmin(axis=1)
-        rows = np.arange(len(direction))
-        speed = np.minimum(feed, of_axis[rows, slowest])
-        y = direction / speed[:, None]
-        axis = np.zeros_like(y)
-        axis[rows, slowest] = np.sign(direction[rows, slowest]) / velocity[slowest]
-        y = np.where((speed < feed)[:, None], axis, y)
-        return Bounds(speed, size @ self.limit[1], size @ self.limit[2]), y
+        size = np.maximum(np.abs(direction), TINY)
+        speed = np.minimum(feed, size @ self.limit[0])
+        return Bounds(speed, size @ self.limit[1], size @ self.limit[2]), direction / speed[:, None]
+
+    def coordinates(self) -> tuple[FloatArray, Array]:
+        """(N, A) the direction in which each leg is bounded: its tangent, or where an axis is slower than the feed, (N,),
+        that axis."""
+        of_axis = self.limit[0] / np.maximum(np.abs(self.tangent), TINY)
+        slowest, rows = of_axis.argmin(axis=1), np.arange(len(of_axis))
+        by_axis = of_axis[rows, slowest] < self.feed
+        axis = np.zeros_like(self.tangent)
+        axis[rows, slowest] = np.sign(self.tangent[rows, slowest])
+        return np.where(by_axis[:, None], axis, self.tangent), by_axis
 
 
 def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -> Way:

@@ -154,6 +154,22 @@ def test_a_coordinate_that_isconfined_may_be_so_fast() -> None:
     )
 
 
+def test_a_coordinate_is_as_fast_as_any_velocity_makes_it() -> None:
+    axes = {
+        letter: Axis(velocity=v, acceleration=1e3, jerk=1e5)
+        for letter, v in (("x", 20.0), ("y", 150.0), ("z", 60.0))
+    }
+    machine, rng = Machine(name="uneven", dt=1e-3, tolerance=0.02, axes=axes), np.random.default_rng(5)
+    way = way_of(toolpath_from_program(problems.pentagon(), machine), machine, ())
+    direction = rng.normal(size=(200, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    bounds, y = way.along(direction, np.full(200, 90.0))
+    velocity = rng.uniform(-1.0, 1.0, (20_000, 3)) * (20.0, 150.0, 60.0)
+    velocity *= np.minimum(90.0 / np.linalg.norm(velocity, axis=1), 1.0)[:, None]
+    assert (velocity @ direction.T <= bounds.speed * (1.0 + 1e-12)).all()
+    assert (velocity @ y.T <= 1.0 + 1e-12).all()
+
+
 def planned(seed: int) -> tuple[Program, Machine]:
     program, machine = random_lines.job(seed)
     return program, machine

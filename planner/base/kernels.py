@@ -17,6 +17,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from functools import cached_property
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -42,6 +43,8 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
             return of_function(value)
         if isinstance(value, ModuleType):
             return value.__name__
+        if hasattr(value, "_defn"):  # one of numba's intrinsics (lanes.py): it belongs together with all of its file
+            return _text_of(value._defn.__code__.co_filename)
         if isinstance(value, type):
             return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
         if isinstance(value, tuple | list):
@@ -67,6 +70,12 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
 
     options = sorted((name, of(value)) for name, value in settings.items())
     return hashlib.sha256(f"{of_function(function)} {options}".encode()).digest()
+
+
+@functools.cache
+def _text_of(file: str) -> str:
+    """A digest of a source file."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def _names_in(code: CodeType) -> set[str]:

@@ -11,6 +11,9 @@ not: h times velocity, acceleration and jerk is indefinite, and with it a step w
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds. So does a change
 of the velocity where the normal acceleration is limited (normal_rows.py).
 
+Up to `WIDTH` windows are searched side by side, one in each lane (base/lanes.py); what is found in one does not depend on
+the others. A window that has ended waits for the last one.
+
 Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
 optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox
 grows by `FREEZE` in every iteration, until rows and kinematics hold.
@@ -20,14 +23,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.curvature import Barrier
-from planner.joint.normal_rows import BETWEEN
-from planner.joint.recursion import END, Factor, NewtonStep, factor_steps, forces, gaps, newton_step
-from planner.joint.rows import TUBE_NODE, VECTORS, Linear, put_rows, slopes
+from planner.base.lanes import (
+    WIDTH,
+    anywhere,
+    larger,
+    magnitude,
+    matrix,
+    pick,
+    put,
+    size,
+    smaller,
+    vector,
+    where,
+    wide,
+)
+from planner.joint.group import Group, group_of
+from planner.joint.problem import StepWindow
+from planner.joint.recursion import END, Factor, Room, backward, factor_steps, forward, gaps
+from planner.joint.rows import NORMAL_ROWS, TUBE_NODE, VECTORS, Rows, Scratch, put_rows
 
-TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
 # Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations. At
 # the largest the durations stay, so that the kinematics are linear and a step closes them: at 1e4 they creep on,
 # and windows go on to the last iteration for the gaps that this leaves.
@@ -65,158 +81,316 @@ class Tuning(NamedTuple):
     first_slack: float  # of the start, at least
 
 
-class Slacks(NamedTuple):
-    """Slacks and multipliers of the rows (N, R)."""
+class Solved(NamedTuple):
+    """What the search of a window has come to; x, u and place as of `StepWindow`."""
 
-    s: FloatArray
+    done: bool  # whether the optimum has been reached
+    iterations: int
+    z: FloatArray  # (N, R) multipliers of the rows, in units of time
+
+
+class _Found(NamedTuple):
+    """Of all lanes, set as each of them ends."""
+
+    x: FloatArray
+    u: FloatArray
+    place: FloatArray
     z: FloatArray
-    missing: FloatArray  # g + s
-    ds: FloatArray
-    dz: FloatArray
+    done: Array  # (W,)
+    iterations: Array  # (W,)
+
+
+_VECTORS, _BLOCKS, _THREE = size(VECTORS), size(4), size(3)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _reach(on, s, ds):
-    """Share of a step ds (N, R) that keeps s positive, at most 1."""
-    most = 0.0
-    for i in range(s.shape[0]):
-        for r in range(s.shape[1]):
-            if on[i, r]:
-                most = max(most, -ds[i, r] / s[i, r])
-    return min(1.0, TO_BOUNDARY / most) if most > 0.0 else 1.0
+def _lanes_of(group, width):
+    """The numbers of a group as lanes."""
+    return Group(
+        wide(group.real, width),
+        wide(group.last, width),
+        wide(group.on, width),
+        wide(group.base, width),
+        wide(group.drift, width),
+        wide(group.start, width),
+        wide(group.per_drift, width),
+        wide(group.length, width),
+        wide(group.line, width),
+        wide(group.bent, width),
+        wide(group.begins, width),
+        wide(group.ends, width),
+        wide(group.at_vertex, width),
+        wide(group.per_box, width),
+        wide(group.room, width),
+        wide(group.room_node, width),
+        wide(group.feed, width),
+        wide(group.feed_node, width),
+        wide(group.normal, width),
+        wide(group.normal_node, width),
+        wide(group.pace, width),
+        wide(group.per_h, width),
+        wide(group.h, width),
+        wide(group.h_max, width),
+        wide(group.h_min, width),
+        wide(group.switch, width),
+        wide(group.switch_at, width),
+        wide(group.smooth, width),
+        wide(group.centre, width),
+        wide(group.per_step, width),
+        wide(group.aside, width),
+    )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _start(on, g, time, tuning, slacks):
-    """Slacks and multipliers of a start."""
-    rows = 0
-    for i in range(len(on)):
-        for r in range(on.shape[1]):
-            rows += 1 if on[i, r] else 0
-    for i in range(len(on)):
-        for r in range(on.shape[1]):
-            slacks.s[i, r], slacks.z[i, r] = 1.0, 0.0
-            if on[i, r]:
-                slacks.s[i, r] = max(-g[i, r], tuning.first_slack)
-                slacks.z[i, r] = tuning.first_gap * time / rows / slacks.s[i, r]
-                slacks.missing[i, r] = g[i, r] + slacks.s[i, r]
-    return rows
+def _rows_of(sizes, N, R, bends, place):
+    """Memory for the rows of N steps, R of each, all 0."""
+    axes, width, more = len(sizes.axes), len(sizes.width), R - 8 * len(sizes.axes) - NORMAL_ROWS
+    w, bent, own = sizes.width, N if bends.any_bent else 0, N if bends.any_own else 0
+    return Rows(
+        wide(np.zeros((N, R, width)), w),
+        wide(np.zeros((N, R, width)), w),
+        wide(np.zeros((N, R, width)), w),
+        wide(np.zeros((N, R, width)), w),
+        wide(np.zeros((N, R, width)), w),
+        wide(np.zeros((N, R, width)), w),
+        place,
+        wide(np.zeros((N, 3, width)), w),
+        wide(np.zeros((N, 3, width)), w),
+        wide(np.zeros((N, 3, axes, width)), w),
+        wide(np.zeros((bent, 3, axes, width)), w),
+        wide(np.zeros((bent, 3, axes, width)), w),
+        wide(np.zeros((own, more, len(sizes.step), width)), w),
+    )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _directions(on, slacks, slope, aim, second):
-    """Steps of slacks and multipliers towards s z = aim - second, where the rows grow by `slope`."""
-    s, z, missing, ds, dz = slacks
-    for i in range(len(on)):
-        for r in range(on.shape[1]):
-            if on[i, r]:
-                ds[i, r] = -missing[i, r] - slope[i, r]
-                dz[i, r] = (aim - second[i, r] - z[i, r] * ds[i, r]) / s[i, r] - z[i, r]
+def _start(group, rows, time, tuning):
+    """Slacks and multipliers of a start. Returns how many rows there are."""
+    N, R = rows.g.shape
+    count = 0.0 * time
+    for i in range(N):
+        for r in range(R):
+            count += group.on[i, r]
+    for i in range(N):
+        for r in range(R):
+            there = group.on[i, r] > 0.0
+            s = where(there, larger(-rows.g[i, r], tuning.first_slack), 1.0 + 0.0 * time)
+            rows.s[i, r], rows.per_s[i, r] = s, 1.0 / s
+            rows.z[i, r] = where(there, tuning.first_gap * time / (count * s), 0.0 * time)
+    return count
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _predicted(on, slacks, along, dual, second):
-    """Complementarity after a predictor that goes the shares `along` and `dual` of its way; second (N, R) its
-    second-order terms."""
-    s, z, _, ds, dz = slacks
-    left = 0.0
-    for i in range(len(on)):
-        for r in range(on.shape[1]):
-            if on[i, r]:
-                left += (s[i, r] + along * ds[i, r]) * (z[i, r] + dual * dz[i, r])
-                second[i, r] = ds[i, r] * dz[i, r] if along > PREDICTED else 0.0
-    return left
+def _step(rows, along, dual):
+    """Slacks and multipliers after the shares `along` and `dual` of their steps."""
+    N, R = rows.g.shape
+    for i in range(N):
+        for r in range(R):
+            rows.s[i, r] += along * rows.ds[i, r]
+            rows.z[i, r] += dual * rows.dz[i, r]
+            rows.per_s[i, r] = 1.0 / rows.s[i, r]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _look(rows, zero):
+    """The sum of s z, the largest row, and the most that is missing of g + s = 0 of active ones (z > s)."""
+    N, R = rows.g.shape
+    products, broken, missed = zero, zero, zero
+    for i in range(N):
+        for r in range(R):
+            g, s, z = rows.g[i, r], rows.s[i, r], rows.z[i, r]
+            products += s * z
+            broken = larger(g, broken)
+            missed = larger(where(z > s, g + s, zero), missed)
+    return products, broken, missed
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _durations(group, u, zero):
+    """The time of each window."""
+    N, last = len(u), u.shape[1] - 1
+    time = zero
+    for i in range(N):
+        time += group.real[i] * u[i, last]
+    return time
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _end(lane, done, iteration, group, rows, x, u, found):
+    """Set what one lane has come to. What holds a node off its leg against the pull does so for the time, like the row
+    itself."""
+    found.done[lane], found.iterations[lane] = done, iteration
+    N, R = rows.g.shape
+    tube = 8 * (u.shape[1] - 1) + TUBE_NODE
+    for i in range(N + 1):
+        for s in range(x.shape[1]):
+            found.x[i, s] = put(found.x[i, s], lane, pick(x[i, s], lane))
+    for i in range(N):
+        for c in range(u.shape[1]):
+            found.u[i, c] = put(found.u[i, c], lane, pick(u[i, c], lane))
+        for c in range(3):
+            found.place[i, c] = put(found.place[i, c], lane, pick(rows.place[i, c], lane))
+        for r in range(R):
+            z = pick(rows.z[i, r], lane)
+            if r == tube:
+                z += pick(group.centre[i], lane) * (1.0 + 2.0 * pick(rows.g[i, r], lane))
+            found.z[i, r] = put(found.z[i, r], lane, z)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
-def solve_window(legs, limits, x, u, place, tuning, at):
-    """Overwrites x (N+1, 3 A), u (N, A+1) and place (N, 3) (problem.py) with the optimum near them. Returns
-    whether it has been reached, the iterations, and the multipliers (N, R) of the rows, in units of time.
-    Meanwhile at[0] is the iteration."""
-    N, axes = len(u), u.shape[1] - 1
-    R, S, C, on = limits.on.shape[1], 3 * axes, axes + 1, limits.on
-    many = (N, R)
-    n, alpha, e, tangent = (
-        np.zeros((N, R, axes)),
-        np.zeros((N, VECTORS, 4)),
-        np.zeros((N, VECTORS, axes)),
-        np.zeros((N, 3, axes)),
+def solve_group(sizes, numbers, bends, motion, tuning, found, at):
+    """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 3, W),
+    which is overwritten; tuning (7, W). What each comes to is set in `found`. Meanwhile at[0] is the iteration."""
+    width, group, axes = sizes.width, _lanes_of(numbers, sizes.width), len(sizes.axes)
+    x, u, place = wide(motion[0], width), wide(motion[1], width), wide(motion[2], width)
+    tuned = wide(tuning, width)
+    tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
+    N, R, S, C = len(u), group.on.shape[1], len(sizes.state), len(sizes.control)
+    ends = _Found(
+        wide(found.x, width),
+        wide(found.u, width),
+        wide(found.place, width),
+        wide(found.z, width),
+        found.done,
+        found.iterations,
     )
-    node = np.zeros((N, 3, axes))
-    own = np.zeros((N, BETWEEN + limits.laws.first[-1], S + C))
-    lin = Linear(np.zeros(many), n, node, alpha, e, tangent, place, np.zeros((N, 3)), own)
-    factor = Factor(np.zeros((N, C, S)), np.zeros((N, C, C)), np.zeros((N + 1, S, S)))
-    slacks = Slacks(np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many))
-    s, z, missing, ds, dz = slacks
-    second, slope, q, ratio = np.zeros(many), np.zeros(many), np.zeros(many), np.zeros(many)
-    gap, w, after, end = np.zeros((N, S)), np.zeros((N, S + C)), np.zeros((N, S)), np.zeros(S)
-    dx, du = np.zeros((N + 1, S)), np.zeros((N, C))
-    put_rows(legs, limits, x, u, lin)
-    gaps(x, u, gap)
-    time = u[:, axes].sum()
-    rows = _start(on, lin.g, time, tuning, slacks)
-    settled, prox, before, close, still = False, tuning.prox, time, 0, 0
-    last, off_before, slow = END, np.inf, 0
-    # what the node's distance from its leg costs acts on it as a multiplier of its row does
-    centred, tube = np.zeros(many), 8 * axes + TUBE_NODE
-    for i in range(N):
-        if on[i, tube]:
-            centred[i, tube] = limits.centre[i] * limits.h[i]
-    for iteration in range(ITERATIONS):
+    rows = _rows_of(sizes, N, R, bends, place)
+    W = len(sizes.width)
+    factor = Factor(
+        wide(np.zeros((N, C, S, W)), width),
+        wide(np.zeros((N, C, C, W)), width),
+        wide(np.zeros((N, S, W)), width),
+        wide(np.zeros((N + 1, S, W)), width),
+        wide(np.zeros((N, C, W)), width),
+    )
+    gap = wide(np.zeros((N, S, W)), width)
+    slope = wide(np.zeros((R, W)), width)
+    nearest, top = wide(np.zeros((N, 3, W)), width), wide(np.zeros((N, W)), width)
+    y, e = matrix(x, _VECTORS, sizes.axes), matrix(x, _VECTORS, sizes.axes)
+    room = Room(
+        y,
+        e,
+        matrix(x, _VECTORS, _BLOCKS),
+        matrix(x, _VECTORS, sizes.axes),
+        matrix(x, sizes.axes, sizes.axes),
+        vector(x, sizes.step),
+        matrix(x, sizes.step, sizes.step),
+        matrix(x, sizes.state, sizes.state),
+        matrix(x, sizes.state, sizes.state),
+        matrix(x, sizes.state, sizes.control),
+        matrix(x, sizes.control, sizes.state),
+        vector(x, sizes.state),
+        vector(x, sizes.state),
+        vector(x, sizes.control),
+        slope,
+    )
+    L = R - 8 * axes - NORMAL_ROWS
+    scratch = Scratch(
+        np.zeros(S),
+        np.zeros(C),
+        np.zeros((3, axes)),
+        np.zeros(axes),
+        np.zeros(axes),
+        np.zeros(axes),
+        np.zeros(axes),
+        np.zeros(L),
+        np.zeros((L, len(sizes.step))),
+        np.zeros((len(sizes.step), len(sizes.step))),
+    )
+    zero = 0.0 * tune.pull
+    lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
+    for k in range(S):
+        lambda_end[k] = zero
+    looking = y, e, nearest, top
+    put_rows(sizes, group, bends, x, u, rows, looking, scratch)
+    gap_most, off = gaps(sizes, group, x, u, gap)
+    time = _durations(group, u, zero)
+    count = _start(group, rows, time, tune)
+    prox, before, close, still, settled = tune.prox, time, zero, zero, zero
+    rho, off_before, slow = zero + END, zero + np.inf, zero
+    active = zero
+    for lane in range(len(sizes.width)):
+        active = put(active, lane, 1.0 if bends.steps[lane] else 0.0)
+    for iteration in range(ITERATIONS + 1):
         at[0] = iteration
-        products, missed, broken = 0.0, 0.0, 0.0
-        for i in range(N):
-            for r in range(R):
-                if on[i, r]:
-                    products += s[i, r] * z[i, r]
-                    broken = max(broken, lin.g[i, r])
-                    if z[i, r] > s[i, r]:
-                        missed = max(missed, missing[i, r])
-                    ratio[i, r] = z[i, r] / s[i, r]
-        now = u[:, axes].sum()
-        close = close + 1 if products <= 2.0 * tuning.gap * time else 0
-        still = still + 1 if close and abs(now - before) <= STILL * tuning.gap * time else 0
-        settled, before = settled or still == STILL_FOR or close > CLOSE_FOR, now
-        if close and not settled:
-            prox = min(prox, max(prox * MELT, tuning.least))
-        if settled:
-            prox, off = min(prox * FREEZE, FROZEN), np.abs(gap[N - 1]).max()
-            slow = slow + 1 if max(SLOWLY * off_before, OFF) < off else 0
-            if slow == SLOW_FOR:
-                last, slow = min(STIFFER * last, STIFFEST), 0
-            off_before = off
-            if max(broken, missed) <= tuning.missed and np.abs(gap).max() <= OFF:
-                # what holds a node off its leg against the pull does so for the time, like the row itself
-                return True, iteration, z + centred * (1.0 + 2.0 * lin.g)
-        if not products <= LOST * time or not factor_steps(
-            x, u, legs, limits, lin, Barrier(z + centred, ratio), tuning.pull + prox, last, factor
-        ):
-            return False, iteration, z
-        second[:] = 0.0
-        aim, along, dual = 0.0, 1.0, 1.0
+        products, broken, missed = _look(rows, zero)
+        now = _durations(group, u, zero)
+        close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)
+        rests = where(magnitude(now - before) <= STILL * tune.gap * time, still + 1.0, zero)
+        still = where(close > 0.0, rests, zero)
+        settled = where(close > CLOSE_FOR, 1.0 + zero, where(still == STILL_FOR, 1.0 + zero, settled))
+        before = now
+        melted = smaller(prox, larger(prox * MELT, tune.least))
+        prox = where(close > 0.0, where(settled > 0.0, prox, melted), prox)
+        prox = where(settled > 0.0, smaller(prox * FREEZE, FROZEN + zero), prox)
+        slow = where(settled > 0.0, where(larger(SLOWLY * off_before, OFF + zero) < off, slow + 1.0, zero), slow)
+        rho = where(slow == SLOW_FOR, smaller(STIFFER * rho, STIFFEST + zero), rho)
+        slow = where(slow == SLOW_FOR, zero, slow)
+        off_before = where(settled > 0.0, off, off_before)
+        reached = where(larger(broken, missed) <= tune.missed, where(gap_most <= OFF, settled, zero), zero)
+        lost = where(products <= LOST * time, zero, 1.0 + zero)
+        if iteration == ITERATIONS:
+            lost = 1.0 + zero
+        if anywhere(active * (reached + lost) > 0.0):
+            for lane in range(len(sizes.width)):
+                if pick(active, lane) > 0.0 and pick(reached + lost, lane) > 0.0:
+                    _end(lane, pick(reached, lane) > 0.0, iteration, group, rows, x, u, ends)
+                    active = put(active, lane, 0.0)
+        if not anywhere(active > 0.0):
+            break
+        bad = factor_steps(
+            sizes, group, bends, x, u, gap, rows, tune.pull + prox, rho, factor, room, scratch
+        )
+        if anywhere(active * bad > 0.0):
+            for lane in range(len(sizes.width)):
+                if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
+                    _end(lane, False, iteration, group, rows, x, u, ends)
+                    active = put(active, lane, 0.0)
+        aim, along, dual, second = zero, zero, zero, zero
         for phase in range(2):
-            if phase == 1:
-                left = _predicted(on, slacks, along, dual, second)
-                aim = max((left / products) ** 3 * products, tuning.gap * time) / rows
-            for i in range(N):
-                for r in range(R):
-                    if on[i, r]:
-                        q[i, r] = centred[i, r] + (aim - second[i, r] + z[i, r] * missing[i, r]) / s[i, r]
-            forces(limits, lin, q, tuning.pull, u, w)
-            newton_step(x, u, gap, w, end, factor, NewtonStep(dx, du, after))
-            slopes(limits, lin, dx, du, slope)
-            _directions(on, slacks, slope, aim, second)
-            along, dual = _reach(on, s, ds), _reach(on, z, dz)
+            backward(
+                sizes, group, bends, x, u, rows, tune.pull, aim, second, lambda_end, factor, room
+            )
+            along, dual, s_dz, z_ds, ds_dz = forward(
+                sizes, group, bends, x, u, gap, rows, aim, second, factor, room, change
+            )
+            if phase == 0:
+                left = products + dual * s_dz + along * z_ds + along * dual * ds_dz
+                share = left / products
+                aim = larger(share * share * left, tune.gap * time) / count
+                second = where(along > PREDICTED, 1.0 + zero, zero)
+        along, dual = where(active > 0.0, along, zero), where(active > 0.0, dual, zero)
         for k in range(S):
-            end[k] += along * (after[N - 1, k] - end[k])
-        x[1:N] += along * dx[1:N]
-        u += along * du
-        put_rows(legs, limits, x, u, lin)
-        gaps(x, u, gap)
+            lambda_end[k] += along * rho * change[k]
         for i in range(N):
-            for r in range(R):
-                if on[i, r]:
-                    s[i, r] += along * ds[i, r]
-                    z[i, r] += dual * dz[i, r]
-                    missing[i, r] = lin.g[i, r] + s[i, r]
-    return False, ITERATIONS, z
+            for k in range(S):
+                x[i, k] += along * factor.dx[i, k]
+            for k in range(C):
+                u[i, k] += along * factor.du[i, k]
+        put_rows(sizes, group, bends, x, u, rows, looking, scratch)
+        gap_most, off = gaps(sizes, group, x, u, gap)
+        _step(rows, along, dual)
+
+
+def solve_windows(windows: list[tuple[StepWindow, Tuning]], at: FloatArray) -> list[Solved]:
+    """Search up to `WIDTH` windows of the same number of axes side by side; x, u and place of each are overwritten with the
+    optimum near them. Meanwhile at[0] is the iteration."""
+    sizes, group, bends, *motion = group_of([one for one, _ in windows], WIDTH)
+    tuning = np.ones((len(Tuning._fields), WIDTH))
+    tuning[:, : len(windows)] = np.array([values for _, values in windows]).T
+    found = _Found(
+        *(np.zeros_like(one) for one in motion),
+        np.zeros(group.on.shape),
+        np.zeros(WIDTH, np.bool_),
+        np.zeros(WIDTH, np.int64),
+    )
+    solve_group(sizes, group, bends, tuple(motion), tuning, found, at)
+    solved = []
+    for lane, (window, _) in enumerate(windows):
+        N, R = window.limits.on.shape
+        window.x[:], window.u[:] = found.x[: N + 1, :, lane], found.u[:N, :, lane]
+        window.place[:] = found.place[:N, :, lane]
+        solved.append(
+            Solved(bool(found.done[lane]), int(found.iterations[lane]), found.z[:N, :R, lane].copy())
+        )
+    return solved

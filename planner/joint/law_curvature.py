@@ -4,7 +4,6 @@
 import numpy as np
 
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.curvature import add_vector
 from planner.joint.laws import (
     JOINT_PUSH,
     JOLT,
@@ -35,10 +34,29 @@ SLOW = 0.1  # of a step's pace: below that the time over which power is squared 
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def add_law_curvature(W, limits, i, x, u, z):
+def _add_vector(W, axes, alpha, e, G):
+    """W += J'GJ for one vector y with dy = J d."""
+    h = 4 * axes
+    for k in range(axes):
+        along = 0.0
+        for m in range(axes):
+            along += G[k, m] * e[m]
+        W[h, h] += e[k] * along
+        for a in range(4):
+            if alpha[a] == 0.0:
+                continue
+            W[h, a * axes + k] += alpha[a] * along
+            for b in range(a + 1):
+                both = alpha[a] * alpha[b]
+                if both != 0.0:
+                    for m in range(axes):
+                        W[a * axes + k, b * axes + m] += both * G[k, m]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def add_law_curvature(W, laws, i, pace, x, u, z):
     """W (4 A + 1, 4 A + 1), lower triangle, += the positive part of the curvature of the rows of step i;
-    z: their multipliers."""
-    laws = limits.laws
+    pace as of the limits (rows.py), z: their multipliers."""
     for m in range(len(laws.kind)):
         own = z[laws.first[m] : laws.first[m + 1]]
         if not own.any():
@@ -46,9 +64,9 @@ def add_law_curvature(W, limits, i, x, u, z):
         if laws.kind[m] == SPEED:
             _curve_speed(W, laws, i, m, x, u, own)
         elif laws.kind[m] == PUSH or laws.kind[m] == POWER:
-            _curve_pushed(W, laws, i, m, x, u, REST * limits.pace[i], own)
+            _curve_pushed(W, laws, i, m, x, u, REST * pace, own)
         elif laws.kind[m] == JOLT:
-            _curve_jolt(W, laws, i, m, x, u, REST * limits.pace[i], own)
+            _curve_jolt(W, laws, i, m, x, u, REST * pace, own)
         elif laws.kind[m] == JOINT_PUSH:
             _curve_joint(W, laws, i, m, u, own)
 
@@ -66,7 +84,7 @@ def _curve_speed(W, laws, i, m, x, u, z):
             a = x[2 * axes + k]
             e[k] = 0.5 * c1 * a + c2 * (a + h * u[k])
             square[k, k] = laws.counts[m, k] * z[r] * share / square_at(laws.begin[i, m], laws.end[i, m], r)
-        add_vector(W, axes, alpha, e, square)
+        _add_vector(W, axes, alpha, e, square)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -97,7 +115,7 @@ def _curve_pushed(W, laws, i, m, x, u, rest, z):
                 for s in range(axes):
                     one = laws.counts[m, k] if s == k else 0.0
                     across[k, s] = by * (one - (w[c, k] * w[c, s] / moving if pushed else 0.0))
-            add_vector(W, axes, alpha, e, across)
+            _add_vector(W, axes, alpha, e, across)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -140,4 +158,4 @@ def _curve_joint(W, laws, i, m, u, z):
             place, t = row // 2, 0.5 * u[axes] * (row // 2)
             weight = 2.0 * z[row] / (laws.end[i, m] if place else laws.node[i, m])
             alpha = np.array([0.0, 1.0, t, 0.5 * t * t])
-            add_vector(W, axes, alpha, np.zeros(axes), weight * laws.convex[i + place, row % 2, q])
+            _add_vector(W, axes, alpha, np.zeros(axes), weight * laws.convex[i + place, row % 2, q])

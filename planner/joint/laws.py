@@ -317,10 +317,10 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_law_rows(limits, i, x, u, g, out):
+def put_law_rows(laws, i, pace, room, aside, x, u, g, out):
     """The rows of step i with the node x (3 A,) and the controls u (A+1,) into g, and their derivatives by p,
-    v, a, j and h into out (.., 4 A + 1)."""
-    laws, axes = limits.laws, len(u) - 1
+    v, a, j and h into out (.., 4 A + 1); pace, room and how far `aside` as of the limits (rows.py)."""
+    axes = len(u) - 1
     if len(laws.kind) == 0:
         return
     f, by, y, tilt = np.empty(2), np.zeros((2, 4 * axes + 1)), np.empty((3, axes)), np.zeros((4, axes))
@@ -335,15 +335,15 @@ def put_law_rows(limits, i, x, u, g, out):
                     f[end] += tilt[0, k] * (y[0, k] - laws.at[i + end, k])
                 chained(u, 1.0 * end, y, tilt, by[end])
                 f[end] = max(f[end], TILTED_LEAST)
-        rest = REST * limits.pace[i]
+        rest = REST * pace
         if laws.kind[m] == SPEED:
             _put_speed(laws, i, m, x, u, f, by, own, slope)
         elif laws.kind[m] == PUSH or laws.kind[m] == POWER:
             _put_pushed(laws, i, m, x, u, rest, f, by, own, slope)
         elif laws.kind[m] == PIN:
-            own[0] = limits.aside - laws.pinned[i] / limits.room_node[i]
+            own[0] = aside - laws.pinned[i] / room
             for k in range(axes):
-                slope[0, k] = laws.pin[i, k] / limits.room_node[i]
+                slope[0, k] = laws.pin[i, k] / room
                 own[0] += slope[0, k] * x[k]
         else:
             _put_ends(laws, i, m, x, u, rest, f, by, own, slope)

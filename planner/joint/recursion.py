@@ -7,7 +7,7 @@ Nodes x = (p, v, a), controls u = (j, h), and the gaps r = f(x, u) - x_next of t
 with their derivatives A (the same triangle for every axis) and B. With the model 1/2 d'W d + w'd of step i in
 d = (dx, du), and V(dx) = 1/2 dx'P dx + p'dx of all that follows, back from the last node,
 
-    K = -(W_uu + B'PB)^-1 (W_ux + B'PA),      P_i = W_xx + A'PA + K'(W_ux + B'PA),      lambda = P dx + p.
+    W_uu + B'PB = L D L',   Y = L^-1 (W_ux + B'PA),   K = -L'^-1 D^-1 Y,   P_i = W_xx + A'PA - Y'D^-1 Y.
 
 The first node stays. The last one does too: its gap e costs rho/2 e'e + lambda'e, and lambda takes over what
 is missing with every step (a method of multipliers). Where active rows are as stiff as rho, as on hundreds of
@@ -18,32 +18,44 @@ W holds the curvature of the rows, sum of z d2g + (z/s) grad g grad g', and is p
 
 from typing import NamedTuple
 
-import numpy as np
-
 from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.curvature import model_of_rows
-from planner.joint.law_curvature import add_law_curvature
-from planner.joint.normal_rows import BETWEEN, add_normal_curvature, stay_of
-from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, VECTOR_OF_NODE, VECTORS, second_of, vector_of
+from planner.base.lanes import anywhere, larger, magnitude, where
+from planner.joint.curvature import add_own_curvature, put_force, put_model, put_slopes
+from planner.joint.rows import SIXTH, put_shares, put_vectors
 
 END = 1e9  # rho [-], at first; with 1e6 the last node's gap stays at 1e-5 where prox has grown
-
-
-class NewtonStep(NamedTuple):
-    """Of N steps."""
-
-    dx: FloatArray  # (N+1, S)
-    du: FloatArray  # (N, C)
-    after: FloatArray  # (N, S) lambda behind every step
+TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
 
 
 class Factor(NamedTuple):
     """The recursion of N steps; S = 3 A, C = A + 1."""
 
     K: FloatArray  # (N, C, S)
-    L: FloatArray  # (N, C, C) Cholesky factor of W_uu + B'PB
-    P: FloatArray  # (N+1, S, S)
+    L: FloatArray  # (N, C, C) below its diagonal, on it 1/D
+    push: FloatArray  # (N, S) P of what follows times the gap
+    dx: FloatArray  # (N+1, S) the step
+    du: FloatArray  # (N, C)
+
+
+class Room(NamedTuple):
+    """Memory for one step; D = S + C."""
+
+    y: FloatArray  # (13, A)
+    e: FloatArray  # (13, A)
+    alpha: FloatArray  # (13, 4)
+    F: FloatArray  # (13, A)
+    G: FloatArray  # (A, A)
+    row: FloatArray  # (D,)
+    W: FloatArray  # (D, D)
+    P: FloatArray  # (S, S)
+    PA: FloatArray  # (S, S)
+    PB: FloatArray  # (S, C)
+    Y: FloatArray  # (C, S)
+    by_h: FloatArray  # (S,)
+    one: FloatArray  # (S,)
+    force: FloatArray  # (C,)
+    slope: FloatArray  # (R,)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -58,232 +70,235 @@ def step_of_h(x, u, axes, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _times_transposed(M, h, axes, out):
-    """out = A'M for M (3 A, ..)."""
-    for k in range(axes):
-        for c in range(M.shape[1]):
-            p, v, a = M[k, c], M[axes + k, c], M[2 * axes + k, c]
-            out[k, c], out[axes + k, c], out[2 * axes + k, c] = p, h * p + v, h * (0.5 * h * p + v) + a
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def factor_steps(x, u, legs, limits, lin, barrier, pull, last, factor):
-    """The recursion into `factor`, with a barrier (curvature.py), the weight of (dh/limits.h)^2, and rho of the last
-    node. False where it breaks down."""
-    N, axes = len(u), u.shape[1] - 1
-    S, C = 3 * axes, axes + 1
-    size, R = S + C, lin.g.shape[1]
-    W, G = np.empty((size, size)), np.empty((VECTORS, axes, axes))
-    of = np.array([vector_of(r, axes) for r in range(R)])
-    PA, APA, PB, by_h = np.empty((S, S)), np.empty((S, S)), np.empty((S, C)), np.empty(S)
-    Hux, Huu, per = np.empty((C, S)), np.empty((C, C)), np.empty(C)
-    P = factor.P
-    P[N] = 0.0
-    for k in range(S):
-        P[N, k, k] = last
-    for i in range(N - 1, -1, -1):
-        h, own = u[i, axes], P[i + 1]
-        model_of_rows(W, G, legs, limits, lin, i, barrier, of)
-        of_own = barrier.z[i, 8 * axes + NORMAL_ROWS :]
-        add_normal_curvature(
-            W, limits.normal[i], limits.pace[i], limits.turns[i], x[i], u[i], of_own[:BETWEEN]
-        )
-        add_law_curvature(W, limits, i, x[i], u[i], of_own[BETWEEN:])
-        W[size - 1, size - 1] += 2.0 * pull / limits.h[i] ** 2
-        if limits.on[i, 8 * axes + NORMAL_ROWS]:
-            priced = 0.0
-            for m in range(3):
-                row = 8 * axes + (NORMAL_NODE, NORMAL_ROWS, NORMAL_ROWS + 1)[m]
-                priced += barrier.z[i, row] + (barrier.z[i - 1, row] if i else 0.0)
-            stay = stay_of(limits.normal[i], x[i], u[i], priced)
-            for k in range(axes):
-                W[axes + k, axes + k] += stay
+def _factor_step(sizes, u, by_h, room, K, L, bad):
+    """K and L of a step and P before it, by P behind it and W. Where a pivot is not positive 1 is added to `bad`."""
+    axes, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
+    h = u[axes]
+    P, PA, PB, W, Y = room.P, room.PA, room.PB, room.W, room.Y
+    for c in range(S):
+        total = 0.0 * h
+        for m in range(S):
+            total += P[c, m] * by_h[m]
+        PB[c, axes] = total
         for k in range(axes):
-            W[S + k, S + k] += 2.0 * limits.smooth[i] * limits.h[i] / limits.box[0, k] ** 2
-        step_of_h(x[i], u[i], axes, by_h)
-        # P is symmetric: (P A)' = A'P
-        _times_transposed(own, h, axes, PA)  # A'P, (S, S)
-        for c in range(S):
-            total = 0.0
-            for m in range(S):
-                total += own[c, m] * by_h[m]
-            PB[c, axes] = total
-            for k in range(axes):
-                PB[c, k] = h * (own[c, 2 * axes + k] + h * (0.5 * own[c, axes + k] + h * own[c, k] / 6.0))
-        # A'PA from A'P: its columns
-        for row in range(S):
-            for k in range(axes):
-                p, v, a = PA[row, k], PA[row, axes + k], PA[row, 2 * axes + k]
-                APA[row, k], APA[row, axes + k], APA[row, 2 * axes + k] = (
-                    p,
-                    h * p + v,
-                    h * (0.5 * h * p + v) + a,
-                )
-        # B'PA = (A'PB)', W_ux from the lower triangle
+            p, v, a = P[c, k], P[c, axes + k], P[c, 2 * axes + k]
+            PB[c, k] = h * (a + h * (0.5 * v + h * p * SIXTH))
+            PA[c, k], PA[c, axes + k], PA[c, 2 * axes + k] = p, h * p + v, h * (0.5 * h * p + v) + a
+    for c in range(C):  # W_ux + B'PA = W_ux + (A'PB)'
+        for k in range(axes):
+            p, v, a = PB[k, c], PB[axes + k, c], PB[2 * axes + k, c]
+            Y[c, k] = p + W[S + c, k]
+            Y[c, axes + k] = h * p + v + W[S + c, axes + k]
+            Y[c, 2 * axes + k] = h * (0.5 * h * p + v) + a + W[S + c, 2 * axes + k]
+    for c in range(C):
+        for d in range(c + 1):
+            if d < axes:
+                p, v, a = PB[d, c], PB[axes + d, c], PB[2 * axes + d, c]
+                total = h * (a + h * (0.5 * v + h * p * SIXTH))
+            else:
+                total = 0.0 * h
+                for m in range(S):
+                    total += by_h[m] * PB[m, c]
+            total += W[S + c, S + d]
+            for m in range(d):
+                total -= L[c, m] * L[d, m] * room.force[m]
+            if d < c:
+                L[c, d] = total * L[d, d]
+            else:
+                good = total > 0.0
+                bad = where(good, bad, 1.0)
+                room.force[c] = where(good, total, 1.0)
+                L[c, c] = 1.0 / room.force[c]
+    for s in range(S):
         for c in range(C):
-            for k in range(axes):
-                p, v, a = PB[k, c], PB[axes + k, c], PB[2 * axes + k, c]
-                Hux[c, k] = p + W[S + c, k]
-                Hux[c, axes + k] = h * p + v + W[S + c, axes + k]
-                Hux[c, 2 * axes + k] = h * (0.5 * h * p + v) + a + W[S + c, 2 * axes + k]
+            for m in range(c):
+                Y[c, s] -= L[c, m] * Y[m, s]
+    for k in range(axes):  # A'PA, from PA, column by column
+        for t in range(S):
+            p, v, a = PA[k, t], PA[axes + k, t], PA[2 * axes + k, t]
+            P[k, t], P[axes + k, t], P[2 * axes + k, t] = p, h * p + v, h * (0.5 * h * p + v) + a
+    for s in range(S):
         for c in range(C):
-            for d in range(c + 1):
-                if d < axes:
-                    total = h * (PB[2 * axes + d, c] + h * (0.5 * PB[axes + d, c] + h * PB[d, c] / 6.0))
-                else:
-                    total = 0.0
-                    for m in range(S):
-                        total += by_h[m] * PB[m, c]
-                Huu[c, d] = total + W[S + c, S + d]
-        # Cholesky
-        L = factor.L[i]
-        L[:] = 0.0
-        for c in range(C):
-            for d in range(c + 1):
-                total = Huu[c, d]
-                for m in range(d):
-                    total -= L[c, m] * L[d, m]
-                if c != d:
-                    L[c, d] = total * per[d]
-                else:
-                    if not total > 0.0:
-                        return False
-                    L[c, c] = np.sqrt(total)
-                    per[c] = 1.0 / L[c, c]
-        K = factor.K[i]
-        for s in range(S):
+            K[c, s] = Y[c, s] * L[c, c]
+    for s in range(S):
+        for t in range(s + 1):
+            total = P[s, t] + W[s, t]
             for c in range(C):
-                total = -Hux[c, s]
-                for m in range(c):
-                    total -= L[c, m] * K[m, s]
-                K[c, s] = total * per[c]
-        # P = W_xx + A'PA - Y'Y with Y = L^-1 Hux (K holds -Y)
-        for s in range(S):
-            for t in range(s + 1):
-                total = APA[s, t] + W[s, t]
-                for c in range(C):
-                    total -= K[c, s] * K[c, t]
-                P[i, s, t] = total
-                P[i, t, s] = total
-        for s in range(S):
-            for c in range(C - 1, -1, -1):
-                total = K[c, s]
-                for m in range(c + 1, C):
-                    total -= L[m, c] * K[m, s]
-                K[c, s] = total * per[c]
-    return True
+                total -= K[c, s] * Y[c, t]
+            P[s, t] = total
+            P[t, s] = total
+    for s in range(S):
+        for c in range(C - 1, -1, -1):
+            total = -K[c, s]
+            for m in range(c + 1, C):
+                total -= L[m, c] * K[m, s]
+            K[c, s] = total
+    return bad
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def forces(limits, lin, q, pull, u, w):
-    """w (N, 4 A + 1) = the gradient of time, pull and smoothness, and the sum of q (N, R) grad g."""
-    N, axes = len(w), lin.n.shape[2]
-    R, more = lin.g.shape[1], 8 * axes
-    of = np.array([vector_of(r, axes) for r in range(R)])
-    F = np.empty((VECTORS, axes))
-    for i in range(N):
-        F[:] = 0.0
-        w[i] = 0.0
-        own = 1.0 + 2.0 * pull * (u[i, axes] - limits.h[i]) / limits.h[i] ** 2
-        for k in range(axes):
-            w[i, 3 * axes + k] = 2.0 * limits.smooth[i] * limits.h[i] * u[i, k] / limits.box[0, k] ** 2
-        for r in range(R):
-            if not limits.on[i, r]:
-                continue
-            m = of[r]
-            if m == -2:
-                row = lin.own[i, r - more - NORMAL_ROWS]
-                for k in range(4 * axes):
-                    w[i, k] += q[i, r] * row[k]
-                own += q[i, r] * row[4 * axes]
-                continue
-            if m < 0:
-                own += q[i, r] / limits.h[i] * (1.0 if r == more else -1.0)
-                continue
-            for k in range(axes):
-                F[m, k] += q[i, r] * lin.n[i, r, k]
-            c = second_of(r - more)
-            if c >= 0:
-                for k in range(axes):
-                    F[VECTOR_OF_NODE[c], k] += q[i, r] * lin.node[i, c, k]
-        for m in range(VECTORS):
-            for k in range(axes):
-                own += F[m, k] * lin.e[i, m, k]
-                for a in range(4):
-                    w[i, a * axes + k] += lin.alpha[i, m, a] * F[m, k]
-        w[i, 4 * axes] = own
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def newton_step(x, u, gap, w, end, factor, step):
-    """The step for the gradient w (N, 4 A + 1) and the gaps (N, 3 A); end (3 A,) is lambda of the last
-    node."""
-    dx, du, after = step
-    N, axes = len(u), u.shape[1] - 1
-    S, C = 3 * axes, axes + 1
-    p, rest, by_h, force = end.copy(), np.empty(S), np.empty(S), np.empty(C)
-    K, L, P = factor
+def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, scratch):
+    """The recursion into `factor`: pull, the weight of (dh/h)^2, and rho of the last node. Where it breaks down what is
+    returned is not 0."""
+    axes, S, N = len(sizes.axes), len(sizes.state), len(u)
+    P, W = room.P, room.W
+    P[:] = 0.0
+    bad = 0.0 * pull
     for i in range(N - 1, -1, -1):
-        h = u[i, axes]
-        after[i] = p
+        last = group.last[i] > 0.0
+        if anywhere(last):
+            for s in range(S):
+                for t in range(S):
+                    P[s, t] = where(last, rho if s == t else 0.0 * rho, P[s, t])
         for s in range(S):
-            total = p[s]
+            total = 0.0 * pull
             for t in range(S):
-                total += P[i + 1, s, t] * gap[i, t]
-            rest[s] = total
+                total += P[s, t] * gap[i, t]
+            factor.push[i, s] = total
+        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
+        put_shares(u[i, axes], turn, room.alpha)
+        motion = room.y, room.alpha, room.e
+        put_model(sizes, group, bends, rows, i, motion, (room.G, room.row), W)
+        if bends.any_own:
+            add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch)
+        W[S + axes, S + axes] += 2.0 * pull * group.per_h[i] * group.per_h[i]
+        for k in range(axes):
+            W[S + k, S + k] += group.smooth[i] * group.per_box[0, k] * group.per_box[0, k]
+            W[S + k, S + k] += 1.0 - group.real[i]
+        step_of_h(x[i], u[i], axes, room.by_h)
+        bad = _factor_step(sizes, u[i], room.by_h, room, factor.K[i], factor.L[i], bad)
+    return bad
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def backward(sizes, group, bends, x, u, rows, pull, aim, second, end, factor, room):
+    """The controls of the Newton step towards s z = aim (curvature.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
+    is lambda of the last node."""
+    axes, S, C, N = len(sizes.axes), len(sizes.state), len(sizes.control), len(u)
+    p, rest, force, w = room.one, room.by_h, room.force, room.row
+    by_h = room.PA[0]
+    for s in range(S):
+        p[s] = 0.0
+    for i in range(N - 1, -1, -1):
+        h, last = u[i, axes], group.last[i] > 0.0
+        if anywhere(last):
+            for s in range(S):
+                p[s] = where(last, end[s], p[s])
+        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
+        put_shares(h, turn, room.alpha)
+        put_force(
+            sizes, group, bends, rows, i, (room.y, room.alpha, room.e), aim, second, room.F, w
+        )
+        per = group.per_h[i]
+        w[S + axes] += group.real[i] + 2.0 * pull * (h - group.h[i]) * per * per
+        for k in range(axes):
+            w[S + k] += group.smooth[i] * u[i, k] * group.per_box[0, k] * group.per_box[0, k]
+        for s in range(S):
+            rest[s] = p[s] + factor.push[i, s]
         step_of_h(x[i], u[i], axes, by_h)
-        total = w[i, S + axes]
+        total = w[S + axes]
         for s in range(S):
             total += by_h[s] * rest[s]
         force[axes] = total
         for k in range(axes):
             p0, v0, a0 = rest[k], rest[axes + k], rest[2 * axes + k]
-            force[k] = w[i, S + k] + h * (a0 + h * (0.5 * v0 + h * p0 / 6.0))
-            p[k], p[axes + k] = w[i, k] + p0, w[i, axes + k] + h * p0 + v0
-            p[2 * axes + k] = w[i, 2 * axes + k] + h * (0.5 * h * p0 + v0) + a0
+            force[k] = w[S + k] + h * (a0 + h * (0.5 * v0 + h * p0 * SIXTH))
+            p[k], p[axes + k] = w[k] + p0, w[axes + k] + h * p0 + v0
+            p[2 * axes + k] = w[2 * axes + k] + h * (0.5 * h * p0 + v0) + a0
+        K, L = factor.K[i], factor.L[i]
         for s in range(S):
             for c in range(C):
-                p[s] += K[i, c, s] * force[c]
+                p[s] += K[c, s] * force[c]
         for c in range(C):
             total = -force[c]
             for m in range(c):
-                total -= L[i, c, m] * du[i, m]
-            du[i, c] = total / L[i, c, c]
+                total -= L[c, m] * factor.du[i, m]
+            factor.du[i, c] = total
         for c in range(C - 1, -1, -1):
-            total = du[i, c]
+            total = factor.du[i, c] * L[c, c]
             for m in range(c + 1, C):
-                total -= L[i, m, c] * du[i, m]
-            du[i, c] = total / L[i, c, c]
-    dx[0] = 0.0
-    for i in range(N):
-        h = u[i, axes]
-        for c in range(C):
-            total = du[i, c]
-            for s in range(S):
-                total += K[i, c, s] * dx[i, s]
-            du[i, c] = total
-        step_of_h(x[i], u[i], axes, by_h)
-        dh = du[i, axes]
-        for k in range(axes):
-            dp, dv, da, dj = dx[i, k], dx[i, axes + k], dx[i, 2 * axes + k], du[i, k]
-            dx[i + 1, k] = dp + h * (dv + h * (0.5 * da + h * dj / 6.0)) + by_h[k] * dh + gap[i, k]
-            dx[i + 1, axes + k] = dv + h * (da + 0.5 * h * dj) + by_h[axes + k] * dh + gap[i, axes + k]
-            dx[i + 1, 2 * axes + k] = da + h * dj + by_h[2 * axes + k] * dh + gap[i, 2 * axes + k]
-        for s in range(S):
-            total = after[i, s]
-            for t in range(S):
-                total += P[i + 1, s, t] * dx[i + 1, t]
-            after[i, s] = total
+                total -= L[m, c] * factor.du[i, m]
+            factor.du[i, c] = total
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def gaps(x, u, out):
-    """out (N, 3 A) = f(x, u) - the next node."""
-    N, axes = len(u), u.shape[1] - 1
+def forward(sizes, group, bends, x, u, gap, rows, aim, second, factor, room, end):
+    """The step of nodes and controls into `factor`, and of slacks and multipliers into `rows`. Returns the shares of it that
+    keep slacks and multipliers positive, and the sums of s dz, z ds and ds dz; end (S,) = the step of the last node."""
+    axes, S, C, N, R = (
+        len(sizes.axes),
+        len(sizes.state),
+        len(sizes.control),
+        len(u),
+        rows.g.shape[1],
+    )
+    dx, du, d, by_h, slope = factor.dx, factor.du, room.row, room.by_h, room.slope
+    none = 0.0 * aim
+    s_dz, z_ds, ds_dz = none, none, none
+    # the largest -ds/s and -dz/z so far, as fractions: comparing them takes no division
+    over_s, under_s, over_z, under_z = none, none + 1.0, none, none + 1.0
+    for s in range(S):
+        dx[0, s], end[s] = none, none
+    for i in range(N):
+        h, real = u[i, axes], group.real[i]
+        for c in range(C):
+            total = du[i, c]
+            for s in range(S):
+                total += factor.K[i, c, s] * dx[i, s]
+            du[i, c] = total * real
+            d[S + c] = du[i, c]
+        for s in range(S):
+            d[s] = dx[i, s]
+        step_of_h(x[i], u[i], axes, by_h)
+        dh = du[i, axes]
+        for k in range(axes):
+            dp, dv, da, dj = d[k], d[axes + k], d[2 * axes + k], d[S + k]
+            dx[i + 1, k] = dp + h * (dv + h * (0.5 * da + h * dj * SIXTH)) + by_h[k] * dh + gap[i, k]
+            dx[i + 1, axes + k] = dv + h * (da + 0.5 * h * dj) + by_h[axes + k] * dh + gap[i, axes + k]
+            dx[i + 1, 2 * axes + k] = da + h * dj + by_h[2 * axes + k] * dh + gap[i, 2 * axes + k]
+        last = group.last[i] > 0.0
+        if anywhere(last):
+            for s in range(S):
+                end[s] = where(last, dx[i + 1, s], end[s])
+                dx[i + 1, s] = where(last, 0.0, dx[i + 1, s])
+        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
+        put_shares(h, turn, room.alpha)
+        put_slopes(
+            sizes, group, bends, rows, i, (room.y, room.alpha, room.e), d, room.F, slope
+        )
+        for r in range(R):
+            on, s_r, z_r = group.on[i, r], rows.s[i, r], rows.z[i, r]
+            ds = on * (-(rows.g[i, r] + s_r) - slope[r])
+            left = aim - second * rows.ds[i, r] * rows.dz[i, r]
+            dz = on * ((left - z_r * ds) * rows.per_s[i, r] - z_r)
+            rows.ds[i, r], rows.dz[i, r] = ds, dz
+            s_dz, z_ds, ds_dz = s_dz + s_r * dz, z_ds + z_r * ds, ds_dz + ds * dz
+            farther = -ds * under_s > over_s * s_r
+            over_s, under_s = where(farther, -ds, over_s), where(farther, s_r, under_s)
+            farther = -dz * under_z > over_z * z_r
+            over_z, under_z = where(farther, -dz, over_z), where(farther, z_r, under_z)
+    along, dual = over_s / under_s, over_z / under_z
+    along = where(along > TO_BOUNDARY, TO_BOUNDARY / larger(along, TO_BOUNDARY), none + 1.0)
+    dual = where(dual > TO_BOUNDARY, TO_BOUNDARY / larger(dual, TO_BOUNDARY), none + 1.0)
+    return along, dual, s_dz, z_ds, ds_dz
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def gaps(sizes, group, x, u, out):
+    """out (N, 3 A) = f(x, u) - the next node. Returns the largest one, and that at the last node."""
+    axes, N, S = len(sizes.axes), len(u), len(sizes.state)
+    most, at_end = 0.0 * u[0, axes], 0.0 * u[0, axes]
     for i in range(N):
         h = u[i, axes]
         for k in range(axes):
             p, v, a, j = x[i, k], x[i, axes + k], x[i, 2 * axes + k], u[i, k]
-            out[i, k] = p + h * (v + h * (0.5 * a + h * j / 6.0)) - x[i + 1, k]
+            out[i, k] = p + h * (v + h * (0.5 * a + h * j * SIXTH)) - x[i + 1, k]
             out[i, axes + k] = v + h * (a + 0.5 * h * j) - x[i + 1, axes + k]
             out[i, 2 * axes + k] = a + h * j - x[i + 1, 2 * axes + k]
+        largest = 0.0 * h
+        for s in range(S):
+            out[i, s] = where(group.real[i] > 0.0, out[i, s], 0.0)
+            largest = larger(magnitude(out[i, s]), largest)
+        most = larger(largest, most)
+        at_end = where(group.last[i] > 0.0, largest, at_end)
+    return most, at_end

@@ -47,8 +47,9 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
+from planner.base.lanes import anywhere, larger, magnitude, pick, put, root, smaller, where
 from planner.joint.laws import LawRows, put_law_rows
-from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent, put_places
+from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
 
 # Vectors y, in this order.
@@ -67,6 +68,7 @@ ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH = range(9, 14)
 NORMAL_ROWS, LAW_ROWS = 14, 14 + BETWEEN
 MORE_ROWS = LAW_ROWS
 VECTOR_OF_BOX = (J, A, MID, V)
+THIRD, SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
 
 
 class StepLimits(NamedTuple):
@@ -98,18 +100,37 @@ class StepLimits(NamedTuple):
     aside: float  # how far inside its bound the row of that has to be [-]
 
 
-class Linear(NamedTuple):
-    """The rows of N steps at a motion."""
+class Rows(NamedTuple):
+    """The rows g + s = 0 of N steps at a motion, with slacks s and multipliers z, and their steps."""
 
     g: FloatArray  # (N, R)
-    n: FloatArray  # (N, R, A) dg/dy
-    node: FloatArray  # (N, 3, A) dg/dy by the second vectors of rows that have one
-    alpha: FloatArray  # (N, 13, 4)
-    e: FloatArray  # (N, 13, A)
-    tangent: FloatArray  # (N, 3, A) of the leg at the node and both inner control points; 0 where nearest is an end of the leg
-    place: FloatArray  # (N, 3) of those along the leg
-    radius: FloatArray  # (N, 3) of the rows of the feed
-    own: FloatArray  # (N, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
+    s: FloatArray  # (N, R)
+    z: FloatArray  # (N, R)
+    per_s: FloatArray  # (N, R) 1/s
+    ds: FloatArray  # (N, R)
+    dz: FloatArray  # (N, R)
+    place: FloatArray  # (N, 3) of the node and the inner control points along the leg
+    moves: FloatArray  # (N, 3) 1 where these move with the point
+    per_radius: FloatArray  # (N, 3) 1/r^2 of the rows of the feed
+    n: FloatArray  # (N, 3, A) derivatives of the rows of the tolerance by y
+    node: FloatArray  # (N or 0, 3, A) on arcs by the second vectors
+    tangent: FloatArray  # (N or 0, 3, A) of the leg, on arcs
+    own: FloatArray  # (N or 0, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
+
+
+class Scratch(NamedTuple):
+    """Of one lane, for what is worked out for one after the other."""
+
+    x: FloatArray  # (S,)
+    u: FloatArray  # (C,)
+    y: FloatArray  # (3, A)
+    point: FloatArray  # (A,)
+    n: FloatArray  # (A,)
+    node: FloatArray  # (A,)
+    tangent: FloatArray  # (A,)
+    g: FloatArray  # (L,)
+    slope: FloatArray  # (L, 4 A + 1)
+    W: FloatArray  # (4 A + 1, 4 A + 1)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -119,229 +140,294 @@ def count(axes):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def vectors_of_step(x, u, axes, y, alpha, e):
-    """y (13, A), alpha (13, 4) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
+def put_vectors(sizes, x, u, y, e):
+    """y (13, A) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,). Returns u of the module
+    text."""
+    axes = len(sizes.axes)
     h = u[axes]
-    alpha[:] = 0.0
-    vv, va = 0.0, 0.0
+    vv, va = 0.0 * h, 0.0 * h
     for k in range(axes):
-        vv, va = vv + x[axes + k] ** 2, va + x[axes + k] * x[2 * axes + k]
-    u0 = va / max(vv, 1e-30)
+        vv, va = vv + x[axes + k] * x[axes + k], va + x[axes + k] * x[2 * axes + k]
+    turn = va / larger(vv, 1e-30)
     for k in range(axes):
         p, v, a, j = x[k], x[axes + k], x[2 * axes + k], u[k]
         y[P, k], y[V, k], y[A, k], y[J, k] = p, v, a, j
         y[MID, k], e[MID, k] = v + 0.5 * h * a, 0.5 * a
         y[FEED_1, k], e[FEED_1, k] = v + 0.25 * h * a, 0.25 * a
-        y[FEED_2, k], e[FEED_2, k] = v + h * (0.5 * a + h * j / 12.0), 0.5 * a + h * j / 6.0
+        y[FEED_2, k], e[FEED_2, k] = v + h * (0.5 * a + h * j * TWELFTH), 0.5 * a + h * j * SIXTH
         y[FEED_3, k], e[FEED_3, k] = v + h * (0.75 * a + 0.25 * h * j), 0.75 * a + 0.5 * h * j
-        y[C1, k], e[C1, k] = p + h * v / 3.0, v / 3.0
-        y[C2, k], e[C2, k] = p + h * (2.0 * v / 3.0 + h * a / 6.0), 2.0 * v / 3.0 + h * a / 3.0
-        y[ACROSS, k] = a - u0 * v
+        y[C1, k], e[C1, k] = p + h * v * THIRD, v * THIRD
+        y[C2, k] = p + h * THIRD * (2.0 * v + 0.5 * h * a)
+        e[C2, k] = THIRD * (2.0 * v + h * a)
+        y[ACROSS, k] = a - turn * v
         e[P, k], e[V, k], e[A, k], e[J, k], e[ACROSS, k] = 0.0, 0.0, 0.0, 0.0, 0.0
         y[LONG, k], e[LONG, k] = h * (v + 0.5 * h * a), v + h * a
-        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j / 6.0))
+        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j * SIXTH))
         e[NEXT, k] = v + h * (a + 0.5 * h * j)
+    return turn
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def put_shares(h, turn, alpha):
+    """alpha (13, 4) of a step of the duration h."""
+    alpha[:] = 0.0
     alpha[P, 0], alpha[V, 1], alpha[A, 2], alpha[J, 3] = 1.0, 1.0, 1.0, 1.0
     alpha[MID, 1], alpha[MID, 2] = 1.0, 0.5 * h
     for m in range(3):
         alpha[FEED_1 + m, 1], alpha[FEED_1 + m, 2] = 1.0, 0.25 * (m + 1) * h
-    alpha[FEED_2, 3], alpha[FEED_3, 3] = h * h / 12.0, 0.25 * h * h
-    alpha[C1, 0], alpha[C1, 1] = 1.0, h / 3.0
-    alpha[C2, 0], alpha[C2, 1], alpha[C2, 2] = 1.0, 2.0 * h / 3.0, h * h / 6.0
-    alpha[ACROSS, 1], alpha[ACROSS, 2] = -u0, 1.0
+    alpha[FEED_2, 3], alpha[FEED_3, 3] = h * h * TWELFTH, 0.25 * h * h
+    alpha[C1, 0], alpha[C1, 1] = 1.0, h * THIRD
+    alpha[C2, 0], alpha[C2, 1], alpha[C2, 2] = 1.0, 2.0 * THIRD * h, h * h * SIXTH
+    alpha[ACROSS, 1], alpha[ACROSS, 2] = -turn, 1.0
     alpha[LONG, 1], alpha[LONG, 2] = h, 0.5 * h * h
-    alpha[NEXT, 0], alpha[NEXT, 1], alpha[NEXT, 2], alpha[NEXT, 3] = 1.0, h, 0.5 * h * h, h**3 / 6.0
+    alpha[NEXT, 0], alpha[NEXT, 1] = 1.0, h
+    alpha[NEXT, 2], alpha[NEXT, 3] = 0.5 * h * h, h * h * h * SIXTH
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_radii(x, u, axes, feed, radius):
-    """radius (3,) of the rows of the feed (module text)."""
-    h, first, last, jerk, change = u[axes], 0.0, 0.0, 0.0, 0.0
+def _ball(axes, y, vector, per, row, g):
+    """The row |y|^2 <= 1/per."""
+    square = 0.0 * per
+    for k in range(axes):
+        square += y[vector, k] * y[vector, k]
+    g[row] = 0.5 * (square * per - 1.0)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_radii(axes, x, u, square, per_radius):
+    """1/r^2 of the rows of the feed (module text); `square` of its limit."""
+    h = u[axes]
+    first, last, jerk, change = square, square, 0.0 * h, 0.0 * h
     for k in range(axes):
         a, j = x[2 * axes + k], u[k]
-        first += (0.25 * h * a) ** 2
-        last += (0.25 * h * (a + h * j)) ** 2
-        jerk += (h * h * j) ** 2
-        change += (h * (a + 0.5 * h * j)) ** 2
-    radius[0], radius[2] = np.sqrt(feed * feed + first), np.sqrt(feed * feed + last)
-    radius[1] = np.sqrt(max(feed * feed + change / 12.0 - jerk / 72.0, 0.01 * feed * feed))
+        ha, hj = 0.25 * h * a, 0.25 * h * h * j
+        first, last = first + ha * ha, last + (ha + hj) * (ha + hj)
+        jerk, change = jerk + hj * hj, change + (ha + 0.5 * hj) * (ha + 0.5 * hj)
+    per_radius[0], per_radius[2] = 1.0 / first, 1.0 / last
+    per_radius[1] = 1.0 / larger(square + 16.0 / 12.0 * change - 16.0 / 72.0 * jerk, 0.01 * square)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _ball(y, vector, limit, row, g, n):
-    """The row |y| <= limit."""
-    square = 0.0
-    for k in range(y.shape[1]):
-        square += y[vector, k] * y[vector, k]
-        n[row, k] = y[vector, k] / (limit * limit)
-    g[row] = 0.5 * (square / (limit * limit) - 1.0)
+def _place_on_line(axes, group, i, x, h, part):
+    """The place on the leg of step i that is nearest to its node, first or second inner control point (0 to 2), or its
+    end, the node x (3)."""
+    along = 0.0 * h
+    for k in range(axes):
+        c = x[k]
+        if part == 1:
+            c = c + THIRD * h * x[axes + k]
+        elif part == 2:
+            c = c + h * THIRD * (2.0 * x[axes + k] + 0.5 * h * x[2 * axes + k])
+        along += (c - group.base[i, k]) * group.drift[i, k]
+    return smaller(larger(along * group.per_drift[i], 0.0), group.length[i])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_switch(legs, limits, i, y, lin):
-    """The row of a node at a vertex where the feed changes, or beside it (module text)."""
-    row, by = 8 * y.shape[1] + SWITCH, limits.switch[i] / (limits.room_node[i] * limits.pace[i])
-    lin.g[i, row], r = limits.aside, limits.switch_leg[i]
-    for k in range(y.shape[1]):
-        off = y[P, k] - legs.base[r, k] - legs.radius[r] * legs.e1[r, k]
-        lin.n[i, row, k], lin.node[i, 2, k] = by * y[V, k], by * off
-        lin.g[i, row] += lin.n[i, row, k] * off
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_rows(legs, limits, x, u, lin):
-    """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `lin`; its places are where the
-    search on arcs begins."""
-    N, axes = len(u), u.shape[1] - 1
-    y, point = np.empty((VECTORS, axes)), np.empty(axes)
-    more, stays = 8 * axes, np.zeros((N, 3), np.bool_)
-    put_places(legs, limits.leg, limits.at_vertex[0], x, u[:, axes], lin.place, stays)
+def put_places(sizes, group, x, u, rows, nearest, top):
+    """The places of the nodes and the inner control points that are on lines, in order along each leg: a motion may go
+    back as far as one place is near enough to what it passes twice. They are halfway between the largest nearest place
+    before and the smallest one behind, so that the farthest is moved by as little as can be; nearest (N, 3) and
+    top (N,) are overwritten."""
+    axes, N = len(sizes.axes), len(u)
+    low, end = 0.0 * u[0, axes], 0.0 * u[0, axes]
     for i in range(N):
-        g, n = lin.g[i], lin.n[i]
-        vectors_of_step(x[i], u[i], axes, y, lin.alpha[i], lin.e[i])
-        for m in range(4):
-            vector = VECTOR_OF_BOX[m]
-            for k in range(axes):
-                share, up, down = (
-                    y[vector, k] / limits.box[m, k],
-                    2 * m * axes + k,
-                    (2 * m + 1) * axes + k,
-                )
-                g[up], g[down] = share - 1.0, -share - 1.0
-                n[up, k], n[down, k] = 1.0 / limits.box[m, k], -1.0 / limits.box[m, k]
         h = u[i, axes]
-        g[more + H_MAX], g[more + H_MIN] = (
-            (h - limits.h_max[i]) / limits.h[i],
-            (limits.h_min[i] - h) / limits.h[i],
-        )
-        _ball(y, V, limits.feed_node[i], more + FEED_NODE, g, n)
-        put_radii(x[i], u[i], axes, limits.feed[i], lin.radius[i])
         for m in range(3):
-            _ball(y, FEED_1 + m, lin.radius[i, m], more + FEED_ROWS + m, g, n)
-        r, at_vertex, passed = limits.leg[i], limits.at_vertex[i], limits.passed[i]
-        curved = legs.radius[r] > 0.0 and not passed
-        lin.node[i] = 0.0
-        for c in range(1 if curved else 3):
-            vector, row = (P, C1, C2)[c], more + TUBE_NODE + c
-            room = limits.room_node[i] if c == 0 else limits.room[i]
-            place = lin.place[i, c]
-            if passed:
-                lin.tangent[i, c], point[:] = 0.0, limits.target[i, c]
-            elif curved:
-                place = nearest_point(legs, r, y[vector], place, point, lin.tangent[i, c])
-            else:
-                for k in range(axes):
-                    lin.tangent[i, c, k] = 0.0 if stays[i, c] else legs.drift[r, k]
-                    point[k] = legs.base[r, k] + place * legs.drift[r, k]
-            if c == 0 and at_vertex:
-                for k in range(axes):
-                    point[k] = legs.base[r, k] + legs.radius[r] * legs.e1[r, k]
-            lin.place[i, c], square = place, 0.0
-            for k in range(axes):
-                off = y[vector, k] - point[k]
-                square += off * off
-                n[row, k] = off / (room * room)
-            g[row] = 0.5 * (square / (room * room) - 1.0)
-        if limits.on[i, more + SWITCH]:
-            _put_switch(legs, limits, i, y, lin)
-        if curved:
-            ends = i < N - 1 and limits.leg[i + 1] != r
-            for c in range(1, 3):
-                if c == 1:
-                    place, vector, other = 0.0 if at_vertex else lin.place[i, 0], C1, P
-                else:
-                    place, vector, other = legs.length[r], C2, NEXT
-                    if not ends:
-                        place = nearest_point(legs, r, y[NEXT], lin.place[i, 2], point, lin.tangent[i, 2])
-                fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= legs.length[r]
-                row = more + TUBE_NODE + c
-                foot, slopes_of = (
-                    Foot(place, fixed, c == 1),
-                    Slopes(n[row], lin.node[i, c - 1], lin.tangent[i, c]),
-                )
-                found = off_tangent(legs, r, y[vector], y[other], foot, limits.room[i], slopes_of)
-                g[row], lin.place[i, c] = found
-        order_node, order_mid, arc = 0.0, 0.0, 0.0
-        for k in range(axes):
-            n[more + ORDER_NODE, k] = -lin.tangent[i, 0, k] / limits.pace[i]
-            n[more + ORDER_MID, k] = -lin.tangent[i, 1, k] / limits.pace[i]
-            n[more + ARC, k] = lin.tangent[i, 1, k] / limits.step_max[i]
-            order_node += n[more + ORDER_NODE, k] * y[V, k]
-            order_mid += n[more + ORDER_MID, k] * y[MID, k]
-            arc += n[more + ARC, k] * y[LONG, k]
-        g[more + ORDER_NODE], g[more + ORDER_MID], g[more + ARC] = order_node, order_mid, arc - 1.0
-        _ball(y, ACROSS, limits.normal_node[i], more + NORMAL_NODE, g, n)
-        if limits.on[i, more + NORMAL_ROWS]:
-            between = g[more + NORMAL_ROWS : more + LAW_ROWS]
-            put_normal_rows(
-                limits.normal[i], limits.pace[i], limits.turns[i], x[i], u[i], between, lin.own[i]
-            )
-        put_law_rows(limits, i, x[i], u[i], g[more + LAW_ROWS :], lin.own[i, BETWEEN:])
-        for c in range(3):
-            place = lin.place[i, c]
-            if (c == 0 and limits.at_vertex[i]) or place <= 0.0 or place >= legs.length[limits.leg[i]]:
-                lin.tangent[i, c] = 0.0  # the nearest point stays where it is
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def vector_of(row, axes):
-    """The vector y that a row depends on; -1 for those of h alone, -2 for those with derivatives of their own."""
-    if row < 8 * axes:
-        return VECTOR_OF_BOX[row // (2 * axes)]
-    more = row - 8 * axes
-    if more <= H_MIN:
-        return -1
-    if more >= NORMAL_ROWS:
-        return -2
-    return (V, FEED_1, FEED_2, FEED_3, P, C1, C2, V, MID, ACROSS, LONG, P)[more - FEED_NODE]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def second_of(kind):
-    """Which second vector (`VECTOR_OF_NODE`) a row behind those of the axes depends on; -1 for none."""
-    if kind == SWITCH:
-        return 2
-    return kind - TUBE_NODE - 1 if TUBE_NODE < kind < ORDER_NODE else -1
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def slopes(limits, lin, dx, du, out):
-    """out (N, R) = the change of every row in a step dx (N+1, 3 A), du (N, A+1)."""
-    N, axes = len(du), du.shape[1] - 1
-    R, more = lin.g.shape[1], 8 * axes
-    dy = np.empty((VECTORS, axes))
-    of = np.array([vector_of(r, axes) for r in range(R)])
+            nearest[i, m] = _place_on_line(axes, group, i, x[i], h, m)
+        begins = group.begins[i] > 0.0
+        nearest[i, 0] = where(begins, where(group.at_vertex[i] > 0.0, 0.0 * h, nearest[i, 0]), nearest[i, 0])
+        low = where(begins, nearest[i, 0], low)
+        last = group.last[i] > 0.0
+        if anywhere(last):
+            end = where(last, larger(_place_on_line(axes, group, i, x[i + 1], h, 3), low), end)
+    behind = end
+    for i in range(N - 1, -1, -1):
+        ends = group.ends[i] > 0.0
+        high = where(group.last[i] > 0.0, end, group.length[i])
+        top[i] = where(ends, high, top[i + 1 if i + 1 < N else i])
+        behind = where(ends, high, behind)
+        for m in range(2, -1, -1):
+            behind = smaller(behind, nearest[i, m])
+            rows.moves[i, m] = behind
+    before = low
     for i in range(N):
-        dh = du[i, axes]
-        for m in range(VECTORS):
-            alpha = lin.alpha[i, m]
+        begins, length = group.begins[i] > 0.0, group.length[i]
+        low = where(begins, nearest[i, 0], low)
+        before = where(begins, low, before)
+        for m in range(3):
+            before = larger(before, nearest[i, m])
+            place = smaller(larger(0.5 * (before + rows.moves[i, m]), low), top[i])
+            there = where(magnitude(place - nearest[i, m]) > 0.0, 0.0, 1.0 + 0.0 * place)
+            there = where(place <= 0.0, 0.0, where(place >= length, 0.0, there))
+            rows.moves[i, m] = there
+            rows.place[i, m] = where(group.line[i] > 0.0, place, rows.place[i, m])
+        rows.moves[i, 0] *= 1.0 - group.at_vertex[i]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_passed(axes, bends, i, lane, group, y, rows):
+    """The rows of the tolerance of a step on a leg that is passed: its places are fixed."""
+    for c in range(3):
+        per = pick(group.room_node[i] if c == 0 else group.room[i], lane)
+        square = 0.0
+        for k in range(axes):
+            target = bends.target[i, c, k, lane]
+            if c == 0 and pick(group.at_vertex[i], lane) > 0.0:
+                target = pick(group.start[i, k], lane)
+            off = pick(y[(P, C1, C2)[c], k], lane) - target
+            square += off * off
+            rows.n[i, c, k] = put(rows.n[i, c, k], lane, off * per)
+        row = 8 * axes + TUBE_NODE + c
+        rows.g[i, row] = put(rows.g[i, row], lane, 0.5 * (square * per - 1.0))
+        rows.moves[i, c] = put(rows.moves[i, c], lane, 0.0)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
+    """The rows of the tolerance of a step on an arc or a curve."""
+    legs, r, length = bends.legs, bends.leg[i, lane], bends.legs.length[bends.leg[i, lane]]
+    at_vertex = pick(group.at_vertex[i], lane) > 0.0
+    ends = pick(group.ends[i], lane) > 0.0 and pick(group.last[i], lane) == 0.0
+    point, c_of = scratch.point, scratch.y
+    slopes = Slopes(scratch.n, scratch.node, scratch.tangent)
+    for k in range(axes):
+        c_of[0, k], c_of[1, k], c_of[2, k] = (
+            pick(y[P, k], lane),
+            pick(y[C1, k], lane),
+            pick(y[C2, k], lane),
+        )
+        scratch.x[k] = pick(y[NEXT, k], lane)
+    for c in range(3):
+        room = 1.0 / np.sqrt(pick(group.room_node[i] if c == 0 else group.room[i], lane))
+        place = pick(rows.place[i, c], lane)
+        scratch.node[:] = 0.0
+        if c == 0:
+            place, value = nearest_point(legs, r, c_of[0], place, point, scratch.tangent), 0.0
             for k in range(axes):
-                dy[m, k] = (
-                    alpha[0] * dx[i, k]
-                    + alpha[1] * dx[i, axes + k]
-                    + alpha[2] * dx[i, 2 * axes + k]
-                    + alpha[3] * du[i, k]
-                    + lin.e[i, m, k] * dh
-                )
+                if at_vertex:
+                    point[k] = pick(group.start[i, k], lane)
+                off = c_of[0, k] - point[k]
+                value += off * off
+                scratch.n[k] = off / (room * room)
+            value = 0.5 * (value / (room * room) - 1.0)
+        else:
+            if c == 1:
+                place = 0.0 if at_vertex else pick(rows.place[i, 0], lane)
+            elif ends:
+                place = length
+            else:
+                place = nearest_point(legs, r, scratch.x[:axes], place, point, scratch.tangent)
+            fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= length
+            other = c_of[0] if c == 1 else scratch.x[:axes]
+            value, place = off_tangent(legs, r, c_of[c], other, Foot(place, fixed, c == 1), room, slopes)
+        for k in range(axes):
+            rows.n[i, c, k] = put(rows.n[i, c, k], lane, scratch.n[k])
+            rows.node[i, c, k] = put(rows.node[i, c, k], lane, scratch.node[k])
+            rows.tangent[i, c, k] = put(rows.tangent[i, c, k], lane, scratch.tangent[k])
+        rows.place[i, c] = put(rows.place[i, c], lane, place)
+        row = 8 * axes + TUBE_NODE + c
+        rows.g[i, row] = put(rows.g[i, row], lane, value)
+        stays = (c == 0 and at_vertex) or place <= 0.0 or place >= length
+        rows.moves[i, c] = put(rows.moves[i, c], lane, 0.0 if stays else 1.0)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def copy_lane(sizes, lane, x, u, scratch):
+    """The node x (S,) and the controls u (C,) of one lane into the scratch."""
+    for k in range(len(sizes.state)):
+        scratch.x[k] = pick(x[k], lane)
+    for k in range(len(sizes.control)):
+        scratch.u[k] = pick(u[k], lane)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
+    """The rows with derivatives of their own."""
+    axes, laws = len(sizes.axes), bends.laws[lane]
+    g, slope, more = scratch.g, scratch.slope, 8 * axes + NORMAL_ROWS
+    copy_lane(sizes, lane, x[i], u[i], scratch)
+    pace, room = pick(group.pace[i], lane), 1.0 / np.sqrt(pick(group.room_node[i], lane))
+    bound = bends.bound[i, lane]
+    if bound:
+        normal = pick(group.normal[i], lane)
+        put_normal_rows(
+            normal, pace, bends.turns[i, lane], scratch.x, scratch.u, g[:BETWEEN], slope[:BETWEEN]
+        )
+    aside = pick(group.aside[0], lane)
+    put_law_rows(laws, i, pace, room, aside, scratch.x, scratch.u, g[BETWEEN:], slope[BETWEEN:])
+    for r in range(0 if bound else BETWEEN, BETWEEN + laws.first[-1]):
+        rows.g[i, more + r] = put(rows.g[i, more + r], lane, g[r])
+        for k in range(len(sizes.step)):
+            rows.own[i, r, k] = put(rows.own[i, r, k], lane, slope[r, k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def tangent_of(group, bends, rows, i, c, k):
+    """Of the leg at the node (c = 0) or an inner control point."""
+    if bends.any_bent:
+        return where(group.line[i] > 0.0, group.drift[i, k], rows.tangent[i, c, k])
+    return group.drift[i, k]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def put_rows(sizes, group, bends, x, u, rows, room, scratch):
+    """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
+    on arcs begins. A row that is not there is -1. room: y and e (13, A), nearest (N, 3) and top (N,)."""
+    axes, N, R = len(sizes.axes), len(u), rows.g.shape[1]
+    y, e, nearest, top = room
+    more = 8 * axes
+    put_places(sizes, group, x, u, rows, nearest, top)
+    for i in range(N):
+        g, h = rows.g[i], u[i, axes]
+        put_vectors(sizes, x[i], u[i], y, e)
+        for m in range(4):
+            for k in range(axes):
+                share = y[VECTOR_OF_BOX[m], k] * group.per_box[m, k]
+                g[2 * m * axes + k], g[(2 * m + 1) * axes + k] = share - 1.0, -share - 1.0
+        g[more + H_MAX] = (h - group.h_max[i]) * group.per_h[i]
+        g[more + H_MIN] = (group.h_min[i] - h) * group.per_h[i]
+        _ball(axes, y, V, group.feed_node[i], more + FEED_NODE, g)
+        _put_radii(axes, x[i], u[i], group.feed[i], rows.per_radius[i])
+        for m in range(3):
+            _ball(axes, y, FEED_1 + m, rows.per_radius[i, m], more + FEED_ROWS + m, g)
+        for c in range(3):
+            per = group.room_node[i] if c == 0 else group.room[i]
+            square, place = 0.0 * h, rows.place[i, c]
+            for k in range(axes):
+                point = group.base[i, k] + place * group.drift[i, k]
+                if c == 0:
+                    point = where(group.at_vertex[i] > 0.0, group.start[i, k], point)
+                off = y[(P, C1, C2)[c], k] - point
+                square += off * off
+                if bends.any_bent:
+                    rows.n[i, c, k] = where(group.line[i] > 0.0, off * per, rows.n[i, c, k])
+                else:
+                    rows.n[i, c, k] = off * per
+            g[more + TUBE_NODE + c] = 0.5 * (square * per - 1.0)
+        if bends.any_bent:
+            for lane in range(len(sizes.width)):
+                if bends.passed[i, lane]:
+                    _put_passed(axes, bends, i, lane, group, y, rows)
+                elif bends.bent[i, lane]:
+                    _put_bent(axes, bends, i, lane, group, y, rows, scratch)
+            order_node, order_mid, arc = 0.0 * h, 0.0 * h, 0.0 * h
+            for k in range(axes):
+                at_node = tangent_of(group, bends, rows, i, 0, k)
+                at_mid = tangent_of(group, bends, rows, i, 1, k)
+                order_node, order_mid = order_node - at_node * y[V, k], order_mid - at_mid * y[MID, k]
+                arc += at_mid * y[LONG, k]
+            g[more + ORDER_NODE], g[more + ORDER_MID] = order_node / group.pace[i], order_mid / group.pace[i]
+            g[more + ARC] = arc * group.per_step[i] - 1.0
+        if bends.any_switch:
+            square = group.aside[0]
+            for k in range(axes):
+                square += group.switch[i] * y[V, k] * (y[P, k] - group.switch_at[i, k])
+            g[more + SWITCH] = square
+        if bends.any_normal:
+            _ball(axes, y, ACROSS, group.normal_node[i], more + NORMAL_NODE, g)
+        if bends.any_own:
+            for lane in range(len(sizes.width)):
+                if i < bends.steps[lane]:
+                    _put_own(sizes, bends, i, lane, group, x, u, rows, scratch)
         for r in range(R):
-            if not limits.on[i, r]:
-                continue
-            if of[r] == -2:
-                row, total = lin.own[i, r - more - NORMAL_ROWS], 0.0
-                for k in range(3 * axes):
-                    total += row[k] * dx[i, k]
-                for k in range(axes + 1):
-                    total += row[3 * axes + k] * du[i, k]
-                out[i, r] = total
-                continue
-            if of[r] < 0:
-                out[i, r] = dh / limits.h[i] * (1.0 if r == more + H_MAX else -1.0)
-                continue
-            total = 0.0
-            for k in range(axes):
-                total += lin.n[i, r, k] * dy[of[r], k]
-            c = second_of(r - more)
-            if c >= 0:
-                for k in range(axes):
-                    total += lin.node[i, c, k] * dy[VECTOR_OF_NODE[c], k]
-            out[i, r] = total
+            g[r] = where(group.on[i, r] > 0.0, g[r], -1.0)

@@ -1,0 +1,178 @@
+"""Windows that are searched side by side (interior_point.py), one in each lane: their steps one after the other,
+numbers of all windows behind each other in the last dimension, filled up to the longest one with steps that have
+no rows.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.lanes import size
+from planner.joint.laws import LawRows
+from planner.joint.legs import LegFormulas
+from planner.joint.problem import StepWindow
+from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, SWITCH, TUBE_NODE
+
+
+class Sizes(NamedTuple):
+    """Tuples of the lengths that are numbers in the machine code (lanes.py); A axes."""
+
+    axes: tuple[int, ...]
+    state: tuple[int, ...]  # S = 3 A
+    control: tuple[int, ...]  # C = A + 1
+    step: tuple[int, ...]  # S + C
+    width: tuple[int, ...]  # W lanes
+
+
+class Group(NamedTuple):
+    """The steps of up to W windows, in the units of each; limits of vectors are 1/limit^2."""
+
+    real: FloatArray  # (N, W) 1 for a step that the window has, else 0
+    last: FloatArray  # (N, W) 1 for its last one
+    on: FloatArray  # (N, R, W) 1 for a row that there is
+    base: FloatArray  # (N, A, W) of the step's leg, as the next four
+    drift: FloatArray  # (N, A, W)
+    start: FloatArray  # (N, A, W) the point where it begins
+    per_drift: FloatArray  # (N, W) 1/|drift|^2
+    length: FloatArray  # (N, W)
+    line: FloatArray  # (N, W) 1 where it is a line that is not passed
+    bent: FloatArray  # (N, W) 1 where it is an arc or a curve that is not passed
+    begins: FloatArray  # (N, W) 1 where the window's first step on a leg is
+    ends: FloatArray  # (N, W) 1 for the last one
+    at_vertex: FloatArray  # (N, W) 1 where the node is where the leg begins
+    per_box: FloatArray  # (4, A, W) 1/limit of jerk, acceleration, velocity, velocity
+    room: FloatArray  # (N, W)
+    room_node: FloatArray  # (N, W)
+    feed: FloatArray  # (N, W) the square of the limit
+    feed_node: FloatArray  # (N, W)
+    normal: FloatArray  # (N, W) the limit
+    normal_node: FloatArray  # (N, W)
+    pace: FloatArray  # (N, W)
+    per_h: FloatArray  # (N, W) 1/h of the guess
+    h: FloatArray  # (N, W)
+    h_max: FloatArray  # (N, W)
+    h_min: FloatArray  # (N, W)
+    switch: FloatArray  # (N, W) over tolerance and pace
+    switch_at: FloatArray  # (N, A, W) the vertex
+    smooth: FloatArray  # (N, W) twice the weight of jerk^2, in time
+    centre: FloatArray  # (N, W) in time, 0 where the row is not
+    per_step: FloatArray  # (N, W) 1/step_max
+    aside: FloatArray  # (1, W)
+
+
+class Bends(NamedTuple):
+    """What is worked out for one lane after the other."""
+
+    leg: Array  # (N, W) of `legs`
+    bent: Array  # (N, W) whether it is an arc or a curve
+    passed: Array  # (N, W) whether it is passed
+    turns: Array  # (N, W) whether the step turns far
+    bound: Array  # (N, W) whether it has rows of the normal acceleration
+    target: FloatArray  # (N or 0, 3, A, W)
+    steps: Array  # (W,) of each window
+    legs: LegFormulas  # of all windows
+    laws: tuple[LawRows, ...]  # of each
+    any_bent: bool
+    any_own: bool  # whether there are rows with derivatives of their own
+    any_normal: bool  # whether there are rows of the normal acceleration at nodes
+    any_switch: bool
+
+
+def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
+    """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 3, W) of them."""
+    axes = windows[0].u.shape[1] - 1
+    counts = [len(one.u) for one in windows]
+    N, R = max(counts), max(one.limits.on.shape[1] for one in windows)
+
+    def stack(of: list[Any], fill: float = 0.0, rows: int = N) -> FloatArray:
+        """Numbers of all steps, those of lanes behind each other."""
+        out: FloatArray = np.full((rows, *np.shape(of[0])[1:], width), fill)
+        for lane, one in enumerate(of):
+            out[: len(one), ..., lane] = one
+        return out
+
+    def each(name: str, fill: float = 0.0) -> FloatArray:
+        return stack([getattr(one.limits, name) for one in windows], fill)
+
+    first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
+    curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
+    together = [
+        np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields
+    ]
+    legs = LegFormulas(*together)
+    offset = np.repeat(curves[:-1], np.diff(first))
+    legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
+    leg = [one.limits.leg + begin for one, begin in zip(windows, first, strict=False)]
+    of = np.concatenate(leg)
+    square = (legs.drift**2).sum(axis=1)
+    start = legs.base + legs.radius[:, None] * legs.e1
+    passed = [one.limits.passed for one in windows]
+    bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
+    vertex = [start[one.limits.switch_leg + begin] for one, begin in zip(windows, first, strict=False)]
+    boxes = [1.0 / one.limits.box for one in windows]
+    tube = 8 * axes + TUBE_NODE
+    on = np.zeros((N, R, width))
+    own = np.zeros((N, width), dtype=bool)
+    for lane, one in enumerate(windows):
+        there = one.limits.on
+        on[: len(there), : there.shape[1], lane] = there
+        own[: len(there), lane] = there[:, 8 * axes + NORMAL_ROWS]
+    group = Group(
+        real=stack([np.ones(count) for count in counts]),
+        last=stack([np.arange(count) == count - 1 for count in counts]),
+        on=on,
+        base=stack([legs.base[at] for at in leg]),
+        drift=stack([legs.drift[at] for at in leg]),
+        start=stack([start[at] for at in leg]),
+        per_drift=stack([1.0 / square[at] for at in leg], 1.0),
+        length=stack([legs.length[at] for at in leg], 1.0),
+        line=stack([(legs.radius[at] == 0.0) & ~now for at, now in zip(leg, passed, strict=True)]),
+        bent=stack(bent),
+        begins=stack([np.diff(at, prepend=-1) != 0 for at in leg]),
+        ends=stack([np.diff(at, append=-1) != 0 for at in leg]),
+        at_vertex=each("at_vertex"),
+        per_box=stack(boxes, 1.0, 4),
+        room=1.0 / each("room", 1.0) ** 2,
+        room_node=1.0 / each("room_node", 1.0) ** 2,
+        feed=each("feed", 1.0) ** 2,
+        feed_node=1.0 / each("feed_node", 1.0) ** 2,
+        normal_node=1.0 / each("normal_node", 1.0) ** 2,
+        normal=each("normal", 1.0),
+        pace=each("pace", 1.0),
+        per_h=1.0 / each("h", 1.0),
+        h=each("h", 1.0),
+        h_max=each("h_max", 2.0),
+        h_min=each("h_min", 0.5),
+        switch=stack([one.limits.switch / (one.limits.room_node * one.limits.pace) for one in windows]),
+        switch_at=stack(vertex),
+        smooth=2.0 * each("smooth") * each("h"),
+        centre=each("centre") * each("h") * on[:, tube],
+        per_step=1.0 / each("step_max", 1.0),
+        aside=stack([np.array([one.limits.aside]) for one in windows], 0.0, 1),
+    )
+    lanes = [*windows, *[windows[0]] * (width - len(windows))]
+    targets = any(now.any() for now in passed)
+    bends = Bends(
+        leg=stack(leg).astype(int),
+        bent=stack(bent).astype(bool),
+        passed=stack(passed).astype(bool),
+        turns=each("turns").astype(bool),
+        bound=own,
+        target=each("target") if targets else np.zeros((0, 3, axes, width)),
+        steps=np.array([*counts, *[0] * (width - len(windows))]),
+        legs=legs,
+        laws=tuple(one.limits.laws for one in lanes),
+        any_bent=targets or any(now.any() for now in bent),
+        any_own=bool(own.any()) or any(len(one.limits.laws.kind) for one in windows),
+        any_normal=bool(on[:, 8 * axes + NORMAL_NODE].any()),
+        any_switch=bool(on[:, 8 * axes + SWITCH].any()),
+    )
+    x = stack([one.x for one in windows], 0.0, N + 1)
+    u = stack([one.u for one in windows])
+    for lane, count in enumerate(counts):
+        x[count + 1 :, :axes, lane] = x[count, :axes, lane]
+        u[count:, axes, lane] = 1.0
+    u[:, axes, len(windows) :] = 1.0
+    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width))
+    return sizes, group, bends, x, u, stack([one.place for one in windows])

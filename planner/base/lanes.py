@@ -1,7 +1,7 @@
 """Numbers side by side for kernels: a value of `WIDTH` float64 that one instruction of the processor works on.
 
-A kernel that is written for numbers works on lanes as well: with `wide` an array (.., WIDTH) of float64 becomes an array
-(..) of lanes, and with an array (.., 1) the same kernel works on single numbers, which is its reference. What it may not do
+A kernel that is written for numbers works on lanes as well: with `wide1` to `wide3` an array (.., WIDTH) of float64 becomes
+a view (..) of lanes, and with an array (.., 1) the same kernel works on single numbers, which is its reference. What it may not do
 is branch on a comparison of lanes: that gives a mask, by which `where` chooses and which `anywhere` looks into.
 
 `vector` and `matrix` are pieces of memory of the function that asks for them, on its stack. Their sizes, like all sizes
@@ -14,9 +14,8 @@ import operator
 
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.imputils import impl_ret_borrowed
 from numba.core.typeconv import Conversion
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 from numba.extending import (
     intrinsic,
     lower_builtin,
@@ -26,7 +25,7 @@ from numba.extending import (
 )
 
 WIDTH = 4  # float64 in a register of AVX2
-_ANY = 8  # byte to which lanes are aligned: numpy promises no more
+_BYTES = 8  # to which lanes are aligned in memory: numpy promises no more
 
 
 class _Lanes(types.Type):
@@ -209,45 +208,152 @@ def put(typingctx, value, lane, number):
     return value(value, types.intp, types.float64), lower
 
 
-def _array_of(context, builder, of, data, shape, owner=None):
-    """The array of that type at `data` with that shape, in memory that belongs to the owner."""
-    array = context.make_array(of)(context, builder)
-    size = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(of.dtype)))
-    strides, step = [], size
-    for extent in reversed(shape):
-        strides.insert(0, step)
-        step = builder.mul(step, extent)
-    context.populate_array(
-        array,
-        data=builder.bitcast(data, array.data.type),
-        shape=shape,
-        strides=strides,
-        itemsize=size,
-        meminfo=owner,
-        parent=None,
+class View(types.Type):
+    """An array in memory that lives long enough, which nobody counts the uses of: where it begins, and the sizes of its
+    dimensions behind the first that are no numbers in the machine code.
+
+    inner : of those dimensions the sizes, None where it is not known when it is compiled
+    """
+
+    def __init__(self, dtype, inner, outer=None):
+        self.dtype, self.inner, self.outer = dtype, inner, outer
+        super().__init__(name=f"view({dtype}, {inner}, {outer})")
+
+
+@register_model(View)
+class _ViewModel(models.StructModel):
+    def __init__(self, dmm, fe_type):
+        unknown = [(f"size{d}", types.intp) for d, n in enumerate(fe_type.inner) if n is None]
+        super().__init__(dmm, fe_type, [("data", types.CPointer(fe_type.dtype)), *unknown])
+
+
+def _is_index(index):
+    return isinstance(index, types.Integer) or (
+        isinstance(index, types.BaseTuple) and all(isinstance(one, types.Integer) for one in index)
     )
-    return array
+
+
+def _indexed(view, index):
+    """The type of what is at an index."""
+    count = 1 if isinstance(index, types.Integer) else len(index)
+    if count > len(view.inner):
+        return view.dtype
+    return View(view.dtype, view.inner[count:], view.inner[count - 1])
+
+
+@infer_global(operator.getitem)
+class _ViewGet(AbstractTemplate):
+    def generic(self, args, kws):
+        view, index = args
+        if isinstance(view, View) and _is_index(index):
+            return signature(_indexed(view, index), view, index)
+        return None
+
+
+@infer_global(operator.setitem)
+class _ViewSet(AbstractTemplate):
+    def generic(self, args, kws):
+        view, index, _ = args
+        if isinstance(view, View) and (_is_index(index) or index == types.slice2_type):
+            return signature(types.none, view, index, view.dtype)
+        return None
+
+
+def _place(context, builder, view, value, index_type, index):
+    """Where an index is, and the sizes behind the first dimension."""
+    given = cgutils.create_struct_proxy(view)(context, builder, value)
+    sizes = [
+        getattr(given, f"size{d}") if n is None else context.get_constant(types.intp, n)
+        for d, n in enumerate(view.inner)
+    ]
+    one = isinstance(index_type, types.Integer)
+    at = [index] if one else cgutils.unpack_tuple(builder, index, len(index_type))
+    of = [index_type] if one else list(index_type)
+    at = [
+        context.cast(builder, value, kind, types.intp)
+        for value, kind in zip(at, of, strict=True)
+    ]
+    offset = at[0]
+    for d, extent in enumerate(sizes):
+        offset = builder.mul(offset, extent)
+        if d + 1 < len(at):
+            offset = builder.add(offset, at[d + 1])
+    return builder.gep(given.data, [offset]), sizes
+
+
+@lower_builtin(operator.getitem, View, types.Any)
+def _get(context, builder, sig, args):
+    view, index = sig.args
+    place, sizes = _place(context, builder, view, args[0], index, args[1])
+    made = sig.return_type
+    if not isinstance(made, View):
+        return builder.load(place, align=_BYTES)
+    out = cgutils.create_struct_proxy(made)(context, builder)
+    out.data = place
+    rest = sizes[len(sizes) - len(made.inner) :]
+    for d, n in enumerate(made.inner):
+        if n is None:
+            setattr(out, f"size{d}", rest[d])
+    return out._getvalue()
+
+
+@lower_builtin(operator.setitem, View, types.Any, types.Any)
+def _set(context, builder, sig, args):
+    view, index, _ = sig.args
+    if index != types.slice2_type:
+        builder.store(args[2], _place(context, builder, view, args[0], index, args[1])[0], align=_BYTES)
+        return
+    number = view.outer  # all of it, where its size is known
+    for n in view.inner:
+        number *= n
+    data = cgutils.create_struct_proxy(view)(context, builder, args[0]).data
+    with cgutils.for_range(builder, context.get_constant(types.intp, number)) as loop:
+        builder.store(args[2], builder.gep(data, [loop.index]), align=_BYTES)
+
+
+def _viewed(dtype, given):
+    """Type and code of a view of an array, whose sizes behind the first are lengths of tuples, or numbers."""
+    counts = tuple(one.count if isinstance(one, types.UniTuple) else None for one in given)
+    made = View(dtype, counts)
+
+    def lower(context, builder, sig, args):
+        array = context.make_array(sig.args[0])(context, builder, args[0])
+        out = cgutils.create_struct_proxy(made)(context, builder)
+        out.data = builder.bitcast(array.data, out.data.type)
+        for d, n in enumerate(counts):
+            if n is None:
+                setattr(out, f"size{d}", context.cast(builder, args[2 + d], given[d], types.intp))
+        return out._getvalue()
+
+    return made, lower
 
 
 @intrinsic
-def wide(typingctx, array, width):
-    """An array (.., WIDTH) as an array (..) of lanes, or (.., 1) as one of numbers: the length of the tuple `width`."""
-    of = types.float64 if width.count == 1 else lanes
-    made = types.Array(of, array.ndim - 1, "C", aligned=width.count == 1)
-
-    def lower(context, builder, sig, args):
-        given = context.make_array(array)(context, builder, args[0])
-        shape = cgutils.unpack_tuple(builder, given.shape, array.ndim)[:-1]
-        array_of = _array_of(context, builder, made, given.data, shape, given.meminfo)._getvalue()
-        return impl_ret_borrowed(context, builder, made, array_of)
-
+def wide1(typingctx, array, width):
+    """An array (N, WIDTH) as a view (N,) of lanes, or (N, 1) of numbers: the length of the tuple `width`. The array has to
+    live as long."""
+    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [])
     return made(array, width), lower
 
 
+@intrinsic
+def wide2(typingctx, array, width, n):
+    """`wide1` of (N, n, WIDTH); n the length of a tuple, or a number."""
+    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n])
+    return made(array, width, n), lower
+
+
+@intrinsic
+def wide3(typingctx, array, width, n, m):
+    """`wide2` of (N, n, m, WIDTH)."""
+    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n, m])
+    return made(array, width, n, m), lower
+
+
 def _on_stack(dtype, sizes):
-    """Type and code of an array on the stack, as large as the lengths of the tuples are."""
+    """Type and code of a view of memory on the stack, as large as the lengths of the tuples are."""
     counts = [one.count for one in sizes]
-    made = types.Array(dtype, len(counts), "C", aligned=dtype != lanes)
+    made = View(dtype, tuple(counts[1:]), counts[0])
 
     def lower(context, builder, sig, args):
         number = 1
@@ -256,15 +362,16 @@ def _on_stack(dtype, sizes):
         with builder.goto_entry_block():
             data = builder.alloca(ir.ArrayType(context.get_data_type(dtype), number))
             data.align = 32
-        shape = [context.get_constant(types.intp, count) for count in counts]
-        return _array_of(context, builder, made, data, shape)._getvalue()
+        out = cgutils.create_struct_proxy(made)(context, builder)
+        out.data = builder.bitcast(data, out.data.type)
+        return out._getvalue()
 
     return made, lower
 
 
 @intrinsic
 def vector(typingctx, like, n):
-    """An array (n,) on the stack of what the array `like` is of, with anything in it; n the length of a tuple."""
+    """A view (n,) of memory on the stack for what the view `like` is of, with anything in it; n the length of a tuple."""
     made, lower = _on_stack(like.dtype, [n])
     return made(like, n), lower
 
@@ -274,13 +381,6 @@ def matrix(typingctx, like, n, m):
     """`vector` (n, m)."""
     made, lower = _on_stack(like.dtype, [n, m])
     return made(like, n, m), lower
-
-
-@intrinsic
-def cube(typingctx, like, n, m, k):
-    """`vector` (n, m, k)."""
-    made, lower = _on_stack(like.dtype, [n, m, k])
-    return made(like, n, m, k), lower
 
 
 def size(n):

@@ -41,7 +41,7 @@ TUBE_VECTOR = (P, C1, C2)
 TUBE_SECOND = (P, P, NEXT)  # second vectors of the rows of the tolerance on arcs
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _add_vector(sizes, W, alpha, e, m, G):
     """W += J'GJ for the vector m with dy = J d."""
     axes = len(sizes.axes)
@@ -64,7 +64,7 @@ FIRST_BLOCK = np.array([0, 1, 2, 3, 1, 1, 1, 1, 0, 0, 1, 1, 0])
 LAST_BLOCK = np.array([0, 1, 2, 3, 2, 2, 3, 3, 1, 2, 2, 2, 3])
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _add_square(sizes, W, row, by):
     """W += by row row', row (4 A + 1,)."""
     for s in range(len(sizes.step)):
@@ -73,7 +73,7 @@ def _add_square(sizes, W, row, by):
             W[s, t] += one * row[t]
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _add_to_row(sizes, row, alpha, e, m, k, by):
     """row (4 A + 1,) += what a derivative `by` by the k-th number of the vector m is by p, v, a, j and h."""
     axes = len(sizes.axes)
@@ -82,7 +82,7 @@ def _add_to_row(sizes, row, alpha, e, m, k, by):
     row[4 * axes] += e[m, k] * by
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_second_row(sizes, group, rows, i, c, y, alpha, e, row):
     """row (4 A + 1,) = the derivative of the row of the inner control point c on an arc, or of SWITCH (c = 0)."""
     row[:] = 0.0
@@ -95,7 +95,7 @@ def put_second_row(sizes, group, rows, i, c, y, alpha, e, row):
             _add_to_row(sizes, row, alpha, e, V, k, group.switch[i] * (y[P, k] - group.switch_at[i, k]))
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _put_ball(axes, G, y, m, square, flat):
     """G = square y y' + flat."""
     for k in range(axes):
@@ -105,7 +105,7 @@ def _put_ball(axes, G, y, m, square, flat):
         G[k, k] += flat
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_model(sizes, group, bends, rows, i, motion, room, W):
     """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i. motion: y, alpha and e of it; room: G (A, A) and a
     row (4 A + 1,)."""
@@ -182,7 +182,7 @@ def put_model(sizes, group, bends, rows, i, motion, room, W):
         put_second_row(sizes, group, rows, i, 0, y, alpha, e, row)
         _add_square(sizes, W, row, z[more + SWITCH] * per_s[more + SWITCH])
     if bends.any_own:
-        for r in range(rows.own.shape[1]):
+        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             of = more + NORMAL_ROWS + r
             _add_square(sizes, W, rows.own[i, r], z[of] * per_s[of])
 
@@ -196,7 +196,7 @@ def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
         if i >= bends.steps[lane]:
             continue
         copy_lane(sizes, lane, x[i], u[i], scratch)
-        for r in range(rows.own.shape[1]):
+        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             scratch.g[r] = pick(rows.z[i, more + r], lane)
         scratch.W[:] = 0.0
         pace, laws = pick(group.pace[i], lane), bends.laws[lane]
@@ -220,7 +220,7 @@ def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
                 W[s, t] = put(W[s, t], lane, pick(W[s, t], lane) + scratch.W[s, t])
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def push_of(group, rows, i, r, aim, second):
     """What a row's gradient counts with in the step towards s z = aim, less the product of the steps before as far as
     `second` is 1."""
@@ -228,7 +228,7 @@ def push_of(group, rows, i, r, aim, second):
     return group.on[i, r] * (left + rows.z[i, r] * (rows.g[i, r] + rows.s[i, r])) * rows.per_s[i, r]
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
     """w (4 A + 1,) = the sum of q grad g of step i; motion: y, alpha and e of it, F (13, A) is overwritten."""
     y, alpha, e = motion
@@ -280,13 +280,13 @@ def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
     shorter = push_of(group, rows, i, more + H_MIN, aim, second)
     w[4 * axes] += (longer - shorter) * group.per_h[i]
     if bends.any_own:
-        for r in range(rows.own.shape[1]):
+        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             q = push_of(group, rows, i, more + NORMAL_ROWS + r, aim, second)
             for k in range(len(sizes.step)):
                 w[k] += q * rows.own[i, r, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_slopes(sizes, group, bends, rows, i, motion, d, dy, out):
     """out (R,) = the change of every row of step i in a step d (4 A + 1,) of p, v, a, j and h; motion: y, alpha and e of
     it, dy (13, A) is overwritten."""
@@ -320,7 +320,7 @@ def put_slopes(sizes, group, bends, rows, i, motion, d, dy, out):
             if bends.any_bent and c > 0:
                 total += rows.node[i, c, k] * dy[TUBE_SECOND[c], k]
         out[more + TUBE_NODE + c] = total
-    for r in range(more + ORDER_NODE, out.shape[0]):
+    for r in range(more + ORDER_NODE, sizes.rows):
         out[r] = 0.0
     if bends.any_bent:
         node, mid, arc = 0.0 * dh, 0.0 * dh, 0.0 * dh
@@ -341,7 +341,7 @@ def put_slopes(sizes, group, bends, rows, i, motion, d, dy, out):
             total += y[V, k] * dy[P, k] + (y[P, k] - group.switch_at[i, k]) * dy[V, k]
         out[more + SWITCH] = total * group.switch[i]
     if bends.any_own:
-        for r in range(rows.own.shape[1]):
+        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             total = 0.0 * dh
             for k in range(len(sizes.step)):
                 total += rows.own[i, r, k] * d[k]

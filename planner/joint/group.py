@@ -23,6 +23,8 @@ class Sizes(NamedTuple):
     control: tuple[int, ...]  # C = A + 1
     step: tuple[int, ...]  # S + C
     width: tuple[int, ...]  # W lanes
+    steps: int  # N
+    rows: int  # R
 
 
 class Group(NamedTuple):
@@ -174,5 +176,5 @@ def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends
         x[count + 1 :, :axes, lane] = x[count, :axes, lane]
         u[count:, axes, lane] = 1.0
     u[:, axes, len(windows) :] = 1.0
-    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width))
+    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R)
     return sizes, group, bends, x, u, stack([one.place for one in windows])

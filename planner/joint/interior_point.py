@@ -37,9 +37,11 @@ from planner.base.lanes import (
     smaller,
     vector,
     where,
-    wide,
+    wide1,
+    wide2,
+    wide3,
 )
-from planner.joint.group import Group, group_of
+from planner.joint.group import Bends, Group, Sizes, group_of
 from planner.joint.problem import StepWindow
 from planner.joint.recursion import END, Factor, Room, backward, factor_steps, forward, gaps
 from planner.joint.rows import NORMAL_ROWS, TUBE_NODE, VECTORS, Rows, Scratch, put_rows
@@ -89,6 +91,43 @@ class Solved(NamedTuple):
     z: FloatArray  # (N, R) multipliers of the rows, in units of time
 
 
+class _Work(NamedTuple):
+    """Memory of a group: of its rows, of the recursion (recursion.py) and for places."""
+
+    g: FloatArray
+    s: FloatArray
+    z: FloatArray
+    per_s: FloatArray
+    ds: FloatArray
+    dz: FloatArray
+    moves: FloatArray
+    per_radius: FloatArray
+    n: FloatArray
+    node: FloatArray
+    tangent: FloatArray
+    own: FloatArray
+    K: FloatArray
+    L: FloatArray
+    push: FloatArray
+    dx: FloatArray
+    du: FloatArray
+    gap: FloatArray
+    slope: FloatArray
+    nearest: FloatArray
+    top: FloatArray
+
+
+def _work_of(sizes: Sizes, bends: Bends) -> _Work:
+    """Memory of a group, all 0."""
+    N, R, W = sizes.steps, sizes.rows, len(sizes.width)
+    A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
+    bent, own = N if bends.any_bent else 0, N if bends.any_own else 0
+    shapes = [(N, R)] * 6 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
+    shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
+    shapes += [(N, S), (R,), (N, 3), (N,)]
+    return _Work(*(np.zeros((*shape, W)) for shape in shapes))
+
+
 class _Found(NamedTuple):
     """Of all lanes, set as each of them ends."""
 
@@ -104,69 +143,69 @@ _VECTORS, _BLOCKS, _THREE = size(VECTORS), size(4), size(3)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _lanes_of(group, width):
+def _lanes_of(sizes, group):
     """The numbers of a group as lanes."""
+    width = sizes.width
     return Group(
-        wide(group.real, width),
-        wide(group.last, width),
-        wide(group.on, width),
-        wide(group.base, width),
-        wide(group.drift, width),
-        wide(group.start, width),
-        wide(group.per_drift, width),
-        wide(group.length, width),
-        wide(group.line, width),
-        wide(group.bent, width),
-        wide(group.begins, width),
-        wide(group.ends, width),
-        wide(group.at_vertex, width),
-        wide(group.per_box, width),
-        wide(group.room, width),
-        wide(group.room_node, width),
-        wide(group.feed, width),
-        wide(group.feed_node, width),
-        wide(group.normal, width),
-        wide(group.normal_node, width),
-        wide(group.pace, width),
-        wide(group.per_h, width),
-        wide(group.h, width),
-        wide(group.h_max, width),
-        wide(group.h_min, width),
-        wide(group.switch, width),
-        wide(group.switch_at, width),
-        wide(group.smooth, width),
-        wide(group.centre, width),
-        wide(group.per_step, width),
-        wide(group.aside, width),
+        wide1(group.real, width),
+        wide1(group.last, width),
+        wide2(group.on, width, sizes.rows),
+        wide2(group.base, width, sizes.axes),
+        wide2(group.drift, width, sizes.axes),
+        wide2(group.start, width, sizes.axes),
+        wide1(group.per_drift, width),
+        wide1(group.length, width),
+        wide1(group.line, width),
+        wide1(group.bent, width),
+        wide1(group.begins, width),
+        wide1(group.ends, width),
+        wide1(group.at_vertex, width),
+        wide2(group.per_box, width, sizes.axes),
+        wide1(group.room, width),
+        wide1(group.room_node, width),
+        wide1(group.feed, width),
+        wide1(group.feed_node, width),
+        wide1(group.normal, width),
+        wide1(group.normal_node, width),
+        wide1(group.pace, width),
+        wide1(group.per_h, width),
+        wide1(group.h, width),
+        wide1(group.h_max, width),
+        wide1(group.h_min, width),
+        wide1(group.switch, width),
+        wide2(group.switch_at, width, sizes.axes),
+        wide1(group.smooth, width),
+        wide1(group.centre, width),
+        wide1(group.per_step, width),
+        wide1(group.aside, width),
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _rows_of(sizes, N, R, bends, place):
-    """Memory for the rows of N steps, R of each, all 0."""
-    axes, width, more = len(sizes.axes), len(sizes.width), R - 8 * len(sizes.axes) - NORMAL_ROWS
-    w, bent, own = sizes.width, N if bends.any_bent else 0, N if bends.any_own else 0
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _rows_of(sizes, work, place):
+    """The rows in their memory."""
+    w, axes, own = sizes.width, sizes.axes, sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS
     return Rows(
-        wide(np.zeros((N, R, width)), w),
-        wide(np.zeros((N, R, width)), w),
-        wide(np.zeros((N, R, width)), w),
-        wide(np.zeros((N, R, width)), w),
-        wide(np.zeros((N, R, width)), w),
-        wide(np.zeros((N, R, width)), w),
+        wide2(work.g, w, sizes.rows),
+        wide2(work.s, w, sizes.rows),
+        wide2(work.z, w, sizes.rows),
+        wide2(work.per_s, w, sizes.rows),
+        wide2(work.ds, w, sizes.rows),
+        wide2(work.dz, w, sizes.rows),
         place,
-        wide(np.zeros((N, 3, width)), w),
-        wide(np.zeros((N, 3, width)), w),
-        wide(np.zeros((N, 3, axes, width)), w),
-        wide(np.zeros((bent, 3, axes, width)), w),
-        wide(np.zeros((bent, 3, axes, width)), w),
-        wide(np.zeros((own, more, len(sizes.step), width)), w),
+        wide2(work.moves, w, _THREE),
+        wide2(work.per_radius, w, _THREE),
+        wide3(work.n, w, _THREE, axes),
+        wide3(work.node, w, _THREE, axes),
+        wide3(work.tangent, w, _THREE, axes),
+        wide3(work.own, w, own, sizes.step),
     )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _start(group, rows, time, tuning):
+def _start(sizes, group, rows, time, tuning):
     """Slacks and multipliers of a start. Returns how many rows there are."""
-    N, R = rows.g.shape
+    N, R = sizes.steps, sizes.rows
     count = 0.0 * time
     for i in range(N):
         for r in range(R):
@@ -181,9 +220,9 @@ def _start(group, rows, time, tuning):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _step(rows, along, dual):
+def _step(sizes, rows, along, dual):
     """Slacks and multipliers after the shares `along` and `dual` of their steps."""
-    N, R = rows.g.shape
+    N, R = sizes.steps, sizes.rows
     for i in range(N):
         for r in range(R):
             rows.s[i, r] += along * rows.ds[i, r]
@@ -192,9 +231,9 @@ def _step(rows, along, dual):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _look(rows, zero):
+def _look(sizes, rows, zero):
     """The sum of s z, the largest row, and the most that is missing of g + s = 0 of active ones (z > s)."""
-    N, R = rows.g.shape
+    N, R = sizes.steps, sizes.rows
     products, broken, missed = zero, zero, zero
     for i in range(N):
         for r in range(R):
@@ -206,9 +245,9 @@ def _look(rows, zero):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _durations(group, u, zero):
+def _durations(sizes, group, u, zero):
     """The time of each window."""
-    N, last = len(u), u.shape[1] - 1
+    N, last = sizes.steps, len(sizes.axes)
     time = zero
     for i in range(N):
         time += group.real[i] * u[i, last]
@@ -216,17 +255,17 @@ def _durations(group, u, zero):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _end(lane, done, iteration, group, rows, x, u, found):
+def _end(sizes, lane, done, iteration, group, rows, x, u, found):
     """Set what one lane has come to. What holds a node off its leg against the pull does so for the time, like the row
     itself."""
     found.done[lane], found.iterations[lane] = done, iteration
-    N, R = rows.g.shape
-    tube = 8 * (u.shape[1] - 1) + TUBE_NODE
+    N, R = sizes.steps, sizes.rows
+    tube = 8 * len(sizes.axes) + TUBE_NODE
     for i in range(N + 1):
-        for s in range(x.shape[1]):
+        for s in range(len(sizes.state)):
             found.x[i, s] = put(found.x[i, s], lane, pick(x[i, s], lane))
     for i in range(N):
-        for c in range(u.shape[1]):
+        for c in range(len(sizes.control)):
             found.u[i, c] = put(found.u[i, c], lane, pick(u[i, c], lane))
         for c in range(3):
             found.place[i, c] = put(found.place[i, c], lane, pick(rows.place[i, c], lane))
@@ -238,34 +277,31 @@ def _end(lane, done, iteration, group, rows, x, u, found):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
-def solve_group(sizes, numbers, bends, motion, tuning, found, at):
+def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 3, W),
     which is overwritten; tuning (7, W). What each comes to is set in `found`. Meanwhile at[0] is the iteration."""
-    width, group, axes = sizes.width, _lanes_of(numbers, sizes.width), len(sizes.axes)
-    x, u, place = wide(motion[0], width), wide(motion[1], width), wide(motion[2], width)
-    tuned = wide(tuning, width)
+    width, group, axes = sizes.width, _lanes_of(sizes, numbers), len(sizes.axes)
+    N, R, S, C = sizes.steps, sizes.rows, len(sizes.state), len(sizes.control)
+    x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
+    rows = _rows_of(sizes, work, wide2(motion[2], width, _THREE))
+    tuned = wide1(tuning, width)
     tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
-    N, R, S, C = len(u), group.on.shape[1], len(sizes.state), len(sizes.control)
     ends = _Found(
-        wide(found.x, width),
-        wide(found.u, width),
-        wide(found.place, width),
-        wide(found.z, width),
+        wide2(found.x, width, sizes.state),
+        wide2(found.u, width, sizes.control),
+        wide2(found.place, width, _THREE),
+        wide2(found.z, width, R),
         found.done,
         found.iterations,
     )
-    rows = _rows_of(sizes, N, R, bends, place)
-    W = len(sizes.width)
     factor = Factor(
-        wide(np.zeros((N, C, S, W)), width),
-        wide(np.zeros((N, C, C, W)), width),
-        wide(np.zeros((N, S, W)), width),
-        wide(np.zeros((N + 1, S, W)), width),
-        wide(np.zeros((N, C, W)), width),
+        wide3(work.K, width, sizes.control, sizes.state),
+        wide3(work.L, width, sizes.control, sizes.control),
+        wide2(work.push, width, sizes.state),
+        wide2(work.dx, width, sizes.state),
+        wide2(work.du, width, sizes.control),
     )
-    gap = wide(np.zeros((N, S, W)), width)
-    slope = wide(np.zeros((R, W)), width)
-    nearest, top = wide(np.zeros((N, 3, W)), width), wide(np.zeros((N, W)), width)
+    gap = wide2(work.gap, width, sizes.state)
     y, e = matrix(x, _VECTORS, sizes.axes), matrix(x, _VECTORS, sizes.axes)
     room = Room(
         y,
@@ -282,7 +318,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
         vector(x, sizes.state),
         vector(x, sizes.state),
         vector(x, sizes.control),
-        slope,
+        wide1(work.slope, width),
     )
     L = R - 8 * axes - NORMAL_ROWS
     scratch = Scratch(
@@ -301,11 +337,11 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
-    looking = y, e, nearest, top
+    looking = y, e, wide2(work.nearest, width, _THREE), wide1(work.top, width)
     put_rows(sizes, group, bends, x, u, rows, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
-    time = _durations(group, u, zero)
-    count = _start(group, rows, time, tune)
+    time = _durations(sizes, group, u, zero)
+    count = _start(sizes, group, rows, time, tune)
     prox, before, close, still, settled = tune.prox, time, zero, zero, zero
     rho, off_before, slow = zero + END, zero + np.inf, zero
     active = zero
@@ -313,8 +349,8 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
         active = put(active, lane, 1.0 if bends.steps[lane] else 0.0)
     for iteration in range(ITERATIONS + 1):
         at[0] = iteration
-        products, broken, missed = _look(rows, zero)
-        now = _durations(group, u, zero)
+        products, broken, missed = _look(sizes, rows, zero)
+        now = _durations(sizes, group, u, zero)
         close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)
         rests = where(magnitude(now - before) <= STILL * tune.gap * time, still + 1.0, zero)
         still = where(close > 0.0, rests, zero)
@@ -334,7 +370,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
         if anywhere(active * (reached + lost) > 0.0):
             for lane in range(len(sizes.width)):
                 if pick(active, lane) > 0.0 and pick(reached + lost, lane) > 0.0:
-                    _end(lane, pick(reached, lane) > 0.0, iteration, group, rows, x, u, ends)
+                    _end(sizes, lane, pick(reached, lane) > 0.0, iteration, group, rows, x, u, ends)
                     active = put(active, lane, 0.0)
         if not anywhere(active > 0.0):
             break
@@ -344,7 +380,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
         if anywhere(active * bad > 0.0):
             for lane in range(len(sizes.width)):
                 if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
-                    _end(lane, False, iteration, group, rows, x, u, ends)
+                    _end(sizes, lane, False, iteration, group, rows, x, u, ends)
                     active = put(active, lane, 0.0)
         aim, along, dual, second = zero, zero, zero, zero
         for phase in range(2):
@@ -369,7 +405,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, found, at):
                 u[i, k] += along * factor.du[i, k]
         put_rows(sizes, group, bends, x, u, rows, looking, scratch)
         gap_most, off = gaps(sizes, group, x, u, gap)
-        _step(rows, along, dual)
+        _step(sizes, rows, along, dual)
 
 
 def solve_windows(windows: list[tuple[StepWindow, Tuning]], at: FloatArray) -> list[Solved]:
@@ -384,7 +420,8 @@ def solve_windows(windows: list[tuple[StepWindow, Tuning]], at: FloatArray) -> l
         np.zeros(WIDTH, np.bool_),
         np.zeros(WIDTH, np.int64),
     )
-    solve_group(sizes, group, bends, tuple(motion), tuning, found, at)
+    work = _work_of(sizes, bends)
+    solve_group(sizes, group, bends, tuple(motion), tuning, work, found, at)
     solved = []
     for lane, (window, _) in enumerate(windows):
         N, R = window.limits.on.shape

@@ -58,7 +58,7 @@ class Room(NamedTuple):
     slope: FloatArray  # (R,)
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def step_of_h(x, u, axes, out):
     """out (3 A,) the derivative of the next node by h."""
     h = u[axes]
@@ -69,7 +69,7 @@ def step_of_h(x, u, axes, out):
         out[2 * axes + k] = j
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _factor_step(sizes, u, by_h, room, K, L, bad):
     """K and L of a step and P before it, by P behind it and W. Where a pivot is not positive 1 is added to `bad`."""
     axes, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
@@ -140,7 +140,7 @@ def _factor_step(sizes, u, by_h, room, K, L, bad):
 def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, scratch):
     """The recursion into `factor`: pull, the weight of (dh/h)^2, and rho of the last node. Where it breaks down what is
     returned is not 0."""
-    axes, S, N = len(sizes.axes), len(sizes.state), len(u)
+    axes, S, N = len(sizes.axes), len(sizes.state), sizes.steps
     P, W = room.P, room.W
     P[:] = 0.0
     bad = 0.0 * pull
@@ -174,7 +174,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
 def backward(sizes, group, bends, x, u, rows, pull, aim, second, end, factor, room):
     """The controls of the Newton step towards s z = aim (curvature.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
     is lambda of the last node."""
-    axes, S, C, N = len(sizes.axes), len(sizes.state), len(sizes.control), len(u)
+    axes, S, C, N = len(sizes.axes), len(sizes.state), len(sizes.control), sizes.steps
     p, rest, force, w = room.one, room.by_h, room.force, room.row
     by_h = room.PA[0]
     for s in range(S):
@@ -229,8 +229,8 @@ def forward(sizes, group, bends, x, u, gap, rows, aim, second, factor, room, end
         len(sizes.axes),
         len(sizes.state),
         len(sizes.control),
-        len(u),
-        rows.g.shape[1],
+        sizes.steps,
+        sizes.rows,
     )
     dx, du, d, by_h, slope = factor.dx, factor.du, room.row, room.by_h, room.slope
     none = 0.0 * aim
@@ -286,7 +286,7 @@ def forward(sizes, group, bends, x, u, gap, rows, aim, second, factor, room, end
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def gaps(sizes, group, x, u, out):
     """out (N, 3 A) = f(x, u) - the next node. Returns the largest one, and that at the last node."""
-    axes, N, S = len(sizes.axes), len(u), len(sizes.state)
+    axes, N, S = len(sizes.axes), sizes.steps, len(sizes.state)
     most, at_end = 0.0 * u[0, axes], 0.0 * u[0, axes]
     for i in range(N):
         h = u[i, axes]

@@ -139,7 +139,7 @@ def count(axes):
     return 8 * axes + MORE_ROWS
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_vectors(sizes, x, u, y, e):
     """y (13, A) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,). Returns u of the module
     text."""
@@ -167,7 +167,7 @@ def put_vectors(sizes, x, u, y, e):
     return turn
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_shares(h, turn, alpha):
     """alpha (13, 4) of a step of the duration h."""
     alpha[:] = 0.0
@@ -184,7 +184,7 @@ def put_shares(h, turn, alpha):
     alpha[NEXT, 2], alpha[NEXT, 3] = 0.5 * h * h, h * h * h * SIXTH
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _ball(axes, y, vector, per, row, g):
     """The row |y|^2 <= 1/per."""
     square = 0.0 * per
@@ -193,7 +193,7 @@ def _ball(axes, y, vector, per, row, g):
     g[row] = 0.5 * (square * per - 1.0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _put_radii(axes, x, u, square, per_radius):
     """1/r^2 of the rows of the feed (module text); `square` of its limit."""
     h = u[axes]
@@ -207,7 +207,7 @@ def _put_radii(axes, x, u, square, per_radius):
     per_radius[1] = 1.0 / larger(square + 16.0 / 12.0 * change - 16.0 / 72.0 * jerk, 0.01 * square)
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _place_on_line(axes, group, i, x, h, part):
     """The place on the leg of step i that is nearest to its node, first or second inner control point (0 to 2), or its
     end, the node x (3)."""
@@ -228,7 +228,7 @@ def put_places(sizes, group, x, u, rows, nearest, top):
     back as far as one place is near enough to what it passes twice. They are halfway between the largest nearest place
     before and the smallest one behind, so that the farthest is moved by as little as can be; nearest (N, 3) and
     top (N,) are overwritten."""
-    axes, N = len(sizes.axes), len(u)
+    axes, N = len(sizes.axes), sizes.steps
     low, end = 0.0 * u[0, axes], 0.0 * u[0, axes]
     for i in range(N):
         h = u[i, axes]
@@ -361,7 +361,7 @@ def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
             rows.own[i, r, k] = put(rows.own[i, r, k], lane, slope[r, k])
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def tangent_of(group, bends, rows, i, c, k):
     """Of the leg at the node (c = 0) or an inner control point."""
     if bends.any_bent:
@@ -373,7 +373,7 @@ def tangent_of(group, bends, rows, i, c, k):
 def put_rows(sizes, group, bends, x, u, rows, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
     on arcs begins. A row that is not there is -1. room: y and e (13, A), nearest (N, 3) and top (N,)."""
-    axes, N, R = len(sizes.axes), len(u), rows.g.shape[1]
+    axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
     y, e, nearest, top = room
     more = 8 * axes
     put_places(sizes, group, x, u, rows, nearest, top)

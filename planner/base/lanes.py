@@ -269,10 +269,7 @@ def _place(context, builder, view, value, index_type, index):
     one = isinstance(index_type, types.Integer)
     at = [index] if one else cgutils.unpack_tuple(builder, index, len(index_type))
     of = [index_type] if one else list(index_type)
-    at = [
-        context.cast(builder, value, kind, types.intp)
-        for value, kind in zip(at, of, strict=True)
-    ]
+    at = [context.cast(builder, value, kind, types.intp) for value, kind in zip(at, of, strict=True)]
     offset = at[0]
     for d, extent in enumerate(sizes):
         offset = builder.mul(offset, extent)

@@ -106,7 +106,7 @@ def _put_ball(axes, G, y, m, square, flat):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_model(sizes, group, bends, rows, i, motion, room, W):
+def put_model(sizes, group, rows, i, motion, room, W):
     """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i. motion: y, alpha and e of it; room: G (A, A) and a
     row (4 A + 1,)."""
     y, alpha, e = motion
@@ -139,7 +139,7 @@ def put_model(sizes, group, bends, rows, i, motion, room, W):
         of, per = more + FEED_ROWS + m, rows.per_radius[i, m]
         _put_ball(axes, G, y, FEED_1 + m, z[of] * per_s[of] * per * per, z[of] * per)
         _add_vector(sizes, W, alpha, e, FEED_1 + m, G)
-    if bends.any_normal:
+    if sizes.any_normal:
         of, per = more + NORMAL_NODE, group.normal_node[i]
         _put_ball(axes, G, y, ACROSS, z[of] * per_s[of] * per * per, z[of] * per)
         _add_vector(sizes, W, alpha, e, ACROSS, G)
@@ -149,24 +149,24 @@ def put_model(sizes, group, bends, rows, i, motion, room, W):
         flat = price * (group.room_node[i] if c == 0 else group.room[i])
         square, moving = z[of] * per_s[of], 0.0 * flat
         for k in range(axes):
-            tangent = tangent_of(group, bends, rows, i, c, k)
+            tangent = tangent_of(sizes, group, rows, i, c, k)
             moving += tangent * tangent
         slides = flat * rows.moves[i, c] / where(moving > 0.0, moving, 1.0)
         one_vector = square
-        if bends.any_bent and c > 0:
+        if sizes.any_bent and c > 0:
             one_vector = where(group.bent[i] > 0.0, 0.0, square)
             put_second_row(sizes, group, rows, i, c, y, alpha, e, row)
             _add_square(sizes, W, row, square - one_vector)
         for k in range(axes):
             along = one_vector * rows.n[i, c, k]
-            slide = slides * tangent_of(group, bends, rows, i, c, k)
+            slide = slides * tangent_of(sizes, group, rows, i, c, k)
             for t in range(axes):
-                G[k, t] = along * rows.n[i, c, t] - slide * tangent_of(group, bends, rows, i, c, t)
+                G[k, t] = along * rows.n[i, c, t] - slide * tangent_of(sizes, group, rows, i, c, t)
             G[k, k] += flat
         _add_vector(sizes, W, alpha, e, TUBE_VECTOR[c], G)
     for r in (more + H_MAX, more + H_MIN):
         W[4 * axes, 4 * axes] += z[r] * per_s[r] * group.per_h[i] * group.per_h[i]
-    if bends.any_bent:
+    if sizes.any_bent:
         for m in range(3):
             vector, c, of = (
                 (V, 0, more + ORDER_NODE),
@@ -176,12 +176,12 @@ def put_model(sizes, group, bends, rows, i, motion, room, W):
             per = group.per_step[i] if m == 2 else 1.0 / group.pace[i]
             row[:] = 0.0
             for k in range(axes):
-                _add_to_row(sizes, row, alpha, e, vector, k, per * tangent_of(group, bends, rows, i, c, k))
+                _add_to_row(sizes, row, alpha, e, vector, k, per * tangent_of(sizes, group, rows, i, c, k))
             _add_square(sizes, W, row, z[of] * per_s[of])
-    if bends.any_switch:
+    if sizes.any_switch:
         put_second_row(sizes, group, rows, i, 0, y, alpha, e, row)
         _add_square(sizes, W, row, z[more + SWITCH] * per_s[more + SWITCH])
-    if bends.any_own:
+    if sizes.any_own:
         for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             of = more + NORMAL_ROWS + r
             _add_square(sizes, W, rows.own[i, r], z[of] * per_s[of])
@@ -203,9 +203,7 @@ def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
         if bends.bound[i, lane]:
             normal = pick(group.normal[i], lane)
             of = scratch.g[:BETWEEN]
-            add_normal_curvature(
-                scratch.W, normal, pace, bends.turns[i, lane], scratch.x, scratch.u, of
-            )
+            add_normal_curvature(scratch.W, normal, pace, bends.turns[i, lane], scratch.x, scratch.u, of)
             priced = 0.0
             for m in range(3):
                 row = 8 * axes + (NORMAL_NODE, NORMAL_ROWS, NORMAL_ROWS + 1)[m]
@@ -229,7 +227,7 @@ def push_of(group, rows, i, r, aim, second):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
+def put_force(sizes, group, rows, i, motion, aim, second, F, w):
     """w (4 A + 1,) = the sum of q grad g of step i; motion: y, alpha and e of it, F (13, A) is overwritten."""
     y, alpha, e = motion
     axes = len(sizes.axes)
@@ -248,7 +246,7 @@ def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
         q = push_of(group, rows, i, more + FEED_ROWS + m, aim, second) * rows.per_radius[i, m]
         for k in range(axes):
             F[FEED_1 + m, k] += q * y[FEED_1 + m, k]
-    if bends.any_normal:
+    if sizes.any_normal:
         q = push_of(group, rows, i, more + NORMAL_NODE, aim, second) * group.normal_node[i]
         for k in range(axes):
             F[ACROSS, k] += q * y[ACROSS, k]
@@ -258,17 +256,17 @@ def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
             q += group.centre[i]
         for k in range(axes):
             F[TUBE_VECTOR[c], k] += q * rows.n[i, c, k]
-            if bends.any_bent and c > 0:
+            if sizes.any_bent and c > 0:
                 F[TUBE_SECOND[c], k] += q * rows.node[i, c, k]
-    if bends.any_bent:
+    if sizes.any_bent:
         node = push_of(group, rows, i, more + ORDER_NODE, aim, second) / group.pace[i]
         mid = push_of(group, rows, i, more + ORDER_MID, aim, second) / group.pace[i]
         arc = push_of(group, rows, i, more + ARC, aim, second) * group.per_step[i]
         for k in range(axes):
-            F[V, k] -= node * tangent_of(group, bends, rows, i, 0, k)
-            F[MID, k] -= mid * tangent_of(group, bends, rows, i, 1, k)
-            F[LONG, k] += arc * tangent_of(group, bends, rows, i, 1, k)
-    if bends.any_switch:
+            F[V, k] -= node * tangent_of(sizes, group, rows, i, 0, k)
+            F[MID, k] -= mid * tangent_of(sizes, group, rows, i, 1, k)
+            F[LONG, k] += arc * tangent_of(sizes, group, rows, i, 1, k)
+    if sizes.any_switch:
         q = push_of(group, rows, i, more + SWITCH, aim, second) * group.switch[i]
         for k in range(axes):
             F[P, k] += q * y[V, k]
@@ -279,7 +277,7 @@ def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
     longer = push_of(group, rows, i, more + H_MAX, aim, second)
     shorter = push_of(group, rows, i, more + H_MIN, aim, second)
     w[4 * axes] += (longer - shorter) * group.per_h[i]
-    if bends.any_own:
+    if sizes.any_own:
         for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             q = push_of(group, rows, i, more + NORMAL_ROWS + r, aim, second)
             for k in range(len(sizes.step)):
@@ -287,7 +285,7 @@ def put_force(sizes, group, bends, rows, i, motion, aim, second, F, w):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_slopes(sizes, group, bends, rows, i, motion, d, dy, out):
+def put_slopes(sizes, group, rows, i, motion, d, dy, out):
     """out (R,) = the change of every row of step i in a step d (4 A + 1,) of p, v, a, j and h; motion: y, alpha and e of
     it, dy (13, A) is overwritten."""
     y, alpha, e = motion
@@ -317,30 +315,30 @@ def put_slopes(sizes, group, bends, rows, i, motion, d, dy, out):
         total = 0.0 * dh
         for k in range(axes):
             total += rows.n[i, c, k] * dy[TUBE_VECTOR[c], k]
-            if bends.any_bent and c > 0:
+            if sizes.any_bent and c > 0:
                 total += rows.node[i, c, k] * dy[TUBE_SECOND[c], k]
         out[more + TUBE_NODE + c] = total
     for r in range(more + ORDER_NODE, sizes.rows):
         out[r] = 0.0
-    if bends.any_bent:
+    if sizes.any_bent:
         node, mid, arc = 0.0 * dh, 0.0 * dh, 0.0 * dh
         for k in range(axes):
-            at_mid = tangent_of(group, bends, rows, i, 1, k)
-            node += tangent_of(group, bends, rows, i, 0, k) * dy[V, k]
+            at_mid = tangent_of(sizes, group, rows, i, 1, k)
+            node += tangent_of(sizes, group, rows, i, 0, k) * dy[V, k]
             mid, arc = mid + at_mid * dy[MID, k], arc + at_mid * dy[LONG, k]
         out[more + ORDER_NODE], out[more + ORDER_MID] = -node / group.pace[i], -mid / group.pace[i]
         out[more + ARC] = arc * group.per_step[i]
-    if bends.any_normal:
+    if sizes.any_normal:
         total = 0.0 * dh
         for k in range(axes):
             total += y[ACROSS, k] * dy[ACROSS, k]
         out[more + NORMAL_NODE] = total * group.normal_node[i]
-    if bends.any_switch:
+    if sizes.any_switch:
         total = 0.0 * dh
         for k in range(axes):
             total += y[V, k] * dy[P, k] + (y[P, k] - group.switch_at[i, k]) * dy[V, k]
         out[more + SWITCH] = total * group.switch[i]
-    if bends.any_own:
+    if sizes.any_own:
         for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             total = 0.0 * dh
             for k in range(len(sizes.step)):

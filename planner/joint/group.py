@@ -25,6 +25,10 @@ class Sizes(NamedTuple):
     width: tuple[int, ...]  # W lanes
     steps: int  # N
     rows: int  # R
+    any_bent: bool  # whether there are legs that are no lines, or are passed
+    any_own: bool  # whether there are rows with derivatives of their own
+    any_normal: bool  # whether there are rows of the normal acceleration at nodes
+    any_switch: bool  # whether there are rows of changes of feed
 
 
 class Group(NamedTuple):
@@ -75,13 +79,11 @@ class Bends(NamedTuple):
     steps: Array  # (W,) of each window
     legs: LegFormulas  # of all windows
     laws: tuple[LawRows, ...]  # of each
-    any_bent: bool
-    any_own: bool  # whether there are rows with derivatives of their own
-    any_normal: bool  # whether there are rows of the normal acceleration at nodes
-    any_switch: bool
 
 
-def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
+def group_of(
+    windows: list[StepWindow], width: int
+) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
     """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 3, W) of them."""
     axes = windows[0].u.shape[1] - 1
     counts = [len(one.u) for one in windows]
@@ -99,9 +101,7 @@ def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends
 
     first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
     curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
-    together = [
-        np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields
-    ]
+    together = [np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields]
     legs = LegFormulas(*together)
     offset = np.repeat(curves[:-1], np.diff(first))
     legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
@@ -165,10 +165,12 @@ def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends
         steps=np.array([*counts, *[0] * (width - len(windows))]),
         legs=legs,
         laws=tuple(one.limits.laws for one in lanes),
-        any_bent=targets or any(now.any() for now in bent),
-        any_own=bool(own.any()) or any(len(one.limits.laws.kind) for one in windows),
-        any_normal=bool(on[:, 8 * axes + NORMAL_NODE].any()),
-        any_switch=bool(on[:, 8 * axes + SWITCH].any()),
+    )
+    there = (
+        targets or any(bool(now.any()) for now in bent),
+        bool(own.any()) or any(len(one.limits.laws.kind) > 0 for one in windows),
+        bool(on[:, 8 * axes + NORMAL_NODE].any()),
+        bool(on[:, 8 * axes + SWITCH].any()),
     )
     x = stack([one.x for one in windows], 0.0, N + 1)
     u = stack([one.u for one in windows])
@@ -176,5 +178,5 @@ def group_of(windows: list[StepWindow], width: int) -> tuple[Sizes, Group, Bends
         x[count + 1 :, :axes, lane] = x[count, :axes, lane]
         u[count:, axes, lane] = 1.0
     u[:, axes, len(windows) :] = 1.0
-    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R)
+    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *there)
     return sizes, group, bends, x, u, stack([one.place for one in windows])

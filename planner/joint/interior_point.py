@@ -121,7 +121,7 @@ def _work_of(sizes: Sizes, bends: Bends) -> _Work:
     """Memory of a group, all 0."""
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
-    bent, own = N if bends.any_bent else 0, N if bends.any_own else 0
+    bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
     shapes = [(N, R)] * 6 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
@@ -359,7 +359,9 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
         melted = smaller(prox, larger(prox * MELT, tune.least))
         prox = where(close > 0.0, where(settled > 0.0, prox, melted), prox)
         prox = where(settled > 0.0, smaller(prox * FREEZE, FROZEN + zero), prox)
-        slow = where(settled > 0.0, where(larger(SLOWLY * off_before, OFF + zero) < off, slow + 1.0, zero), slow)
+        slow = where(
+            settled > 0.0, where(larger(SLOWLY * off_before, OFF + zero) < off, slow + 1.0, zero), slow
+        )
         rho = where(slow == SLOW_FOR, smaller(STIFFER * rho, STIFFEST + zero), rho)
         slow = where(slow == SLOW_FOR, zero, slow)
         off_before = where(settled > 0.0, off, off_before)
@@ -374,9 +376,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
                     active = put(active, lane, 0.0)
         if not anywhere(active > 0.0):
             break
-        bad = factor_steps(
-            sizes, group, bends, x, u, gap, rows, tune.pull + prox, rho, factor, room, scratch
-        )
+        bad = factor_steps(sizes, group, bends, x, u, gap, rows, tune.pull + prox, rho, factor, room, scratch)
         if anywhere(active * bad > 0.0):
             for lane in range(len(sizes.width)):
                 if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
@@ -384,11 +384,9 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
                     active = put(active, lane, 0.0)
         aim, along, dual, second = zero, zero, zero, zero
         for phase in range(2):
-            backward(
-                sizes, group, bends, x, u, rows, tune.pull, aim, second, lambda_end, factor, room
-            )
+            backward(sizes, group, x, u, rows, tune.pull, aim, second, lambda_end, factor, room)
             along, dual, s_dz, z_ds, ds_dz = forward(
-                sizes, group, bends, x, u, gap, rows, aim, second, factor, room, change
+                sizes, group, x, u, gap, rows, aim, second, factor, room, change
             )
             if phase == 0:
                 left = products + dual * s_dz + along * z_ds + along * dual * ds_dz

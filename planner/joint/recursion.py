@@ -158,8 +158,8 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
         turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
         put_shares(u[i, axes], turn, room.alpha)
         motion = room.y, room.alpha, room.e
-        put_model(sizes, group, bends, rows, i, motion, (room.G, room.row), W)
-        if bends.any_own:
+        put_model(sizes, group, rows, i, motion, (room.G, room.row), W)
+        if sizes.any_own:
             add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch)
         W[S + axes, S + axes] += 2.0 * pull * group.per_h[i] * group.per_h[i]
         for k in range(axes):
@@ -171,7 +171,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def backward(sizes, group, bends, x, u, rows, pull, aim, second, end, factor, room):
+def backward(sizes, group, x, u, rows, pull, aim, second, end, factor, room):
     """The controls of the Newton step towards s z = aim (curvature.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
     is lambda of the last node."""
     axes, S, C, N = len(sizes.axes), len(sizes.state), len(sizes.control), sizes.steps
@@ -186,9 +186,7 @@ def backward(sizes, group, bends, x, u, rows, pull, aim, second, end, factor, ro
                 p[s] = where(last, end[s], p[s])
         turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
         put_shares(h, turn, room.alpha)
-        put_force(
-            sizes, group, bends, rows, i, (room.y, room.alpha, room.e), aim, second, room.F, w
-        )
+        put_force(sizes, group, rows, i, (room.y, room.alpha, room.e), aim, second, room.F, w)
         per = group.per_h[i]
         w[S + axes] += group.real[i] + 2.0 * pull * (h - group.h[i]) * per * per
         for k in range(axes):
@@ -222,7 +220,7 @@ def backward(sizes, group, bends, x, u, rows, pull, aim, second, end, factor, ro
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def forward(sizes, group, bends, x, u, gap, rows, aim, second, factor, room, end):
+def forward(sizes, group, x, u, gap, rows, aim, second, factor, room, end):
     """The step of nodes and controls into `factor`, and of slacks and multipliers into `rows`. Returns the shares of it that
     keep slacks and multipliers positive, and the sums of s dz, z ds and ds dz; end (S,) = the step of the last node."""
     axes, S, C, N, R = (
@@ -263,9 +261,7 @@ def forward(sizes, group, bends, x, u, gap, rows, aim, second, factor, room, end
                 dx[i + 1, s] = where(last, 0.0, dx[i + 1, s])
         turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
         put_shares(h, turn, room.alpha)
-        put_slopes(
-            sizes, group, bends, rows, i, (room.y, room.alpha, room.e), d, room.F, slope
-        )
+        put_slopes(sizes, group, rows, i, (room.y, room.alpha, room.e), d, room.F, slope)
         for r in range(R):
             on, s_r, z_r = group.on[i, r], rows.s[i, r], rows.z[i, r]
             ds = on * (-(rows.g[i, r] + s_r) - slope[r])

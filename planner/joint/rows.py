@@ -362,9 +362,9 @@ def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def tangent_of(group, bends, rows, i, c, k):
+def tangent_of(sizes, group, rows, i, c, k):
     """Of the leg at the node (c = 0) or an inner control point."""
-    if bends.any_bent:
+    if sizes.any_bent:
         return where(group.line[i] > 0.0, group.drift[i, k], rows.tangent[i, c, k])
     return group.drift[i, k]
 
@@ -399,12 +399,12 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
                     point = where(group.at_vertex[i] > 0.0, group.start[i, k], point)
                 off = y[(P, C1, C2)[c], k] - point
                 square += off * off
-                if bends.any_bent:
+                if sizes.any_bent:
                     rows.n[i, c, k] = where(group.line[i] > 0.0, off * per, rows.n[i, c, k])
                 else:
                     rows.n[i, c, k] = off * per
             g[more + TUBE_NODE + c] = 0.5 * (square * per - 1.0)
-        if bends.any_bent:
+        if sizes.any_bent:
             for lane in range(len(sizes.width)):
                 if bends.passed[i, lane]:
                     _put_passed(axes, bends, i, lane, group, y, rows)
@@ -412,20 +412,20 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
                     _put_bent(axes, bends, i, lane, group, y, rows, scratch)
             order_node, order_mid, arc = 0.0 * h, 0.0 * h, 0.0 * h
             for k in range(axes):
-                at_node = tangent_of(group, bends, rows, i, 0, k)
-                at_mid = tangent_of(group, bends, rows, i, 1, k)
+                at_node = tangent_of(sizes, group, rows, i, 0, k)
+                at_mid = tangent_of(sizes, group, rows, i, 1, k)
                 order_node, order_mid = order_node - at_node * y[V, k], order_mid - at_mid * y[MID, k]
                 arc += at_mid * y[LONG, k]
             g[more + ORDER_NODE], g[more + ORDER_MID] = order_node / group.pace[i], order_mid / group.pace[i]
             g[more + ARC] = arc * group.per_step[i] - 1.0
-        if bends.any_switch:
+        if sizes.any_switch:
             square = group.aside[0]
             for k in range(axes):
                 square += group.switch[i] * y[V, k] * (y[P, k] - group.switch_at[i, k])
             g[more + SWITCH] = square
-        if bends.any_normal:
+        if sizes.any_normal:
             _ball(axes, y, ACROSS, group.normal_node[i], more + NORMAL_NODE, g)
-        if bends.any_own:
+        if sizes.any_own:
             for lane in range(len(sizes.width)):
                 if i < bends.steps[lane]:
                     _put_own(sizes, bends, i, lane, group, x, u, rows, scratch)

@@ -11,7 +11,7 @@ from benchmarks.solvers import tube_solvers
 from planner.base.arrays import read_only
 from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
-from planner.joint import laws, own, rows
+from planner.joint import groups, laws, own, rows
 from planner.joint.checks import normal_shares, worst_shares
 from planner.joint.curvature import Barrier
 from planner.joint.guess import guess_from
@@ -272,14 +272,15 @@ def test_the_normal_acceleration_holds_between_nodes():
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     """The motion of the start between two windows that were found: verified, nothing jumps, and it is said."""
-    asked = own.solve_window
+    solve = groups.solve_windows
 
-    def hasty(legs, limits, x, u, *more):
-        return (
-            (False, 0, None) if x[0].any() and abs(x[-1, 2:]).max() > 0 else asked(legs, limits, x, u, *more)
-        )
+    def hasty(asked):
+        inner = [one.window.x[0].any() and abs(one.window.x[-1, 2:]).max() > 0 for one in asked]
+        return [
+            one._replace(done=one.done and not fails) for one, fails in zip(solve(asked), inner, strict=True)
+        ]
 
-    monkeypatch.setattr(own, "solve_window", hasty)
+    monkeypatch.setattr(groups, "solve_windows", hasty)
     monkeypatch.setattr(own, "WINDOW", 60)
     monkeypatch.setattr(own, "OVERLAP", 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 10)
@@ -294,32 +295,48 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
         assert np.abs(np.diff(column, axis=0)).max() <= rate * dt * (1 + 1e-6)
 
 
-@pytest.mark.parametrize(("divide", "asked_for"), [(True, 9), (False, 2)])
+@pytest.mark.parametrize(
+    ("divide", "width", "asked_for"), [(True, 1, 9), (True, 4, 9), (False, 1, 2), (False, 4, 4)]
+)
 def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
-    monkeypatch, divide, asked_for
+    monkeypatch, divide, width, asked_for
 ):
-    """The second of five fails: neither the others nor the joins are asked for; where parts are of use, all are."""
+    """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
+    whatever the group; where parts are of use, all are."""
     run, guess = begun("pentagon")
     monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
-    windows, asked = [], own.solve_window
+    monkeypatch.setattr(groups, "WIDTH", width)
+    monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
+    windows, solve = set[bytes](), groups.solve_windows
+    second = None
 
-    def second_fails(legs, limits, x, u, *more):
-        if not windows or windows[-1] != x[0].tobytes():
-            windows.append(x[0].tobytes())
-        return (False, 0, None) if len(windows) == 2 else asked(legs, limits, x, u, *more)
+    def second_fails(asked):
+        nonlocal second
+        for one in asked:
+            windows.add(one.window.origin.tobytes())
+            if len(windows) == 2 and second is None:
+                second = one.window.origin.tobytes()
+        found = solve(asked)
+        return [
+            one._replace(done=False) if window.window.origin.tobytes() == second else one
+            for one, window in zip(found, asked, strict=True)
+        ]
 
-    monkeypatch.setattr(own, "solve_window", second_fails)
+    monkeypatch.setattr(groups, "solve_windows", second_fails)
     use_threads(1)
     try:
         found = TubeOwn(divide=divide).solve(run, guess)
     finally:
         use_threads(None)
-    assert found.kept is not None
-    assert found.kept.any()
     assert len(windows) == asked_for
+    if divide:
+        assert found.kept is not None
+        assert found.kept.any()
+    else:
+        assert found.steps is None
 
 
 @pytest.mark.parametrize("k", [0.1, 7.0])

@@ -26,10 +26,16 @@ NAMES = ("corner", "arcs", "pentagon", "own", "powered", "turned")
 class Fence(PathLimit):
     """A bound that jumps from one place to the next."""
 
-    name, acceleration, jerk = "fence", 2000.0, 2e5
+    name = "fence"
 
     def velocity(self, at):
         return np.where((at.x > 1.3) & (at.x < 4.7), 35.0, 90.0)
+
+    def acceleration(self, at):
+        return 2000.0 + 0.0 * at.x
+
+    def jerk(self, at):
+        return 2e5 + 0.0 * at.x
 
 
 LONG = 1 << 20  # steps: enough for threads
@@ -160,8 +166,10 @@ def jobs():
 
 
 @pytest.mark.usefixtures("small_windows")
-@pytest.mark.parametrize(("threads", "width", "seed"), [(1, 1, 0), (1, 3, 1), (1, 4, 2), (2, 4, 3)])
-def test_the_same_bytes_in_any_group(monkeypatch, threads, width, seed):
+@pytest.mark.parametrize(
+    ("threads", "width", "waiting", "seed"), [(1, 1, 1, 0), (1, 3, 3, 1), (1, 4, 32, 2), (2, 4, 8, 3)]
+)
+def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed):
     """In windows of a few steps, some of which fail."""
     made, alone = jobs()
     assert any(one.steps is not None and one.windows > one.solved for one in alone)
@@ -174,6 +182,7 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, seed):
         return [at for at in order if groups.kind_of(asked[at]) == kind][:width]
 
     monkeypatch.setattr(groups, "together", shuffled)
+    monkeypatch.setattr(groups, "WAITING", waiting)
     use_threads(threads)
     order = rng.permutation(len(made)).tolist()
     found = searched([made[k][0].search(*made[k][1:]) for k in order], LONG)

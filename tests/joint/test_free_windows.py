@@ -9,7 +9,6 @@ from starts import MACHINE, PROGRAMS, begun
 from benchmarks.jobs import problems, random_lines
 from benchmarks.solvers import tube_solvers
 from planner.base.arrays import read_only
-from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
 from planner.joint import groups, laws, own, rows
 from planner.joint.checks import normal_shares, worst_shares
@@ -231,26 +230,6 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
         np.testing.assert_allclose(ends[:-1, column], state[1:, column], atol=tiny)
 
 
-@pytest.mark.usual_sizes
-def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
-    run, guess = begun("pentagon")
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 3)
-    monkeypatch.setattr(own, "OVERLAP", len(guess) // 7)
-    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
-    found = []
-    for count in (1, 3):
-        use_threads(count)
-        try:
-            found.append(TubeOwn().solve(run, guess))
-        finally:
-            use_threads(None)
-    one, three = found
-    assert one.windows == 5
-    assert (one.iterations, one.solved) == (three.iterations, three.solved)
-    for name in ("h", "position", "velocity", "acceleration", "jerk"):
-        assert getattr(one.steps, name).tobytes() == getattr(three.steps, name).tobytes()
-
-
 def test_the_normal_acceleration_holds_between_nodes():
     """Its rows are enough for whole steps: what solves a window keeps it everywhere, and uses all of it."""
     program, machine = random_lines.job(40)
@@ -293,50 +272,6 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     seen, dt = made.trajectory, MACHINE.dt
     for column, rate in ((seen.position, 100.0), (seen.velocity, 2000.0), (seen.acceleration, 2e5)):
         assert np.abs(np.diff(column, axis=0)).max() <= rate * dt * (1 + 1e-6)
-
-
-@pytest.mark.parametrize(
-    ("divide", "width", "asked_for"), [(True, 1, 9), (True, 4, 9), (False, 1, 2), (False, 4, 4)]
-)
-def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
-    monkeypatch, divide, width, asked_for
-):
-    """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
-    whatever the group; where parts are of use, all are."""
-    run, guess = begun("pentagon")
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
-    monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
-    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
-    monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
-    monkeypatch.setattr(groups, "WIDTH", width)
-    monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
-    windows, solve = set[bytes](), groups.solve_windows
-    second = None
-
-    def second_fails(asked):
-        nonlocal second
-        for one in asked:
-            windows.add(one.window.origin.tobytes())
-            if len(windows) == 2 and second is None:
-                second = one.window.origin.tobytes()
-        found = solve(asked)
-        return [
-            one._replace(done=False) if window.window.origin.tobytes() == second else one
-            for one, window in zip(found, asked, strict=True)
-        ]
-
-    monkeypatch.setattr(groups, "solve_windows", second_fails)
-    use_threads(1)
-    try:
-        found = TubeOwn(divide=divide).solve(run, guess)
-    finally:
-        use_threads(None)
-    assert len(windows) == asked_for
-    if divide:
-        assert found.kept is not None
-        assert found.kept.any()
-    else:
-        assert found.steps is None
 
 
 @pytest.mark.parametrize("k", [0.1, 7.0])

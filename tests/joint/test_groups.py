@@ -195,3 +195,44 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed)
         assert one.price.tobytes() == other.price.tobytes()
         for column in dataclasses.fields(one.steps):
             assert getattr(one.steps, column.name).tobytes() == getattr(other.steps, column.name).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("divide", "width", "asked_for"), [(True, 1, 9), (True, 4, 9), (False, 1, 2), (False, 4, 4)]
+)
+def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
+    monkeypatch, divide, width, asked_for
+):
+    """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
+    whatever the group; where parts are of use, all are."""
+    run, guess = begun("pentagon")
+    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
+    monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
+    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
+    monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
+    monkeypatch.setattr(groups, "WIDTH", width)
+    monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
+    windows, solve = set[bytes](), groups.solve_windows
+    second = None
+
+    def second_fails(asked):
+        nonlocal second
+        for one in asked:
+            windows.add(one.window.origin.tobytes())
+            if len(windows) == 2 and second is None:
+                second = one.window.origin.tobytes()
+        found = solve(asked)
+        return [
+            one._replace(done=False) if window.window.origin.tobytes() == second else one
+            for one, window in zip(found, asked, strict=True)
+        ]
+
+    monkeypatch.setattr(groups, "solve_windows", second_fails)
+    use_threads(1)
+    found = TubeOwn(divide=divide).solve(run, guess)
+    assert len(windows) == asked_for
+    if divide:
+        assert found.kept is not None
+        assert found.kept.any()
+    else:
+        assert found.steps is None

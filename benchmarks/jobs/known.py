@@ -122,9 +122,9 @@ def turns(random: np.random.Generator) -> Known:
 
 
 SORTS: tuple[tuple[Callable[[np.random.Generator], Known], int], ...] = (
-    (capped, 1200),
-    (to_a_point, 600),
-    (turning_back, 600),
+    (capped, 600),
+    (to_a_point, 900),
+    (turning_back, 900),
     (stopping, 300),
     (turns, 300),
 )

@@ -1,6 +1,6 @@
 """Method `optimal` beside optima that are known exactly: how far is it from them?
 
-    python -m benchmarks.judge.known_optima [--share 1] [--first 0]            into results/known-optima.json and .md
+    python -m benchmarks.judge.known_optima [--share 1] [--first 0] [--processes 1]            into results/known-optima.json and .md
 
 The jobs of benchmarks/jobs/known.py, 3,000 of them; `--share` of each sort. Every plan has to pass its verdict.
 """
@@ -8,6 +8,7 @@ The jobs of benchmarks/jobs/known.py, 3,000 of them; `--share` of each sort. Eve
 from __future__ import annotations
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -35,25 +36,36 @@ def _time(known: Known, program: Program) -> float:
     return plan.cycle_time if plan.verdict is not None and plan.verdict.passed else np.nan
 
 
+def row(sort: int, seed: int) -> dict[str, Any]:
+    """What came of a job: of the sort with that place in `SORTS`."""
+    use_threads(1)
+    make = SORTS[sort][0]
+    found: dict[str, Any] = {"sort": make.__name__.replace("_", " "), "seed": seed}
+    try:
+        known = job(make, seed)
+    except RuntimeError as error:
+        return found | {"not_known": str(error)}
+    return found | {"least_s": float(known.least), "error": float(known.error), "above": float(above(known))}
+
+
 def main() -> None:
     """Plan, compare, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--share", type=float, default=1.0)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=1)
     asked = parser.parse_args()
-    use_threads(1)
-    rows: list[dict[str, Any]] = []
-    for sort, count in SORTS:
-        for seed in range(asked.first, asked.first + round(asked.share * count)):
-            row: dict[str, Any] = {"sort": sort.__name__.replace("_", " "), "seed": seed}
-            try:
-                known = job(sort, seed)
-                row |= {"least_s": known.least, "error": known.error, "above": above(known)}
-            except RuntimeError as error:
-                row |= {"not_known": str(error)}
-            rows.append(row)
-            if not row.get("above", 0.0) <= WITHIN:
-                print(row, flush=True)
+    tasks = [
+        (sort, seed)
+        for sort, (_, count) in enumerate(SORTS)
+        for seed in range(asked.first, asked.first + round(asked.share * count))
+    ]
+    rows = []
+    with ProcessPoolExecutor(asked.processes) as pool:
+        for found in pool.map(row, *zip(*tasks, strict=True)):
+            rows.append(found)
+            if not found.get("above", 0.0) <= WITHIN:
+                print(found, flush=True)
     write_results("known-optima", {"jobs": rows}, _table(rows))
 
 

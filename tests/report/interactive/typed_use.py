@@ -9,7 +9,6 @@ import numpy as np
 
 import planner
 
-
 if TYPE_CHECKING:  # who imports the file plans nothing, and writes no `out` and no report.html
     machine = planner.load_machine("mill")
     program = planner.read_program(text="G1 X10 F600")

@@ -29,7 +29,6 @@ class Token(NamedTuple):
     at: int  # where it begins in the line
 
 
-
 class TokenReader:
     """Reads a text that is split into tokens, from left to right.
 

@@ -25,6 +25,7 @@ from benchmarks.jobs import problems, random_lines
 from benchmarks.record import markdown, write_results
 from planner.base.errors import PlannerError
 from planner.base.threads import use_threads
+from planner.joint.groups import Search
 from planner.joint.guess import Guess
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
@@ -46,13 +47,14 @@ def counted() -> list[TubeSolution]:
     """What all searches of this process find from now on."""
     planner.plan(problems.pentagon(), "mill")  # kernels are loaded
     found: list[TubeSolution] = []
-    solve = TubeOwn.solve
+    search = TubeOwn.search
 
-    def solve_and_count(self: TubeOwn, run: TubeRun, guess: Guess) -> TubeSolution:
-        found.append(solve(self, run, guess))
-        return found[-1]
+    def search_and_count(self: TubeOwn, run: TubeRun, guess: Guess) -> Search[TubeSolution]:
+        ended = yield from search(self, run, guess)
+        found.append(ended)
+        return ended
 
-    TubeOwn.solve = solve_and_count  # type: ignore[method-assign]
+    TubeOwn.search = search_and_count  # type: ignore[method-assign]
     return found
 
 

@@ -15,15 +15,17 @@ import unicodedata
 from typing import Any
 
 
-def import_needed(package: str, user: str) -> Any:
-    """The package, imported; `user` is what needs it. Raises InputError with the command that installs it."""
+def import_needed(package: str, user: str, extra: str = "") -> Any:
+    """The package, imported; `user` is what needs it, `extra` the extra of ours that has it. Raises InputError
+    with the command that installs it."""
     try:
         return importlib.import_module(package)
     except ModuleNotFoundError as fault:
         if fault.name != package.partition(".")[0]:
             raise  # it is there, and something that it needs is not
+        wanted = f"'feedrate-planner[{extra}]'" if extra else fault.name
         raise InputError(
-            f"{user} needs the package {fault.name}, which is not installed: pip install {fault.name}"
+            f"{user} needs the package {fault.name}, which is not installed: pip install {wanted}"
         ) from None
 
 

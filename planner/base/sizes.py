@@ -55,9 +55,7 @@ class Sizes:
     points_shared: int = _size(PARTS, 3_000, 0)  # fewer are solved by one thread
     relaxed_shared: int = _size(PARTS, 2_000, 0)  # spans; fewer are relaxed by one thread
     read_shared: int = _size(PARTS, 65_536, 0)  # samples; fewer are judged by one thread
-    # steps of a run that is divided into windows enough for itself, and of windows that are worth threads
-    searched_shared: int = _size(PARTS, 3_000, 0)
-    windows_shared: int = _size(PARTS, 1_000, 0)
+    windows_shared: int = _size(PARTS, 1_000, 0)  # steps of searches that are worth a thread
 
     # The judge and what it is asked for before.
     judged_at_once: int = _size(PARTS, 16_384, 64)  # samples: 2 MB

@@ -10,6 +10,7 @@ tol_*     a part of the contour error budget [mm]   dt        interpolation peri
 """
 
 import math
+import re
 
 MM_PER_INCH = 25.4  # by definition
 # Of F words [mm/min] and of angles in files [deg].
@@ -17,3 +18,10 @@ SECONDS_PER_MINUTE = 60.0
 RAD_PER_DEG = math.pi / 180.0
 MICROMETRE = 1e-3  # [mm]
 MILLISECOND = 1e-3  # [s]
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+
+
+def number_and_unit(text: str) -> tuple[str, str] | None:
+    """The number that a text begins with, as it is written, and what stands behind it; None for none."""
+    found = _QUANTITY.fullmatch(text)
+    return None if found is None else (found[1], found[2])

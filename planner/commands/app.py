@@ -27,8 +27,6 @@ from planner.commands.verify import verify_command
 UsageError: Any = typer.BadParameter.__mro__[1]
 _NUMBER = re.compile(r"Input should be a valid (number|integer).*|'.*' is not a valid (float|integer)\.?")
 _LEAST = re.compile(r"Input should be greater than or equal to (\S+)")
-# Options that are gone, and why.
-GONE = {"--rounds": "splines are not reshaped any more, path and feed are searched together; leave it out"}
 
 
 class PlainCommand(TyperCommand):
@@ -65,8 +63,6 @@ def _plain(fault: Any, options: list[str]) -> None:
         near = difflib.get_close_matches(wrong, options, n=1)
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")
         fault.possibilities = None
-    if wrong in GONE:
-        fault.message, fault.possibilities = f"{wrong} has no use any more: {GONE[wrong]}", None
     if type(fault).__name__ == "MissingParameter" and not fault.message:
         fault.message = getattr(fault.param, "help", None) or ""
     text = str(fault.message or "").removeprefix("Value error, ")

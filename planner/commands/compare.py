@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +21,16 @@ from planner.commands.options import (
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import BAD_INPUT, FAILED, NOT_SOLVED, guarded, memory_used_up, say, show
+from planner.commands.terminal import (
+    BAD_INPUT,
+    FAILED,
+    NOT_SOLVED,
+    guarded,
+    memory_used_up,
+    say,
+    say_json,
+    show,
+)
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -100,7 +108,7 @@ def compare_command(
     if output is not None:
         write_comparison(output, rows, about)
     if as_json:
-        say(json.dumps(comparison_dict(rows, about), indent=2, allow_nan=False))
+        say_json(comparison_dict(rows, about))
     else:
         title = f"{job}: {len(rows)} methods, machine {limits.name}"
         show(*assumed_lines(program.assumptions), comparison_table(rows, title))

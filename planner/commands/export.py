@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import ForceOption, JsonOption, length_option
-from planner.commands.terminal import FAILED, guarded, say
+from planner.commands.options import ForceOption, JsonOption, TrajectoryArgument, length_option
+from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
     from planner.motion.pulses import AxisPulses
@@ -167,13 +166,7 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
 
 @guarded
 def pulses_command(
-    trajectory: Annotated[
-        Path,
-        typer.Argument(
-            metavar="TRAJECTORY",
-            help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote",
-        ),
-    ],
+    trajectory: TrajectoryArgument,
     steps: Annotated[
         str, typer.Option(metavar="x=400,y=400", help="pulses per mm of each axis (rotary axes: per degree)")
     ],
@@ -214,7 +207,7 @@ def pulses_command(
         }
         write_pulses(output, trains, about)
     if as_json:
-        say(json.dumps({"axes": _figures(trains), "faults": faults}, indent=2, allow_nan=False))
+        say_json({"axes": _figures(trains), "faults": faults})
     else:
         for axis, figures in _figures(trains).items():
             rate = figures["highest_frequency_hz"]

@@ -1,6 +1,5 @@
 """`planner info`: what a program holds."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,7 @@ from planner.commands.options import (
     MachineOption,
     takes_reading,
 )
-from planner.commands.terminal import BAD_INPUT, guarded, say, show
+from planner.commands.terminal import BAD_INPUT, guarded, say, say_json, show
 from planner.nc.reading import Reading
 
 
@@ -33,7 +32,7 @@ def info_command(
 
     found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE), reading)
     if as_json:
-        say(json.dumps(info_summary(found), indent=2, allow_nan=False))
+        say_json(info_summary(found))
     else:
         show(info_table(found))
     if found.unsupported:
@@ -59,19 +58,15 @@ def expand_command(
     from planner.machine import load_machine
     from planner.nc.language.flat import flat_program
     from planner.nc.reader import load, source_name
+    from planner.report.replace import write_new
 
-    if output is not None and output.exists() and not force:
-        raise InputError("the file exists; give another name or --force", source=str(output))
     data = load(job)
     found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=source_name(job))
     text = data if found is None else readable(found[0]).encode()
     if output is None:
         typer.echo(text, nl=False)
         return
-    try:
-        output.write_bytes(text)
-    except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror}", source=str(output)) from fault
+    write_new(output, text, force=force)
     if found is None:
         say(f"{output}: nothing to expand, the program is copied")
     else:

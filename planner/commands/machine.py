@@ -32,8 +32,9 @@ def init_file(file: Annotated[Path, typer.Argument(metavar="FILE", help="file to
     """Write a commented machine file to start from; it names every key and its unit."""
     from importlib import resources
 
-    text = (resources.files("planner") / "templates" / "machine.toml").read_text(encoding="utf-8")
-    _write_new(file, text)
+    from planner.report.replace import write_new
+
+    write_new(file, (resources.files("planner") / "templates" / "machine.toml").read_bytes())
     say(f"{file} written; plan with: planner plan JOB -m {file}")
 
 
@@ -74,6 +75,7 @@ def import_file(
 ) -> None:
     """Make a machine file from the settings of a control, and say what they leave open."""
     from planner.controls.machine_import.convert import RAMP_TIME, import_machine
+    from planner.report.replace import write_new
 
     imported = import_machine(
         settings,
@@ -82,7 +84,7 @@ def import_file(
         tolerance=tolerance,
         given=_limits_given(set_ or []),
     )
-    _write_new(output, imported.text)
+    write_new(output, imported.text.encode())
     for sentence in imported.assumed:
         say(f"note: {sentence}")
     say(f"{output} written; plan with: planner plan JOB -m {output}")
@@ -98,16 +100,3 @@ def _limits_given(texts: list[str]) -> dict[str, float]:
         except ValueError:
             raise InputError(f"--set {text}: write a limit and its value, such as z.jerk=1e4") from None
     return given
-
-
-def _write_new(file: Path, text: str) -> None:
-    """Write a file that does not exist yet. Raises InputError if it does, or cannot be written."""
-    try:
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise InputError(
-            "exists already and is not overwritten; give another name", source=str(file)
-        ) from None
-    except OSError as fault:
-        raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault

@@ -23,7 +23,7 @@ from planner.base.files import STDIN
 from planner.base.threads import cores
 from planner.commands.interrupt import interrupts_raise
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED, say, show
+from planner.commands.terminal import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED, say, say_json, show
 
 # By the exit code of a program's process.
 OUTCOMES = {
@@ -96,13 +96,14 @@ def plan_many(
     folders = [None] * len(jobs) if output is None else folders_of(jobs, output)
     many = min(threads or cores(), len(jobs))
     each = ["--threads", str(max((threads or cores()) // many, 1)), *options]
+    end, held_open = os.pipe()  # the end of this pipe tells the processes that this one has gone
     tasks = [
-        _Task(job, [*each, *([] if folder is None else ["-o", str(folder)])])
+        _Task(job, [*each, *([] if folder is None else ["-o", str(folder)])], end)
         for job, folder in zip(jobs, folders, strict=True)
     ]
     done: dict[Path, Done] = {}
     interrupted = False
-    with ProgressBar(quiet=quiet) as progress, interrupts_raise():
+    with os.fdopen(held_open, "wb"), ProgressBar(quiet=quiet) as progress, interrupts_raise():
         pool = ThreadPoolExecutor(max_workers=many)
         try:
             running = [pool.submit(task.run) for task in tasks]
@@ -126,8 +127,8 @@ def plan_many(
 class _Task:
     """A program and the process that plans it."""
 
-    def __init__(self, job: Path, options: Sequence[str]):
-        self.job, self._options = job, options
+    def __init__(self, job: Path, options: Sequence[str], stdin: int):
+        self.job, self._options, self._stdin = job, options, stdin
         self.unwanted = False  # Ctrl-C came
         self.process: subprocess.Popen[str] | None = None
 
@@ -135,11 +136,10 @@ class _Task:
         """Start the process, wait for it, and read what it says."""
         path = os.pathsep.join(os.path.abspath(place) for place in sys.path)
         command = [sys.executable, "-P", "-c", CHILD, "plan", *self._options, "--json", "-q", "--"]
-        errors: list[str] = []
         with subprocess.Popen(
             [*command, str(self.job)],
             env={**os.environ, "PYTHONPATH": path},
-            stdin=subprocess.PIPE,  # its end tells the process that this one has gone
+            stdin=self._stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -147,18 +147,11 @@ class _Task:
         ) as self.process:
             if self.unwanted:
                 self.process.terminate()
-            assert self.process.stdout is not None
-            assert self.process.stderr is not None
-            said_there = self.process.stderr
-            reader = threading.Thread(target=lambda: errors.append(said_there.read()))
-            reader.start()
-            text = self.process.stdout.read()
-            code = self.process.wait()
-            reader.join()
+            text, said = (stream.strip() for stream in self.process.communicate())
+            code = self.process.returncode
         summary: dict[str, Any] = {}
         with suppress(ValueError):
             summary = json.loads(text)
-        said = "".join(errors).strip()
         if -code in FROM_OUTSIDE:
             said, code = f"its process was ended from outside (signal {-code}), {PERHAPS_MEMORY}", NOT_SOLVED
         elif code < 0:
@@ -192,7 +185,7 @@ def _report(rows: Sequence[Done], as_json: bool) -> None:
             {"program": str(row.job), "exit_code": row.code, "outcome": row.outcome, "said": row.said, "summary": row.summary or None}
             for row in rows
         ]  # fmt: skip
-        say(json.dumps({"programs": programs}, indent=2, allow_nan=False))
+        say_json({"programs": programs})
         return
     from planner.report.tables import assumed_lines, programs_table
 

@@ -4,7 +4,6 @@
 import functools
 import inspect
 import math
-import re
 from collections.abc import Callable, Container, Iterable
 from enum import StrEnum
 from pathlib import Path
@@ -14,7 +13,7 @@ import typer
 
 from planner.base import names
 from planner.base.errors import InputError
-from planner.base.units import MICROMETRE, MILLISECOND, MM_PER_INCH
+from planner.base.units import MICROMETRE, MILLISECOND, MM_PER_INCH, number_and_unit
 from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore_list
 
 DEFAULT_MACHINE = "mill"
@@ -74,14 +73,10 @@ def time_option(name: str, help_text: str) -> Any:
 def _with_unit(name: str, help_text: str, what: str, units: dict[str, float]) -> Any:
     """An option that takes a number above 0, with one of these units or without: then with the first one."""
     first = next(iter(units))
-    pattern = re.compile(rf"([^a-zµ]+(?:e[-+]?\d+)?)\s*({'|'.join(units)})?")
 
     def parsed(text: str) -> float:
-        found = pattern.fullmatch(text)
-        try:
-            value = float(found[1]) * units[found[2] or first] if found else math.nan
-        except ValueError:
-            value = math.nan
+        number, unit = number_and_unit(text) or ("nan", "")
+        value = float(number) * units.get(unit or first, math.nan)
         if not 0.0 < value < math.inf:
             comma = "; decimals have a point" if "," in text else ""
             raise typer.BadParameter(
@@ -121,6 +116,12 @@ ToleranceOption = Annotated[
         "contour tolerance [mm], or with a unit: 20um; takes precedence over G64 P in the program and over the machine file",
     ),
 ]
+TrajectoryArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote"
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
 ThreadsOption = Annotated[
     int | None,
@@ -151,13 +152,10 @@ def given_options(context: typer.Context, without: Container[str]) -> list[str]:
     return words
 
 
-def _one_of(allowed: tuple[str, ...]) -> Callable[[str], str]:
-    def check(text: str) -> str:
-        if text not in allowed:
-            raise InputError(f"'{text}' is not known; allowed are {', '.join(allowed)}")
-        return text
-
-    return check
+def _one_of(kind: str, known: tuple[str, ...], help_text: str) -> tuple[Any, Any]:
+    """Type and option of a setting of the reader that takes one of some names."""
+    check = functools.partial(names.known_name, kind, names=known)
+    return str, _choice(f"--{kind}", check, help_text, "|".join(known))
 
 
 # The settings of the reader as options: name and type of the field of `Reading`, and the option.
@@ -171,32 +169,16 @@ _READING: dict[str, tuple[Any, Any]] = {
             help="leave out what you know to be harmless: codes, axes, commands, such as M428,G187,A,$X",
         ),
     ),
-    "arc_centres": (
-        str,
-        _choice(
-            "--arc-centres",
-            _one_of(ARC_CENTRES),
-            "what I J K mean in a program without G90.1 and G91.1; auto: by what closes its arcs",
-            "|".join(ARC_CENTRES),
-        ),
+    "arc_centres": _one_of(
+        "arc-centres",
+        ARC_CENTRES,
+        "what I J K mean in a program without G90.1 and G91.1; auto: by what closes its arcs",
     ),
-    "extruder": (
-        str,
-        _choice(
-            "--extruder",
-            _one_of(EXTRUDERS),
-            "what to do with the E words of a 3-D printer",
-            "|".join(EXTRUDERS),
-        ),
-    ),
-    "dialect": (
-        str,
-        _choice(
-            "--dialect",
-            _one_of(DIALECTS),
-            "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
-            "|".join(DIALECTS),
-        ),
+    "extruder": _one_of("extruder", EXTRUDERS, "what to do with the E words of a 3-D printer"),
+    "dialect": _one_of(
+        "dialect",
+        DIALECTS,
+        "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
     ),
 }
 

@@ -26,7 +26,7 @@ from planner.commands.options import (
     takes_reading,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import FAILED, guarded, say, show
+from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def plan_command(
     if written and output is not None:  # with what was not written, and why
         said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]
     if as_json:
-        say(json.dumps(said, indent=2, allow_nan=False))
+        say_json(said)
     else:
         _show(result, said["notes"], corners=corners)
         for name in written:

@@ -2,7 +2,6 @@
 ends."""
 
 import inspect
-import json
 from collections import Counter
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -24,7 +23,7 @@ from planner.commands.options import (
     taking,
 )
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, show
+from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, say_json, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -110,7 +109,7 @@ def what_if_command(
     with ProgressBar(quiet=quiet) as progress:
         rows = what_if(studied, settings, lambda label, stage, done: progress(f"{label}: {stage}", done))
     if as_json:
-        say(json.dumps(what_if_dict(studied, rows), indent=2, allow_nan=False))
+        say_json(what_if_dict(studied, rows))
     else:
         show(*assumed_lines(studied.program.assumptions), what_if_table(studied, rows, title_of(studied)))
     end_with({it.row.outcome for it in rows})
@@ -177,11 +176,7 @@ def sweep_command(
     written = write_sweep(done, output)
     outcomes = Counter(row["outcome"] for row in done.rows)
     if as_json:
-        say(
-            json.dumps(
-                {"reused": done.reused, "outcomes": outcomes, "points": done.rows}, indent=1, allow_nan=False
-            )
-        )
+        say_json({"reused": done.reused, "outcomes": outcomes, "points": done.rows})
     else:
         show(*assumed_lines(studied.program.assumptions), sweep_table(done, title_of(studied)))
         for name in written:

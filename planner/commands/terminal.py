@@ -14,6 +14,7 @@ import codecs
 import errno
 import functools
 import io
+import json
 import mmap
 import os
 import sys
@@ -115,6 +116,11 @@ def say(text: str, *, err: bool = False) -> None:
     Raises InputError if the output cannot be written, BrokenPipeError if its reader has gone.
     """
     _write(printable(text), err=err)
+
+
+def say_json(value: object) -> None:
+    """Print a value as JSON."""
+    say(json.dumps(value, indent=2, allow_nan=False))
 
 
 def _write(text: str, *, err: bool = False) -> None:

@@ -9,7 +9,6 @@ all the same.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +16,16 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
-from planner.commands.options import DEFAULT_MACHINE, JsonOption, QuietOption, ToleranceOption, takes_reading
+from planner.commands.options import (
+    DEFAULT_MACHINE,
+    JsonOption,
+    QuietOption,
+    ToleranceOption,
+    TrajectoryArgument,
+    takes_reading,
+)
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import FAILED, guarded, say, show
+from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import AS_USUAL, Reading
 
 if TYPE_CHECKING:
@@ -30,13 +36,7 @@ if TYPE_CHECKING:
 @guarded
 @takes_reading
 def verify_command(
-    trajectory: Annotated[
-        Path,
-        typer.Argument(
-            metavar="TRAJECTORY",
-            help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote",
-        ),
-    ],
+    trajectory: TrajectoryArgument,
     job: Annotated[
         Path | None, typer.Argument(metavar="JOB", help="NC program (default: the one that TRAJECTORY names)")
     ] = None,
@@ -104,8 +104,7 @@ def verify_command(
             "cycle_time_s": time,
             "notes": notes,
         }
-        summary = {"assumptions": program.assumptions, **verdict_summary(verdict), **about}
-        say(json.dumps(summary, indent=2))
+        say_json({"assumptions": program.assumptions, **verdict_summary(verdict), **about})
     else:
         for note in notes:
             say(f"note: {note}", err=True)

@@ -39,7 +39,8 @@ SMALLEST = np.finfo(np.float64).tiny
 class Window:
     """The steps of a window, and those beside it, of a cut motion (guess.py), as a copy.
 
-    leg, h, state, place : as of that
+    leg, h, state, place : as of that; of the steps beside it, which may be found meanwhile, only the legs are
+                           read, and their h is 0
     lo, hi               : the steps of the window are lo .. hi - 1 of these
     """
 
@@ -48,6 +49,7 @@ class Window:
         self.leg, self.h = cut.leg[begin:end], cut.h[begin:end].copy()
         self.state, self.place = cut.state[begin : end + 1].copy(), cut.place[begin:end].copy()
         self.lo, self.hi = lo - begin, hi - begin
+        self.h[: self.lo] = self.h[self.hi :] = 0.0
 
     def __len__(self) -> int:
         return len(self.h)

@@ -4,26 +4,26 @@ interior_point.py.
 A window's first and last node stay as they are, in position, velocity and acceleration, so that windows join
 exactly. The first windows lie end to end; those of the second sweep each reach over one join, from inside one
 window to inside the next, where these have found their optimum. Windows of a sweep have no step in common:
-they are searched side by side, and what they find is the same for any number of threads. A window that does
-not converge, that breaks something when its steps are integrated and looked at exactly (checks.py) is
-divided; what is left of that keeps the motion that the search began with, and is said.
+they are searched side by side, together with those of other runs (groups.py), and what they find does not
+depend on the others. A window that does not converge, that breaks something when its steps are integrated and
+looked at exactly (checks.py) is divided; what is left of that keeps the motion that the search began with, and
+is said.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side
 from planner.feedrate.solution import Status
 from planner.joint.checks import Keeps, switches_missed, worst_shares
+from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import Guess
-from planner.joint.interior_point import Tuning, solve_window
+from planner.joint.interior_point import Tuning
 from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
 from planner.joint.law_window import NEAR, Window, near
 from planner.joint.legs import LegFormulas
@@ -35,6 +35,7 @@ from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.rows import H_MIN
 from planner.joint.run import TubeRun
+from planner.joint.window_solver import Asked
 
 # Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that
 # a window which fails is divided into.
@@ -49,10 +50,6 @@ JOIN_WITHIN = SIZES.searched_join
 TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
 # The most that rows may be missed by [-].
 MISSED_MOST = max(missed for _, missed in TRIES)
-# Iterations of a window, about, and the share of its work that is told to be done at most before all of it is
-# [-].
-USUAL, NEARLY = 25.0, 0.9
-QUIET = SIZES.windows_shared  # steps: of windows that have fewer together nothing is told before they end
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
 # Laws of the position are about a place, and of the tolerance along a curve the rows know the tangents at nodes.
@@ -76,8 +73,8 @@ class TubeOwn:
     gap      : complementarity at its end, share of the time [-]
     divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess
                need not keep the limits and no part of it is kept: windows may end slower than it, and the
-               search ends at the first one that fails
-    progress : called with the share of the steps that are done [-]
+               search ends at the first one that fails and has found nothing
+    progress : called with the share of the steps that are done [-], in any thread
     smooth   : weight of the jerk against the time at least [-] (numbers.py); above 0 what is found may be
                slower than the guess
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
@@ -94,14 +91,18 @@ class TubeOwn:
     def solve(self, run: TubeRun, guess: Guess) -> TubeSolution:
         """The best motion near the guess, never slower than it. Where no faster one is found its steps are
         `kept`."""
+        return searched([self.search(run, guess)], len(guess))[0]
+
+    def search(self, run: TubeRun, guess: Guess) -> Search[TubeSolution]:
+        """The same beside other searches; `solve_time` is from its beginning to its end."""
         began, search = time.perf_counter(), _Search(self, run, guess)
-        search.sweep()
+        whole = yield from search.sweeps()
         took = time.perf_counter() - began
-        if search.kept.all():
+        if not whole or search.kept.all():
             return TubeSolution(
                 status=Status.ITERATION_LIMIT,
                 sentence="the search did not end faster than its start",
-                iterations=search.iterations,
+                iterations=sum(search.iterations),
                 solve_time=took,
                 windows=search.windows,
                 solved=search.solved,
@@ -111,7 +112,7 @@ class TubeOwn:
         return TubeSolution(
             status=Status.ACCEPTABLE if share else Status.OPTIMAL,
             sentence=sentence,
-            iterations=search.iterations,
+            iterations=sum(search.iterations),
             solve_time=took,
             windows=search.windows,
             solved=search.solved,
@@ -120,18 +121,6 @@ class TubeOwn:
             kept=search.kept,
             price=search.price,
         )
-
-
-class _Count:
-    """Of a window: its steps, whether it was solved at once, iterations so far, that of the present solve,
-    and whether all is over."""
-
-    def __init__(self, steps: int):
-        self.steps, self.solved, self.iterations, self.at, self.over = steps, False, 0, np.zeros(1), False
-
-    def share(self) -> float:
-        """Of its work that is done, about [-]."""
-        return 1.0 if self.over else min(float(self.at[0]) / USUAL, NEARLY)
 
 
 class _Cut:
@@ -154,26 +143,25 @@ class _Search:
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
         self.price = np.zeros((len(guess), columns(run)))
-        self.iterations, self.windows, self.solved = 0, 0, 0
+        self.iterations, self.windows, self.solved = list[int](), 0, 0
         self._keeps = keeps_of(run)
         self._strain = strain(run, guess)
-        self._stopped = False
-        self._done, self._all = 0, len(guess)  # steps of all windows
+        self._done, self._all = list[int](), len(guess)  # steps of all windows
 
-    def sweep(self) -> None:
-        """All windows, and then all joins."""
+    def sweeps(self) -> Generator[Sweep, list[bool], bool]:
+        """All windows, and then all joins; whether it was not given up."""
         steps = len(self.guess)
         even = np.linspace(0, steps, max(int(np.ceil(steps / WINDOW)), 1) + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
         if not self.settings.divide:  # no step of the guess is kept
             self._slow(joins)
         self._all = steps + 2 * OVERLAP * len(joins)
-        self._side_by_side([0, *joins], [*joins, steps], self.settings.divide)
-        if self._stopped:
-            return
-        self._side_by_side(
-            [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
-        )
+        whole = yield from self._sweep([0, *joins], [*joins, steps], self.settings.divide)
+        if whole and joins:
+            yield from self._sweep(
+                [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
+            )
+        return whole
 
     def _slow(self, nodes: list[int]) -> None:
         """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as
@@ -205,46 +193,35 @@ class _Search:
         place = np.where(begins, self.run.offset[self.guess.leg], self.guess.place[:, 0])
         return np.append(place, self.run.offset[-1])
 
-    def _side_by_side(self, begin: list[int], end: list[int], parts: bool = True) -> None:
+    def _sweep(
+        self, begin: list[int], end: list[int], parts: bool = True
+    ) -> Generator[Sweep, list[bool], bool]:
         """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are
-        of no use, the first one that fails ends the search."""
+        of no use, the first one that fails gives the search up. Whether none did."""
+        tries = TRIES if parts else TRIES[:1]
+        tasks = [self._window(lo, hi, tries) for lo, hi in zip(begin, end, strict=True)]
+        ended = yield Sweep(tasks, all_needed=not parts)
+        self.windows += len(tasks)
+        self.solved += sum(ended)
+        return parts or all(ended)
 
-        def improve(lo: int, hi: int, count: _Count) -> None:
-            count.solved = self._improve(lo, hi, count, TRIES if parts else TRIES[:1])
-            self._stopped |= not (parts or count.solved)
-            count.over = True
-
-        counts = [_Count(hi - lo) for lo, hi in zip(begin, end, strict=True)]
-        work = [partial(improve, *one) for one in zip(begin, end, counts, strict=True)]
-        if sum(count.steps for count in counts) > QUIET:
-            side_by_side(work, self._stop, lambda: self._tell(counts))
-        else:
-            for one in work:
-                one()
-        self._done += sum(count.steps for count in counts)
-        self._tell([])
-        self.windows += len(counts)
-        self.solved += sum(count.solved for count in counts)
-        self.iterations += sum(count.iterations for count in counts)
-
-    def _tell(self, running: list[_Count]) -> None:
+    def _window(self, lo: int, hi: int, tries: Tries) -> Task:
+        """Improve the steps lo .. hi - 1, and tell so."""
+        solved = yield from self._improve(lo, hi, tries)
+        self._done.append(hi - lo)
         if self.settings.progress is not None:
-            done = self._done + sum(count.steps * count.share() for count in running)
-            self.settings.progress(min(done / self._all, 1.0))
-
-    def _stop(self) -> None:
-        """Begin no other window."""
-        self._stopped = True
+            self.settings.progress(min(sum(self._done) / self._all, 1.0))
+        return solved
 
     def _join(self, near: int) -> int:
         """A node to join windows at."""
         begin = max(near - JOIN_WITHIN, 0)
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
+    def _improve(self, lo: int, hi: int, tries: Tries) -> Task:
         """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from
-        what these have found. Whether it did not fail; `count` takes the iterations."""
-        if self._improved(lo, hi, count, tries):
+        what these have found. Whether it did not fail."""
+        if (yield from self._improved(lo, hi, tries)):
             return True
         if hi - lo < 2 * LEAST or not self.settings.divide:
             return False
@@ -252,13 +229,13 @@ class _Search:
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
         before = float(self.guess.h[lo:hi].sum())
-        self._improve(lo, middle, count, TRIES[:1])
-        self._improve(middle, hi, count, TRIES[:1])
+        yield from self._improve(lo, middle, TRIES[:1])
+        yield from self._improve(middle, hi, TRIES[:1])
         if self.guess.h[lo:hi].sum() < before:
-            self._improved(lo, hi, count, tries)
+            yield from self._improved(lo, hi, tries)
         return False
 
-    def _improved(self, lo: int, hi: int, count: _Count, tries: Tries) -> bool:
+    def _improved(self, lo: int, hi: int, tries: Tries) -> Task:
         """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
         takes their place."""
         run, smooth = self.run, self.settings.smooth
@@ -267,15 +244,11 @@ class _Search:
             tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
             needed, beside = near(run.laws, begun), np.full(hi - lo, -1)
             for number in range(TOLD if len(run.laws) else TIGHTENED):
-                if self._stopped:
-                    return False
                 which = np.flatnonzero(needed)
                 window = window_of(run, begun, begun.lo, begun.hi, missed, tight, smooth, which, beside)
                 tuning = Tuning(pull, prox, self.settings.gap, missed, self.settings.least, *START)
-                done, iterations, z = solve_window(
-                    window.legs, window.limits, window.x, window.u, window.place, tuning, count.at
-                )
-                count.iterations += iterations
+                done, iterations, z = yield Asked(window, tuning)
+                self.iterations.append(iterations)
                 if not done:
                     break
                 rows_of_switch = int((beside >= 0).sum())

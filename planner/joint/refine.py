@@ -14,6 +14,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import REVERSAL_ANGLE
 from planner.joint.checks import normal_shares
+from planner.joint.groups import Search
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn, keeps_of
@@ -139,12 +140,14 @@ def divided(run: TubeRun, leg: Array, found: TubeSolution, cut: Cut) -> Divided:
     return Divided(Guess(leg=leg[of], h=h, state=state, place=places), parts)
 
 
-def searched_again(run: TubeRun, found: TubeSolution, finer: Divided, solver: TubeOwn) -> TubeSolution | None:
+def searched_again(
+    run: TubeRun, found: TubeSolution, finer: Divided, solver: TubeOwn
+) -> Search[TubeSolution | None]:
     """The best motion near one that was found, in shorter steps; None where none is faster.
 
     finer : that motion, divided
     """
-    again = replace(solver, divide=True).solve(run, finer.guess)
+    again = yield from replace(solver, divide=True).search(run, finer.guess)
     if again.steps is None:
         return None
     price = again.price

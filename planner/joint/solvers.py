@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from planner.joint.groups import Search
 from planner.joint.guess import Guess
 from planner.joint.nlp import TubeNLP
 from planner.joint.outcome import TubeSolution
@@ -28,3 +29,10 @@ SOLVERS: dict[str, TubeSolver] = {"own": TubeOwn(), "ipopt": TubeNLP(), "fatrop"
 def tube_solver(solver: str | TubeSolver) -> TubeSolver:
     """The solver of that name (base/names.py), or the one that is given."""
     return SOLVERS[solver] if isinstance(solver, str) else solver
+
+
+def search_with(solver: TubeSolver, run: TubeRun, guess: Guess) -> Search[TubeSolution]:
+    """What a solver finds; the own one beside other searches."""
+    if isinstance(solver, TubeOwn):
+        return (yield from solver.search(run, guess))
+    return solver.solve(run, guess)

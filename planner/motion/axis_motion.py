@@ -23,7 +23,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import COLUMNS, Trajectory
 
 # Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-]; the better one is
 # then good to rounding.
@@ -33,6 +33,7 @@ QUADRATURE_ROUNDING = 1e-9
 SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
+LEVELS = COLUMNS[1:5]  # position, velocity, acceleration, jerk
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,10 +84,7 @@ class AxisMotion:
             radius=self.radius,
             dt=dt,
             t=times,
-            position=columns[0],
-            velocity=columns[1],
-            acceleration=columns[2],
-            jerk=columns[3],
+            **dict(zip(LEVELS, columns, strict=True)),
             s=s,
             feed=feed,
             block=self.block[piece],
@@ -101,7 +99,7 @@ class AxisMotion:
         later = np.zeros(len(self) + 1)
         np.add.at(later, before, by)
         later = np.cumsum(later)[:-1]
-        rest = {name: np.zeros_like(place) for name in ("velocity", "acceleration", "jerk")}
+        rest = {name: np.zeros_like(place) for name in LEVELS[1:]}
         columns = {
             name: np.insert(getattr(self, name), before, row, axis=0)
             for name, row in ({"position": place} | rest).items()

@@ -161,10 +161,8 @@ def _set_system(state: State, block: Block, kind: int) -> None:
 
 def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
     """G10 L2 P1 to P6, and G10 L20 P1 to P300 for G54.1."""
-    number, number_max = (
-        integer(block, "P", 0) if "P" in block.value else -1,
-        FURTHER_MAX if kind == 20 else 6,
-    )
+    number = integer(block, "P", 0) if "P" in block.value else -1
+    number_max = FURTHER_MAX if kind == 20 else 6
     if not 1 <= number <= number_max:
         external = "; P0, the external offset, is not read" if number == 0 else ""
         needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{number_max}{external}"

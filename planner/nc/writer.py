@@ -64,12 +64,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     f_word_feed = programmed * in_source.unit[row]
     off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
     changeable = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
-    moving, row, programmed, often = (
-        moving[changeable],
-        row[changeable],
-        programmed[changeable],
-        often[changeable],
-    )
+    moving, row, programmed, often = (column[changeable] for column in (moving, row, programmed, often))
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / in_source.unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf

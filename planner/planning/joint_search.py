@@ -1,8 +1,8 @@
 """The joint search of a job: from a motion along a smoothed path to path and feed found together (joint/),
 run by run.
 
-A run is what lies between two full stops. Long runs are searched one after the other, the windows of each
-side by side, then short ones side by side; what is found does not depend on the number of threads. The motion
+A run is what lies between two full stops. Runs are searched side by side, long ones first, their windows in
+groups (joint/groups.py); what is found does not depend on that, nor on the number of threads. The motion
 from which the search begins may keep its limits at the points of a coarse grid only: where the search leaves
 no step of it nothing else is asked of it, and a run on which the search does not end, or that is not
 searched (G61, threads), is planned by itself in another way (runs_alone.py). Or it keeps them everywhere:
@@ -10,7 +10,6 @@ then it stays where the search does not end.
 """
 
 import dataclasses
-import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import pairwise
@@ -19,17 +18,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side
 from planner.corners.budget import filters_count
 from planner.feedrate.solution import Status
+from planner.joint.groups import Search as Searching
+from planner.joint.groups import searched
 from planner.joint.guess import Cut, Guess
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
 from planner.joint.parts import FoundRun, parts_of
 from planner.joint.refine import divided, searched_again
 from planner.joint.run import TubeRun, tube_runs_of
-from planner.joint.solvers import TubeSolver
+from planner.joint.solvers import TubeSolver, search_with
 from planner.joint.splice import SplicedRun
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
@@ -49,7 +48,6 @@ from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
-LONG = SIZES.searched_shared
 # What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
 # other [-].
 SEARCHES = (1.0, 1.2, 2.3)
@@ -219,47 +217,32 @@ def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun]:
     """The solution on each run; where the start `stays` it is divided where it fails."""
-    size = [len(start.guess(k, run)) for k, run in enumerate(runs)]
-    found: list[FoundRun | None] = [None for _ in runs]
-    stopped = threading.Event()
+    size = np.array([len(start.guess(k, run)) for k, run in enumerate(runs)])
+    order, done = np.argsort(-size, kind="stable").tolist(), np.zeros(len(runs))  # shares
 
-    def done() -> int:
-        return sum(steps for steps, of_run in zip(size, found, strict=True) if of_run is not None)
+    def one(k: int) -> Searching[FoundRun]:
+        solver = solver_of(search, partial(done.__setitem__, k), stays=stays)
+        within = start.lasting(k) if stays else np.inf
+        found = yield from search_run(k, runs[k], start, solver, within)
+        done[k] = 1.0
+        return found
 
-    def one(k: int, tell: Report) -> None:
-        if stopped.is_set():
-            return
-        solver, within = solver_of(search, tell, stays=stays), start.lasting(k) if stays else np.inf
-        found[k] = search_run(k, runs[k], start, solver, within)
-
-    def share(before: int, of_run: int, part: float) -> None:
-        report((before + part * of_run) / sum(size))
-
-    for k in range(len(runs)):
-        if size[k] > LONG:
-            one(k, partial(share, done(), size[k]))
-    short = [k for k in range(len(runs)) if size[k] <= LONG]
-    work = [partial(one, k, lambda _: None) for k in short]
-    if sum(size[k] for k in short) > LONG:
-        side_by_side(work, stopped.set, lambda: share(done(), 0, 0.0))
-    else:
-        for task in work:
-            task()
-    return [of_run for of_run in found if of_run is not None]
+    found = searched(map(one, order), int(size.sum()), lambda: report(float(done @ size) / size.sum()))
+    return [found[k] for k in np.argsort(order).tolist()]
 
 
 def search_run(
     k: int, run: TubeRun, start: Start, solver: TubeSolver | InTwo, within: float = np.inf
-) -> FoundRun:
+) -> Searching[FoundRun]:
     """The solution of the search along run k from its start; of no use if it takes as long as `within`
     [s]."""
     if run.left:
         return FoundRun(run, Status.ACCEPTABLE, run.left)
     guess = start.guess(k, run)
     if isinstance(solver, InTwo):
-        run, guess, solution = _in_two(k, run, start, solver)
+        run, guess, solution = yield from _in_two(k, run, start, solver)
     else:
-        solution = solver.solve(run, guess)
+        solution = yield from search_with(solver, run, guess)
     steps = solution.steps
     if steps is None:
         return FoundRun(run, Status.ACCEPTABLE, solution.sentence)
@@ -271,18 +254,20 @@ def search_run(
     )
 
 
-def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun, Guess, TubeSolution]:
+def _in_two(
+    k: int, run: TubeRun, start: Start, solver: InTwo
+) -> Searching[tuple[TubeRun, Guess, TubeSolution]]:
     """The run with the budgets that the last of the searches had, the steps from which that began, and its
     solution."""
     guess = start.guess(k, run)
-    found = start.in_long_steps.get(k) or solver.first.solve(run, guess)
+    found = start.in_long_steps.get(k) or (yield from solver.first.search(run, guess))
     start.in_long_steps[k] = found
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
             return run, guess, found
         cut, own = solver.finer[0]
         guess = start.guess_in(k, run, cut)
-        return run, guess, own.solve(run, guess)
+        return run, guess, (yield from own.search(run, guess))
     rounds = solver.finer
     if (start.with_reserve(run, guess.leg, found).budget < run.budget).any():
         once_more = ((start.cut, solver.first),)
@@ -291,7 +276,7 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> tuple[TubeRun,
     for cut, own in rounds:
         wider = start.with_reserve(run, guess.leg, found)
         finer = divided(wider, guess.leg, found, cut)
-        again = searched_again(wider, found, finer, own)
+        again = yield from searched_again(wider, found, finer, own)
         if again is None or again.steps is None:
             continue
         if own.smooth or again.steps.h.sum() <= found.steps.h.sum():

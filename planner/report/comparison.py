@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from planner.base.files import readable
@@ -18,8 +17,9 @@ from planner.feedrate.constraints import normal_limit
 from planner.machine import Machine
 from planner.report.compare import Row, best_of
 from planner.report.replace import write_whole
+from planner.report.rows import number_text, ratio_text
 from planner.report.summary import versions
-from planner.report.tables import ratio_text
+from planner.report.tables import outcome_text, outcomes_table, titled
 
 SUFFIXES = (".json", ".csv")
 QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
@@ -29,38 +29,33 @@ def comparison_table(rows: list[Row], title: str) -> Group:
     """The table for the terminal, followed by the reason for each method that did not pass."""
     best = best_of(rows)
     columns: list[tuple[str, Callable[[Row], str]]] = [
-        ("cycle\ntime s", lambda row: _number(row.cycle_time, ".4f")),
-        ("ratio to\nbest", lambda row: _number(_to_best(row, best), ".4f")),
+        ("cycle\ntime s", lambda row: number_text(row.cycle_time, ".4f")),
+        ("ratio to\nbest", lambda row: number_text(_to_best(row, best), ".4f")),
     ]
     for name in QUANTITIES:
         if any(name in (row.worst or {}) for row in rows):
             heading = f"{name.replace('_', chr(10), 1)}\n/ limit"
             columns.append((heading, functools.partial(_worst, quantity=name)))
     columns += [
-        ("contour\nµm", lambda row: _number(row.contour_error, ".4g", MICROMETRE)),
-        ("corners\nµm", lambda row: _number(row.vertex_error, ".4g", MICROMETRE)),
+        ("contour\nµm", lambda row: number_text(row.contour_error, ".4g", MICROMETRE)),
+        ("corners\nµm", lambda row: number_text(row.vertex_error, ".4g", MICROMETRE)),
     ]
     if any(row.after_filters is not None for row in rows):
-        columns.append(("behind\nfilters", lambda row: _number(row.after_filters, ".4g", MICROMETRE)))
+        columns.append(("behind\nfilters", lambda row: number_text(row.after_filters, ".4g", MICROMETRE)))
     columns += [
         ("eq. 18-19\nat most", lambda row: "-" if row.corner_ratio is None else ratio_text(row.corner_ratio)),
-        ("over\neq. 20", lambda row: _number(row.gain, ".3f")),
+        ("over\neq. 20", lambda row: number_text(row.gain, ".3f")),
     ]
     if any(row.ringing is not None for row in rows):
-        columns.append(("rings\nµm", lambda row: _number(row.ringing, ".4g", MICROMETRE)))
-    columns.append(("planning\ns", lambda row: _number(row.planning_time, ".3f")))
-    table = Table(box=None, pad_edge=False)
-    table.add_column("method", no_wrap=True)
-    for heading, _ in columns:
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+        columns.append(("rings\nµm", lambda row: number_text(row.ringing, ".4g", MICROMETRE)))
+    columns.append(("planning\ns", lambda row: number_text(row.planning_time, ".3f")))
+    table = outcomes_table(["method"], [heading for heading, _ in columns])
     for row in rows:
-        outcome = Text(row.outcome, style="green" if row.passed else "bold red")
-        table.add_row(row.method, *(text(row) for _, text in columns), outcome)
+        table.add_row(row.method, *(text(row) for _, text in columns), outcome_text(row.outcome))
     said = [Text(f"{row.method}: {row.sentence}") for row in rows if not row.passed]
     free = [f"{row.method} does not limit {', '.join(row.free)}" for row in rows if row.free]
     notes = [Text(f"(in brackets: not limited; {'; '.join(free)})")] if free else []
-    return Group(Text(title, style="bold"), table, *notes, *said)
+    return titled(title, table, *notes, *said)
 
 
 def comparison_dict(rows: list[Row], about: dict[str, Any]) -> dict[str, Any]:
@@ -140,7 +135,3 @@ def _worst(row: Row, quantity: str) -> str:
     ratio, name = row.worst[quantity]
     text = f"{ratio_text(ratio)} {name.partition('.')[2]}".rstrip()
     return f"({text})" if quantity in row.free else text
-
-
-def _number(value: float | None, form: str, unit: float = 1.0) -> str:
-    return "-" if value is None else format(value / unit, form)

@@ -180,6 +180,21 @@ def write_whole(path: Path, text: str) -> None:
         new.write_text(text, encoding="utf-8")
 
 
+def write_new(file: Path, text: bytes, *, force: bool | None = None) -> None:
+    """Write a file that is not there yet. Raises InputError if it is there, or cannot be written.
+
+    force : write over one that is there; None where the command has no such option
+    """
+    try:
+        with file.open("wb" if force else "xb") as stream:
+            stream.write(text)
+    except FileExistsError:
+        remedy = "give another name" if force is None else "give another name or --force"
+        raise InputError(f"exists already and is not overwritten; {remedy}", source=str(file)) from None
+    except OSError as fault:
+        raise InputError(f"cannot be written: {fault.strerror}", source=str(file)) from fault
+
+
 def _stands_alone(path: Path) -> bool:
     """Whether a file is a page, a comparison, a trace or pulses, by its content."""
     with path.open("rb") as stream:

@@ -134,6 +134,11 @@ def ratio_text(value: float) -> str:
     return f"{value:.6f}" if 0.999 < value < 1.01 else f"{value:.4g}"
 
 
+def number_text(value: float | None, form: str, unit: float = 1.0) -> str:
+    """A number in a unit, "-" where there is none."""
+    return "-" if value is None else format(value / unit, form)
+
+
 LIMITS_SHOWN = 5  # of the limits that save time, the most valuable
 SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in the table [-]
 MILLISECOND = 1e-3  # [s]

@@ -20,6 +20,7 @@ from planner.report.rows import (
     VERDICT,
     first_of,
     hours_text,
+    number_text,
     plan_rows,
     ratio_text,
     smoothing,
@@ -48,11 +49,11 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     notes : printed below, without what `assumed_lines` says first; None for those of the plan
     """
     title = f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
-    table = _pairs()
+    table = pairs_table()
     _add(table, plan_rows(plan))
     first = set(plan.program.assumptions)
     said = [note for note in (plan.notes if notes is None else notes) if note not in first]
-    return _titled(title, table, *(Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)))
+    return titled(title, table, *(Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)))
 
 
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
@@ -66,9 +67,9 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
 
     asked : name and text of the lines before it
     """
-    table = _pairs()
+    table = pairs_table()
     _add(table, [*(asked or {}).items(), *verdict_rows(verdict)])
-    return _titled(title, table)
+    return titled(title, table)
 
 
 def corners_table(corners: CornerCheck) -> Table | None:
@@ -109,7 +110,7 @@ def info_table(info: ProgramInfo) -> Group:
     """The reader's assumptions, what a program contains, and every construct that is not supported."""
     blocks = sum(info.blocks.values())
     title = f"{info.source}: {info.lines:,} lines, {blocks:,} blocks"
-    table = _pairs()
+    table = pairs_table()
     table.add_row("blocks", _counts(info.blocks))
     if info.full_circles or info.helices:
         table.add_row(
@@ -216,15 +217,32 @@ def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
 
 
-def _pairs() -> Table:
+def outcomes_table(things: Iterable[str], numbers: Iterable[str]) -> Table:
+    """An empty table of plans: columns of what they are, of numbers, and the verdict."""
+    table = Table(box=None, pad_edge=False)
+    for name in things:
+        table.add_column(name, overflow="fold")
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    return table
+
+
+def outcome_text(outcome: str) -> Text:
+    """The outcome of a plan, in its colour."""
+    return Text(outcome, style="green" if outcome == PASSED else "bold red")
+
+
+def pairs_table() -> Table:
+    """An empty table of names and what there is to say of them."""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     return table
 
 
-def _titled(title: str, *parts: RenderableType) -> Group:
-    # not the table's own title, which is folded to the table's width
+def titled(title: str, *parts: RenderableType) -> Group:
+    """Parts under a title, which is not the table's own: that is folded to the table's width."""
     return Group(Text(title, style="bold"), *parts)
 
 
@@ -236,11 +254,8 @@ def programs_table(rows: Sequence[tuple[str, str, Mapping[str, Any], str]]) -> G
 
     rows : name, outcome, the content of `summary.json` (empty where there is none), and what was said of it
     """
-    table = Table(box=None, pad_edge=False)
-    table.add_column("program", overflow="fold")
-    for name in ("blocks", "cycle\ntime s", "total\ntime s", "contour\nµm", "computing\ns"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    headings = ("blocks", "cycle\ntime s", "total\ntime s", "contour\nµm", "computing\ns")
+    table = outcomes_table(["program"], headings)
     time, total, incomplete, said = 0.0, 0.0, False, []
     for name, outcome, summary, text in rows:
         cycle = summary.get("cycle_time_s")
@@ -249,11 +264,11 @@ def programs_table(rows: Sequence[tuple[str, str, Mapping[str, Any], str]]) -> G
         table.add_row(
             name,
             f"{summary['blocks']:,}" if "blocks" in summary else "-",
-            _number(cycle, ".4f"),
-            _number(beside.get("total_s"), ".4f"),
-            _number(contour, ".4g", MICROMETRE),
-            _number(sum(summary["timings_s"].values()) if summary.get("timings_s") else None, ".2f"),
-            Text(outcome, style="green" if outcome == PASSED else "bold red"),
+            number_text(cycle, ".4f"),
+            number_text(beside.get("total_s"), ".4f"),
+            number_text(contour, ".4g", MICROMETRE),
+            number_text(sum(summary["timings_s"].values()) if summary.get("timings_s") else None, ".2f"),
+            outcome_text(outcome),
         )
         if outcome == PASSED:
             time += cycle or 0.0
@@ -274,7 +289,3 @@ def _why(summary: Mapping[str, Any]) -> str:
         summary.get("sentence") or "no reason was given"
     ]
     return str(faults[0])
-
-
-def _number(value: float | None, form: str, unit: float = 1.0) -> str:
-    return "-" if value is None else format(value / unit, form)

@@ -48,6 +48,10 @@ Joints = Callable[[Trajectory], Trajectory]
 Feeds = Callable[[Trajectory], FloatArray]
 TIP = "tip_"  # before the names of the columns of the tool's tip
 ROW_GROUP = SIZES.row_group
+# Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level then
+# leaves 55 % of the bytes, as fast as writing them raw. Higher levels take longer and save nothing;
+# dictionaries make it larger.
+PACKED: Any = {"compression": "zstd", "compression_level": 1}
 
 
 def write_trajectory(
@@ -71,7 +75,8 @@ def write_trajectory(
     text = json.dumps(about or {}, allow_nan=False)
     match path.suffix:
         case ".parquet":
-            _write_parquet(path, _groups(trajectory, joints_of, feed_of), text)
+            with path.open("wb") as file:  # pyarrow takes no name that is not UTF-8, but an open file
+                _write_parquet(file, _groups(trajectory, joints_of, feed_of), text)
         case ".csv":
             _write_csv(path, _groups(trajectory, joints_of, feed_of))
             path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
@@ -166,27 +171,17 @@ def _table(columns: dict[str, Array]) -> Any:
     )
 
 
-def _write_parquet(path: Path, groups: Iterator[dict[str, Array]], text: str) -> None:
-    # pyarrow takes no name that is not UTF-8, but an open file.
-    with path.open("wb") as file:
-        _write_groups(file, groups, text)
-
-
-def _write_groups(file: BinaryIO, groups: Iterator[dict[str, Array]], text: str) -> None:
+def _write_parquet(file: BinaryIO, groups: Iterator[dict[str, Array]], text: str) -> None:
     from pyarrow import parquet
 
     writer = None
     for columns in groups:
         table = _table(columns).replace_schema_metadata({"planner": text})
         if writer is None:
-            # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its
-            # fastest level then leaves 55 % of the bytes, as fast as writing them raw. Higher levels take
-            # longer and save nothing; dictionaries make it larger.
             writer = parquet.ParquetWriter(
                 file,
                 table.schema,
-                compression="zstd",
-                compression_level=1,
+                **PACKED,
                 use_dictionary=["line", "block"],
                 use_byte_stream_split=[name for name in columns if name not in ("line", "block")],
             )
@@ -242,8 +237,7 @@ def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[
         parquet.write_table(
             table.replace_schema_metadata({"planner": text}),
             file,
-            compression="zstd",
-            compression_level=1,
+            **PACKED,
             use_dictionary=["axis", "direction", "line"],
             use_byte_stream_split=["t"],
         )

@@ -9,9 +9,8 @@ from starts import MACHINE, PROGRAMS, begun
 from benchmarks.jobs import problems, random_lines
 from benchmarks.solvers import tube_solvers
 from planner.base.arrays import read_only
-from planner.base.threads import use_threads
 from planner.geometry.build import toolpath_from_program
-from planner.joint import laws, own, rows
+from planner.joint import groups, laws, own, rows
 from planner.joint.checks import normal_shares, worst_shares
 from planner.joint.curvature import Barrier
 from planner.joint.guess import guess_from
@@ -231,26 +230,6 @@ def test_windows_find_what_the_whole_run_finds(monkeypatch):
         np.testing.assert_allclose(ends[:-1, column], state[1:, column], atol=tiny)
 
 
-@pytest.mark.usual_sizes
-def test_any_number_of_threads_finds_the_same_bytes(monkeypatch):
-    run, guess = begun("pentagon")
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 3)
-    monkeypatch.setattr(own, "OVERLAP", len(guess) // 7)
-    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
-    found = []
-    for count in (1, 3):
-        use_threads(count)
-        try:
-            found.append(TubeOwn().solve(run, guess))
-        finally:
-            use_threads(None)
-    one, three = found
-    assert one.windows == 5
-    assert (one.iterations, one.solved) == (three.iterations, three.solved)
-    for name in ("h", "position", "velocity", "acceleration", "jerk"):
-        assert getattr(one.steps, name).tobytes() == getattr(three.steps, name).tobytes()
-
-
 def test_the_normal_acceleration_holds_between_nodes():
     """Its rows are enough for whole steps: what solves a window keeps it everywhere, and uses all of it."""
     program, machine = random_lines.job(40)
@@ -272,14 +251,15 @@ def test_the_normal_acceleration_holds_between_nodes():
 
 def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     """The motion of the start between two windows that were found: verified, nothing jumps, and it is said."""
-    asked = own.solve_window
+    solve = groups.solve_windows
 
-    def hasty(legs, limits, x, u, *more):
-        return (
-            (False, 0, None) if x[0].any() and abs(x[-1, 2:]).max() > 0 else asked(legs, limits, x, u, *more)
-        )
+    def hasty(asked):
+        inner = [one.window.x[0].any() and abs(one.window.x[-1, 2:]).max() > 0 for one in asked]
+        return [
+            one._replace(done=one.done and not fails) for one, fails in zip(solve(asked), inner, strict=True)
+        ]
 
-    monkeypatch.setattr(own, "solve_window", hasty)
+    monkeypatch.setattr(groups, "solve_windows", hasty)
     monkeypatch.setattr(own, "WINDOW", 60)
     monkeypatch.setattr(own, "OVERLAP", 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 10)
@@ -292,34 +272,6 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     seen, dt = made.trajectory, MACHINE.dt
     for column, rate in ((seen.position, 100.0), (seen.velocity, 2000.0), (seen.acceleration, 2e5)):
         assert np.abs(np.diff(column, axis=0)).max() <= rate * dt * (1 + 1e-6)
-
-
-@pytest.mark.parametrize(("divide", "asked_for"), [(True, 9), (False, 2)])
-def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
-    monkeypatch, divide, asked_for
-):
-    """The second of five fails: neither the others nor the joins are asked for; where parts are of use, all are."""
-    run, guess = begun("pentagon")
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
-    monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
-    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
-    monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
-    windows, asked = [], own.solve_window
-
-    def second_fails(legs, limits, x, u, *more):
-        if not windows or windows[-1] != x[0].tobytes():
-            windows.append(x[0].tobytes())
-        return (False, 0, None) if len(windows) == 2 else asked(legs, limits, x, u, *more)
-
-    monkeypatch.setattr(own, "solve_window", second_fails)
-    use_threads(1)
-    try:
-        found = TubeOwn(divide=divide).solve(run, guess)
-    finally:
-        use_threads(None)
-    assert found.kept is not None
-    assert found.kept.any()
-    assert len(windows) == asked_for
 
 
 @pytest.mark.parametrize("k", [0.1, 7.0])

@@ -10,6 +10,7 @@ from starts import begun, toolpath_of
 
 from benchmarks.jobs import problems
 from planner.corners.budget import error_rate
+from planner.joint.groups import searched
 from planner.joint.guess import Cut
 from planner.joint.motion import CLOSED_EVERY, Steps, closed_at_nodes, integrated
 from planner.joint.outcome import TubeSolution
@@ -43,7 +44,8 @@ def test_a_divided_motion_is_the_same_motion(name: str):
 @pytest.mark.parametrize("name", ["corner", "arcs", "pentagon"])
 def test_shorter_steps_are_faster_and_as_fast_as_without_the_long_ones(name: str):
     run, leg, found = found_in_long_steps(name)
-    again = searched_again(run, found, divided(run, leg, found, Cut()), TubeOwn())
+    finer = divided(run, leg, found, Cut())
+    (again,) = searched([searched_again(run, found, finer, TubeOwn())], len(finer.guess))
     at_once = TubeOwn().solve(*begun(name))
     assert again is not None
     assert again.kept is None
@@ -58,8 +60,8 @@ def test_what_the_second_search_leaves_is_what_the_first_has_found(monkeypatch):
     run, leg, found = found_in_long_steps("pentagon")
     finer = divided(run, leg, found, Cut())
     nothing = dataclasses.replace(found, steps=None, kept=None, price=None)
-    monkeypatch.setattr(TubeOwn, "solve", lambda *of: nothing)
-    assert searched_again(run, found, finer, TubeOwn()) is None
+    monkeypatch.setattr(TubeOwn, "search", lambda *of: (yield from ()) or nothing)
+    assert searched([searched_again(run, found, finer, TubeOwn())], len(finer.guess)) == [None]
 
 
 def test_nodes_are_met_between_which_gaps_add_up():

@@ -12,6 +12,7 @@ import planner
 from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.feedrate.solution import Status
+from planner.joint.groups import QUIET
 from planner.joint.parts import FoundRun
 from planner.machine import Axis, Machine
 from planner.nc.program import Program
@@ -20,7 +21,6 @@ from planner.planning import joint_search
 from planner.planning.job.choice import beside
 from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Trace
-from planner.planning.joint_search import LONG
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.page import job_of
@@ -52,7 +52,7 @@ def test_many_short_runs_have_the_same_motion_on_any_number_of_threads() -> None
             )
         )
         searched = [step for step in told.steps if step.name == "search"]
-        assert searched[-1].facts["steps"] > LONG
+        assert searched[-1].facts["steps"] > QUIET
         assert found[-1].verdict is not None
         assert found[-1].verdict.passed
     first, other = (plan.require().trajectory for plan in found)
@@ -86,7 +86,7 @@ def test_a_run_that_the_search_does_not_find_is_planned_alone_and_the_others_are
     own = joint_search.search_run
 
     def one_fails(k, run, *more):
-        found = own(k, run, *more)
+        found = yield from own(k, run, *more)
         return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else found
 
     monkeypatch.setattr(joint_search, "search_run", one_fails)
@@ -107,7 +107,7 @@ def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
     own = joint_search.search_run
 
     def one_is_fast(k, run, *more):
-        found = own(k, run, *more)
+        found = yield from own(k, run, *more)
         if k != 7:
             return found
         steps = found.steps
@@ -131,7 +131,8 @@ def test_a_run_that_is_not_found_nor_planned_alone_is_that_of_the_motion_on_the_
     own = joint_search.search_run
 
     def one_fails(k, run, *more):
-        return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else own(k, run, *more)
+        found = yield from own(k, run, *more)
+        return FoundRun(run, Status.ACCEPTABLE, "made up") if k == 5 else found
 
     whole, _ = planned()
     monkeypatch.setattr(joint_search, "search_run", one_fails)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE, number_and_unit
 from planner.feedrate.constraints.limits import JERK, LIMITS
 from planner.machine import ROTARY_AXES, Machine, machine_from_dict
 from planner.nc.program import Program
@@ -56,7 +56,6 @@ _OF_MACHINE = {
     "fir.phase_lag_max": _ANGLE,
     FEED: _NONE,
 }
-_VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,18 +119,18 @@ def parse_value(name: str, text: str, machine: Machine, tolerance: float) -> flo
     """The value of a setting in the unit of the machine file; arguments and errors as of `parse_setting`."""
     units = setting_names(machine)[name]
     allowed = ", ".join(unit for unit in [*units, "%"] if unit)
-    found = _VALUE.fullmatch(text)
-    if not found:
+    found = number_and_unit(text)
+    if found is None:
         raise InputError(
             f"{name}={text}: write a number, in {next(iter(units)) or 'times'} or with a unit: {allowed}"
         )
-    number, unit = float(found[1]), found[2]
+    number, unit = float(found[0]), found[1]
     if unit == "%":
         present = value_of(name, machine, tolerance)
         if present is None or math.isnan(present):
             what = f"the machine has no {name}" if present is None else "the program changes it (G64 P)"
             raise InputError(f"{name}={text}: a percentage of what? {what}; write a number")
-        relative = found[1][0] in "+-"
+        relative = found[0][0] in "+-"
         value = present * (number / 100.0 + (1.0 if relative else 0.0))
     elif unit and unit not in units:
         near = difflib.get_close_matches(unit, [each for each in units if each], n=1)

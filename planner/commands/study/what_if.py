@@ -19,7 +19,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from planner.base.errors import InputError
@@ -29,7 +28,9 @@ from planner.commands.study.settings import FEED, TOLERANCE, Setting, StudiedJob
 from planner.feedrate.constraints.limits import LIMITS
 from planner.machine import Machine
 from planner.report.compare import Row, row_of_plan, tried
+from planner.report.rows import number_text
 from planner.report.summary import json_ready
+from planner.report.tables import outcome_text, outcomes_table, pairs_table, titled
 from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE, POWER
 from planner.sensitivity.records import PriceList
 
@@ -146,29 +147,25 @@ REASONS_SHOWN = 5  # why points did not pass
 
 def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
     """Rows of `what_if` side by side, followed by the reason for each one that did not pass."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("change", no_wrap=True)
-    table.add_column("from", no_wrap=True)
-    for name in ("cycle\ntime s", "change\ns", "foretold\ns", "change\n%", "contour\nµm"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    headings = ("cycle\ntime s", "change\ns", "foretold\ns", "change\n%", "contour\nµm")
+    table = outcomes_table(["change", "from"], headings)
     said = []
     time = rows[0].row.cycle_time
     for it in rows:
-        row = it.row
+        row, change = it.row, it.change if it.settings else None
         table.add_row(
             _changes(job, it),
             _present(job, it),
-            "-" if row.cycle_time is None else f"{row.cycle_time:.4f}",
-            "-" if it.change is None or not it.settings else f"{it.change:+.4f}",
+            number_text(row.cycle_time, ".4f"),
+            number_text(change, "+.4f"),
             foretold_text(it.foretold),
-            "-" if it.change is None or not it.settings or not time else f"{100.0 * it.change / time:+.2f}",
-            "-" if row.contour_error is None else f"{row.contour_error / MICROMETRE:.4g}",
-            Text(row.outcome, style="green" if row.passed else "bold red"),
+            "-" if change is None or not time else f"{100.0 * change / time:+.2f}",
+            number_text(row.contour_error, ".4g", MICROMETRE),
+            outcome_text(row.outcome),
         )
         if not row.passed:
             said.append(Text(f"{it.label}: {row.sentence}"))
-    return Group(Text(title, style="bold"), table, *said)
+    return titled(title, table, *said)
 
 
 def foretold_text(foretold: Forecast | None) -> str:
@@ -197,9 +194,7 @@ def sweep_table(done: Sweep, title: str) -> Group:
     """A sweep in a few lines: how many points, their outcomes, the fastest that passed, and why the others
     did not."""
     outcomes = Counter(row["outcome"] for row in done.rows)
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
+    table = pairs_table()
     before = f", {done.reused:,} of them planned before" if done.reused else ""
     told = ", ".join(f"{count:,} {outcome}" for outcome, count in outcomes.most_common())
     table.add_row("points", f"{len(done.rows):,}{before}: {told}")
@@ -216,7 +211,7 @@ def sweep_table(done: Sweep, title: str) -> Group:
     ]
     if len(reasons) > REASONS_SHOWN:
         said.append(Text(f"and {len(reasons) - REASONS_SHOWN:,} more reasons; {TABLE} has them all"))
-    return Group(Text(title, style="bold"), table, *said)
+    return titled(title, table, *said)
 
 
 def what_if_dict(job: StudiedJob, rows: Sequence[WhatIf]) -> dict[str, Any]:

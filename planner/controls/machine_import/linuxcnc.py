@@ -41,12 +41,9 @@ _LETTERS = "xyzabcuvw"  # in the order of LinuxCNC's axes
 # (src/emc/ini/emcIniFile.cc).
 _MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
 _DEGREES = {
-    "deg": 1.0,
-    "degree": 1.0,
-    "grad": 0.9,
-    "gon": 0.9,
-    "rad": 1.0 / RAD_PER_DEG,
-    "radian": 1.0 / RAD_PER_DEG,
+    **dict.fromkeys(("deg", "degree"), 1.0),
+    **dict.fromkeys(("grad", "gon"), 0.9),
+    **dict.fromkeys(("rad", "radian"), 1.0 / RAD_PER_DEG),
 }
 _JOINTS = {"trivkins": _LETTERS, "xyzac-trt-kins": "xyzac", "xyzbc-trt-kins": "xyzbc"}
 _DEFAULT = 1.0  # [units/s and units/s2] of a limit that is not set
@@ -55,25 +52,7 @@ _SAME = 1e-3  # of two units: numbers such as 0.03937 are inches
 _TABLES = r"EMC|EMCMOT|TRAJ|KINS|DISPLAY|JOINT_\d+|AXIS_\w"
 # Start-up codes that are those of every program's start or have a key of the machine file.
 _USUAL = frozenset(
-    [
-        "G17",
-        "G21",
-        "G20",
-        "G40",
-        "G49",
-        "G54",
-        "G61",
-        "G61.1",
-        "G64",
-        "G80",
-        "G90",
-        "G91.1",
-        "G92.1",
-        "G94",
-        "G97",
-        "G98",
-        "G99",
-    ]
+    f"G{code}" for code in (17, 20, 21, 40, 49, 54, 61, 61.1, 64, 80, 90, 91.1, 92.1, 94, 97, 98, 99)
 )
 _PATH_CONTROL = {"G64": "blend", "G61": "exact_path", "G61.1": "exact_stop"}
 # Files that a machine file does not have: what they hold, and the table that takes it.

@@ -15,7 +15,7 @@ more to a solver: the rows q', q'', q''' with the limits a, j, and the cap feed^
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -38,22 +38,28 @@ FAR = 4.0  # caps of feed^2 beyond so many times those of the axes are as good a
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class UserRows:
-    """Rows of V limits at P grid points."""
+class _Rows:
+    """What the grid has of a limit at P points, each (P,), or of V limits side by side, each (P, V)."""
 
-    names: tuple[str, ...]  # of the limits
-    d1: FloatArray  # (P, V) q'
-    # d2_left, d2_right, d3_left and d3_right: (P, V) as those of the axes
+    d1: FloatArray  # q'
+    # d2_left, d2_right, d3_left and d3_right: as those of the axes
     d2_left: FloatArray
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    # (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
+    # (3,) or (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
     least: FloatArray
-    # acceleration and jerk: (P, V) bounds at the points
+    # acceleration and jerk: bounds at the points
     acceleration: FloatArray
     jerk: FloatArray
-    feed_sq_max: FloatArray  # (P, V) what the bounds of the velocity allow; inf where nothing
+    feed_sq_max: FloatArray  # what the bounds of the velocity allow; inf where nothing
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UserRows(_Rows):
+    """Rows of V limits at P grid points."""
+
+    names: tuple[str, ...]  # of the limits
     error: FloatArray  # (P,) of the interval to the right, share of the acceleration bounds [-]
     coarse: Array  # (P,) True where that interval needs points
 
@@ -84,17 +90,8 @@ def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) 
     real = _real_bounds(samples, limits, at, inside)
     columns = [_Column.of(limit, samples, at, inside, real) for limit in limits.along]
     stacked = {
-        name: np.stack([getattr(column, name) for column in columns], axis=1)
-        for name in (
-            "d1",
-            "d2_left",
-            "d2_right",
-            "d3_left",
-            "d3_right",
-            "acceleration",
-            "jerk",
-            "feed_sq_max",
-        )
+        field.name: np.stack([getattr(column, field.name) for column in columns], axis=1)
+        for field in fields(_Rows)
     }
     error, coarse = np.zeros(len(samples)), np.zeros(len(samples), dtype=bool)
     for column in columns:
@@ -103,7 +100,6 @@ def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) 
     coarse[at] &= samples.s[at + 1] - samples.s[at] > LEAST
     return UserRows(
         names=tuple(limit.name for limit in limits.along),
-        least=np.stack([column.least for column in columns], axis=1),
         error=error,
         coarse=coarse,
         **stacked,
@@ -135,18 +131,9 @@ def _real_bounds(samples: PathSamples, limits: Limits, at: Array, inside: FloatA
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Column:
+class _Column(_Rows):
     """One limit on the grid: rows at the points (P,), and on the intervals (n,) what their middles say."""
 
-    d1: FloatArray
-    d2_left: FloatArray
-    d2_right: FloatArray
-    d3_left: FloatArray
-    d3_right: FloatArray
-    least: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    feed_sq_max: FloatArray
     error: FloatArray
     bend: FloatArray
     short: FloatArray

@@ -10,7 +10,7 @@ absolute coordinates. A fault is recorded and reading goes on, so that `info` ca
 import dataclasses
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -183,7 +183,7 @@ class _Run:
             self.absolute = it.name == "PA"
         else:
             self._move_pen(it.name == "PD", it.at)
-        for x, y in _pairs(it.numbers):
+        for x, y in zip(it.numbers[::2], it.numbers[1::2], strict=True):
             self._go(self._point(x, y, absolute=self.absolute), it.at)
 
     def _arc(self, it: Instruction) -> None:
@@ -320,7 +320,3 @@ _EXECUTE: dict[str, Callable[[_Run, Instruction], None]] = {
     **dict.fromkeys(PAGE_ENDS, _Run._end_page),
     "IN": _Run._begin_anew,
 }
-
-
-def _pairs(numbers: list[float]) -> Iterator[tuple[float, float]]:
-    return zip(numbers[::2], numbers[1::2], strict=True)

@@ -1,7 +1,9 @@
 """A program with parameters, expressions, loops or subprograms through the interpreter, and what was expanded
 on the way."""
 
+import contextlib
 import dataclasses
+import gc
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -91,14 +93,15 @@ class _Files:
         if source.file:
             self.run.files.append(name)
         parser = self.dialect.parser(source)
-        procedures = parser.parse()
-        if parser.faults:
-            return sorted(parser.faults, key=lambda fault: fault.place.line)
         marker = f"<nc {source.file}>"  # the name of the file in Python's tracebacks
-        try:
-            self.run.add(compile_procedures(procedures, self.dialect.language, self.rows, marker), marker)
-        except ProgramFault as fault:
-            return [fault]
+        with _garbage_waits():
+            procedures = parser.parse()
+            if parser.faults:
+                return sorted(parser.faults, key=lambda fault: fault.place.line)
+            try:
+                self.run.add(compile_procedures(procedures, self.dialect.language, self.rows, marker), marker)
+            except ProgramFault as fault:
+                return [fault]
         return []
 
     def load(self, name: str) -> bool:
@@ -118,6 +121,19 @@ class _Files:
         if nameless is not None:
             self.run.functions.setdefault(name, nameless)
         return True
+
+
+@contextlib.contextmanager
+def _garbage_waits() -> Iterator[None]:
+    """Within, Python looks for no garbage: statements are none, and it would go through all of them again
+    and again."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
 
 
 def _below(folder: Path) -> Iterator[Path]:

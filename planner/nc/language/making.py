@@ -272,6 +272,19 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
     yield from dwell_rows(hole.dwell)
 
 
+def helix(
+    at: complex, centre: complex, heights: tuple[float, float], pitch: float, turning: int, feed: float
+) -> Iterator[Row]:
+    """Down at a place round a centre, in equal turns of at most a pitch, and once round on the ground; `turning`
+    1 counter-clockwise, -1 clockwise. Raises ValueError."""
+    top, bottom = heights
+    count, code, spoke = equal_steps(top - bottom, pitch), 3.0 if turning > 0 else 2.0, centre - at
+    for k in range(1, count + 2):
+        z = bottom if k >= count else top + (bottom - top) * k / count
+        place: Row = [("X", at.real), ("Y", at.imag), ("Z", z), ("I", spoke.real), ("J", spoke.imag)]
+        yield [("G", code), ("F", feed), *place]
+
+
 def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turning: int) -> Iterator[Row]:
     """A bore on a helix: infeed per turn, once round on the ground, to the middle. Raises ValueError."""
     radius = making.tool_radius()
@@ -282,12 +295,8 @@ def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turni
         core = f"leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
         raise ValueError(f"a helix of radius {size:.6g} {core}")
     (x, y, _), feed = making.here(), hole.feed or 0.0
-    count = equal_steps(hole.top - hole.bottom, infeed)
     yield go(hole.clear)
     yield [("G", 1.0), ("F", feed), ("X", x + size), ("Y", y)]
     yield go(hole.top, feed)
-    code = 3.0 if turning > 0 else 2.0
-    for k in range(1, count + 2):
-        z = hole.bottom if k >= count else hole.top + (hole.bottom - hole.top) * k / count
-        yield [("G", code), ("F", feed), ("X", x + size), ("Y", y), ("Z", z), ("I", -size), ("J", 0.0)]
+    yield from helix(complex(x + size, y), complex(x, y), (hole.top, hole.bottom), infeed, turning, feed)
     yield [("G", 1.0), ("X", x), ("Y", y)]

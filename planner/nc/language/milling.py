@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.nc.language.making import HolePlan, Row, equal_steps
+from planner.nc.language.making import HolePlan, Row, equal_steps, helix
 from planner.nc.turning import Leg
 
 _SHORT = 1e-9  # relative length of a leg that is left out
@@ -246,16 +246,9 @@ class _Cutting:
             yield self.line(plan.plunge_feed, z=z)
         else:
             size, pitch = plan.helix
-            count = equal_steps(begin - z, pitch)
-            side = start + size
-            yield self.line(plan.plunge_feed, side)
-            to = -size * self.turned
-            code = 3.0 if plan.turning > 0 else 2.0
-            for k in range(1, count + 2):  # and once round on the ground
-                deep = z if k >= count else begin + (z - begin) * k / count
-                yield [
-                    ("G", code), ("F", plan.plunge_feed), *self._ends(side, deep), ("I", to.real), ("J", to.imag)
-                ]  # fmt: skip
+            yield self.line(plan.plunge_feed, start + size)
+            side, centre = (self.at + self.turned * place for place in (start + size, start))
+            yield from helix(side, centre, (begin, z), pitch, plan.turning, plan.plunge_feed)
             yield self.line(plan.feed, start)
 
     def _ends(self, point: complex | None, z: float | None) -> Row:

@@ -14,10 +14,12 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
+from planner.nc.language import tree
 from planner.nc.language.detect import bare, computes, may_compute, row_text
-from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace, Statements
+from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
 from planner.nc.lexer import BOM, Words
 
+NESTED_MAX = 100  # loops and branches in each other
 _PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
 _MESSAGE = re.compile(rb"\([ \t]*(?:DEBUG|PRINT|MSG)[ \t]*,", re.IGNORECASE)
 
@@ -137,12 +139,40 @@ class Source:
         return Fault(fault.place.line, self.words.column_at(at), word, fault.message, name)
 
 
-class LineParser(Statements):
-    """Makes statements of one file, line by line. Faults of all its lines are kept in `faults`."""
+class LineParser:
+    """Makes statements of one file, line by line.
+
+    body, base : where the next statement goes, and where it goes outside of all that is open
+    open       : statements without an end, the outermost first
+    faults     : those of all lines
+    """
 
     def __init__(self, source: Source):
-        super().__init__()
         self.source = source
+        self.main: list[tree.Statement] = []
+        self.base = self.body = self.main
+        self.open: list[tree.OpenStatement] = []
+        self.faults: list[ProgramFault] = []
+
+    def begin(self, opened: tree.OpenStatement) -> tree.OpenStatement:
+        """Open a statement, in whose body the next ones go. Raises ProgramFault for too many in each other."""
+        if len(self.open) >= NESTED_MAX:
+            text = f"more than {NESTED_MAX} loops and branches in each other"
+            raise ProgramFault(opened.place, text)
+        self.open.append(opened)
+        self.body = opened.body
+        return opened
+
+    def close(self) -> tree.OpenStatement:
+        """The innermost open statement ends."""
+        closed = self.open.pop()
+        self.body = self.open[-1].body if self.open else self.base
+        return closed
+
+    def add_loop(self, closed: tree.OpenStatement, condition: tree.Expression, kind: str = "while") -> None:
+        """Add the loop of an open statement that has been closed."""
+        name = f"{closed.kind} {closed.place.at}"
+        self.body.append(tree.Loop(closed.place, kind, name, condition, closed.body))
 
     def read(self, items: Iterable[SourceLine | PlainRows]) -> None:
         """Take the lines and plain rows of a program in its order."""

@@ -114,8 +114,8 @@ class LineReader(TokenReader):
         """The whole number behind one of the letters, which are gone past; None if something else comes."""
         if self.peek() not in letters or not self.peek(1).isdecimal():
             return None
-        self.next += 2
-        return int(self.peek(-1))
+        self.pop()
+        return int(self.pop().text)
 
     def name(self) -> str:
         """A name between < and >."""
@@ -124,7 +124,7 @@ class LineReader(TokenReader):
         name = self.peek()[1:-1].lower()
         if name.startswith(("_hal[", "_ini[")):
             raise self.fault("a signal or setting that only the control knows; write its value")
-        self.next += 1
+        self.pop()
         return name
 
     def parameter(self) -> tree.Parameter:
@@ -154,7 +154,7 @@ class LineReader(TokenReader):
                 self.expect("=", "the parameter")
                 assignments.append((target, self.expression() if self.language.long_values else self.value()))
             elif kind in ("letter", "name"):
-                self.next += 1
+                self.pop()
                 value = self.value()
                 is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.column()]
                 if scale != 1.0 and is_length and isinstance(value, tree.Number):

@@ -29,9 +29,6 @@ class Token(NamedTuple):
     at: int  # where it begins in the line
 
 
-_END = Token("", "", 0)
-
-
 class TokenReader:
     """Reads a text that is split into tokens, from left to right.
 
@@ -39,7 +36,7 @@ class TokenReader:
     pattern          : of a token behind blanks; the names of its groups are kinds
     opening, closing : the brackets of expressions
     pieces           : what long expressions are divided into, for messages
-    next             : the token that comes
+    tokens, next     : the pieces, with two of no kind behind the last; and which of them comes
     """
 
     language: Language
@@ -64,7 +61,7 @@ class TokenReader:
         if at < end:
             at += len(self.text[at:]) - len(self.text[at:].lstrip())
             raise self.fault(f"{self.text[at]!r} is not part of the language", at)
-        return tokens
+        return [*tokens, *2 * [Token("", "", len(self.text))]]
 
     def fault(self, message: str, at: int | None = None) -> ProgramFault:
         """A fault of a character of the text; of the next token if none is given."""
@@ -83,28 +80,29 @@ class TokenReader:
     @property
     def ended(self) -> bool:
         """True if nothing is left."""
-        return self.next >= len(self.tokens)
+        return not self.tokens[self.next].kind
 
     def peek(self, ahead: int = 0) -> str:
         """The text of a token that comes; empty after the last."""
-        return self.tokens[self.next + ahead].text if self.next + ahead < len(self.tokens) else ""
+        return self.tokens[self.next + ahead].text
 
     def kind(self) -> str:
         """The kind of the next token; empty after the last."""
-        return "" if self.ended else self.tokens[self.next].kind
+        return self.tokens[self.next].kind
 
     def pop(self) -> Token:
-        """Go past the next token."""
-        self.next += 1
-        return self.tokens[self.next - 1]
+        """Go past the next token, if there is one."""
+        token = self.tokens[self.next]
+        self.next += bool(token.kind)
+        return token
 
     def column(self) -> int:
         """Where the next token begins in the text."""
-        return len(self.text) if self.ended else self.tokens[self.next].at
+        return self.tokens[self.next].at
 
-    def take(self, *texts: str) -> bool:
-        """Go past one of the tokens if it comes next."""
-        found = not self.ended and self.peek() in texts
+    def take(self, text: str) -> bool:
+        """Go past the token if it comes next."""
+        found = self.tokens[self.next].text == text
         self.next += found
         return found
 
@@ -116,7 +114,7 @@ class TokenReader:
     def expression(self, rank: int = 1) -> Expression:
         """Values with operators of at least that rank, those of one rank taken from left to right."""
         left, count, language = self.value(), 0, self.language
-        while (its := language.ranks.get(operator := self.peek(), 0)) >= rank:
+        while (its := language.ranks.get(operator := self.tokens[self.next].text, 0)) >= rank:
             self.next += 1
             left = Operation(language.meant.get(operator, operator), (left, self.expression(its + 1)))
             count += 1
@@ -134,7 +132,7 @@ class TokenReader:
 
     def value(self) -> Expression:
         """A number, parameter, function or bracket, with signs before it."""
-        token = self.tokens[self.next] if self.next < len(self.tokens) else _END
+        token = self.tokens[self.next]
         if token.kind == "number":
             self.next += 1
             return Number(self.number(token.text))
@@ -145,7 +143,7 @@ class TokenReader:
         found: Expression | None = None
         if token.text == self.opening:
             found = self.bracket()
-        elif token is not _END:
+        elif token.kind:
             self.next += 1
             if token.text in ("+", "-"):
                 found = -self.value() if token.text == "-" else self.value()

@@ -84,7 +84,6 @@ class Exists(Value):
 Expression = Number | Numbered | Named | Operation | Exists
 Parameter = Numbered | Named
 Assignments = tuple[tuple[Parameter, Expression], ...]
-NESTED_MAX = 100  # loops and branches in each other
 ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
 
 
@@ -258,36 +257,6 @@ class OpenStatement:
         if self.condition is not None:
             self.another_branch(None)
         return If(self.place, tuple(self.branches), self.body)
-
-
-class Statements:
-    """The statements so far: `body` is where the next one goes, `base` where it goes outside of all that is
-    open; `open` has those without an end, the outermost first; `faults` are those of all lines."""
-
-    def __init__(self) -> None:
-        self.main: list[Statement] = []
-        self.base = self.body = self.main
-        self.open: list[OpenStatement] = []
-        self.faults: list[ProgramFault] = []
-
-    def begin(self, opened: OpenStatement) -> OpenStatement:
-        """Open a statement, in whose body the next ones go. Raises ProgramFault for too many in each other."""
-        if len(self.open) >= NESTED_MAX:
-            text = f"more than {NESTED_MAX} loops and branches in each other"
-            raise ProgramFault(opened.place, text)
-        self.open.append(opened)
-        self.body = opened.body
-        return opened
-
-    def close(self) -> OpenStatement:
-        """The innermost open statement ends."""
-        closed = self.open.pop()
-        self.body = self.open[-1].body if self.open else self.base
-        return closed
-
-    def add_loop(self, closed: OpenStatement, condition: Expression, kind: str = "while") -> None:
-        """Add the loop of an open statement that has been closed."""
-        self.body.append(Loop(closed.place, kind, f"{closed.kind} {closed.place.at}", condition, closed.body))
 
 
 Statement = (

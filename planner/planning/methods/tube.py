@@ -16,6 +16,7 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.names import QUICK
 from planner.feedrate.solution import Status
+from planner.joint.groups import searched
 from planner.joint.parts import FoundRun, parts_of
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.joint.solvers import TubeSolver, tube_solver
@@ -57,7 +58,8 @@ class TubeMethod(Method):
         start, found = Start(first.making.motion, job), list[FoundRun]()
         with job.stage("solve") as report:
             for k, run in enumerate(runs):
-                found.append(search_run(k, run, start, solver, within=start.lasting(k)))
+                steps = len(start.guess(k, run))
+                found += searched([search_run(k, run, start, solver, within=start.lasting(k))], steps)
                 report((k + 1) / len(runs))
         made, stays, why = _delivered(job, first, start, found)
         corner = f" with corner {first.corner}" if first.corner else ""

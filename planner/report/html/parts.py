@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array
-from planner.base.errors import InputError
+from planner.base.errors import import_needed
 from planner.base.files import readable
 
 LEVEL = 6  # of compression: a higher one takes three times as long for 2 % less
@@ -90,11 +90,7 @@ def packed(column: Array) -> str:
 def plotly_script() -> str:
     """plotly's script, to be run by the page that it stands in. Raises InputError if plotly is not
     installed."""
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as fault:
-        raise InputError("a report needs the package plotly: pip install plotly") from fault
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
+    return str(import_needed("plotly.offline", "a report").get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def template(name: str) -> str:

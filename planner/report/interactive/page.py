@@ -13,13 +13,12 @@ import tempfile
 import webbrowser
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from planner.base.errors import InputError
+from planner.base.errors import import_needed
 from planner.base.names import known_name
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
@@ -104,12 +103,7 @@ def save(
 
 def plan_frame(plan: Plan) -> pandas.DataFrame:
     """`Plan.to_pandas`: a row for each setpoint."""
-    try:
-        pd = import_module("pandas")
-    except ImportError as fault:
-        raise InputError(
-            "a table needs the package pandas: pip install 'feedrate-planner[notebook]'"
-        ) from fault
+    pd = import_needed("pandas", "a table", "notebook")
     trajectory = plan.require().trajectory
     assert trajectory is not None
     joints = joints_of(plan)
@@ -259,12 +253,7 @@ class PlanFigures:
         return self._figure(data, made["layout"], height)
 
     def _figure(self, data: list[Any], layout: dict[str, Any], height: int) -> Figure:
-        try:
-            go = import_module("plotly.graph_objects")
-        except ImportError as fault:
-            raise InputError(
-                "figures need the package plotly: pip install 'feedrate-planner[notebook]'"
-            ) from fault
+        go = import_needed("plotly.graph_objects", "a figure", "notebook")
         text = f"{self._plan.method} on {self._plan.machine.name}: {self._plan.cycle_time:.4f} s"
         figure: Figure = go.Figure(data, {**layout, "title": {"text": text}, "height": height})
         return figure

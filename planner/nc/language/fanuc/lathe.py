@@ -5,7 +5,6 @@ A profile is a procedure of its own, which a cycle runs to read it (lathe_cycles
 """
 
 import re
-from collections.abc import Callable
 
 import numpy as np
 
@@ -113,17 +112,16 @@ class LatheParser(LatheWords):
         if cycle == "G70":
             self.body += [tree.made(line.place, "start"), call, tree.made(line.place, "back")]
             return
-        values = _ROUGHING[cycle](
-            self, {letter: self._length(word, cycle, line) for letter, word in given.items()}, line
-        )
+        measured = {letter: self._length(word, cycle, line) for letter, word in given.items()}
+        values = self._pattern(measured, line) if cycle == "G73" else self._removal(cycle, measured, line)
         self.body += [shared(values, line), tree.made(line.place, "profile"), call]
         self.body.append(of_shared(line.place, cycle, values))
 
     def _removal(
-        self, given: dict[str, tree.Expression], line: SourceLine, depth: str
+        self, cycle: str, given: dict[str, tree.Expression], line: SourceLine
     ) -> dict[str, tree.Expression]:
         """G71 (depth in U of its first block) and G72 (in W)."""
-        before = self.waiting.get("G71" if depth == "U" else "G72", {})
+        depth, before = "U" if cycle == "G71" else "W", self.waiting.get(cycle, {})
         values = {letter: given[letter] for letter in "UWIK" if letter in given}
         if "D" not in given and depth not in before:
             remedy = f"D, or {depth} in a block before this one ({depth}2. R0.5)"
@@ -179,15 +177,6 @@ class LatheParser(LatheWords):
         if (match and match.group(1)) or (line.scale != 1.0 and ord(word.letter) in LENGTHS):
             return word.value
         return word.value * _INCREMENT
-
-
-_ROUGHING: dict[
-    str, Callable[[LatheParser, dict[str, tree.Expression], SourceLine], dict[str, tree.Expression]]
-] = {
-    "G71": lambda parser, given, line: parser._removal(given, line, "U"),
-    "G72": lambda parser, given, line: parser._removal(given, line, "W"),
-    "G73": LatheParser._pattern,
-}
 
 
 def _finishing(first: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:

@@ -44,7 +44,7 @@ from planner.nc.language.making import (
     pecked,
     tapped,
 )
-from planner.nc.language.milling import ArcSlot, PocketPlan, PocketShape, RoundedRectangle, pocket_rows
+from planner.nc.language.milling import ArcSlot, PocketPlan, RoundedRectangle, pocket_rows
 
 _FIRST, _LAST = 200, 385  # Q parameters of cycles
 _FEEDS = (206, 207, 208, 385)  # that inch programs give in tenths of an inch per minute
@@ -207,10 +207,6 @@ def _place(making: Making, given: Given, half: complex, angle: float, names: dic
     return complex(x, y) - inside * cmath.rect(1.0, math.radians(angle))
 
 
-def _cut(making: Making, shape: PocketShape, given: Given, at: complex, angle: float) -> Iterator[Row]:
-    yield from pocket_rows(shape, _plan(making, given), at, angle)
-
-
 def _rectangle(making: Making, given: Given) -> Iterable[Row]:
     a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
     if min(a, b) <= 0.0:
@@ -219,7 +215,8 @@ def _rectangle(making: Making, given: Given) -> Iterable[Row]:
     if given["Q220"] > min(a, b):
         raise ValueError("Q220, the radius of the corners, is more than half a side")
     shape, angle = RoundedRectangle(a, b, min(corner, a, b)), given["Q224"]
-    return _cut(making, shape, given, _place(making, given, complex(a, b), angle, _CORNERS), angle)
+    at = _place(making, given, complex(a, b), angle, _CORNERS)
+    return pocket_rows(shape, _plan(making, given), at, angle)
 
 
 def _circle(making: Making, given: Given) -> Iterable[Row]:
@@ -227,7 +224,7 @@ def _circle(making: Making, given: Given) -> Iterable[Row]:
     if size <= 0.0:
         raise ValueError("Q223, the diameter of the pocket, is to be above 0")
     at = _place(making, given, 0j, 0.0, {0: 0j})
-    return _cut(making, RoundedRectangle(size, size, size), given, at, 0.0)
+    return pocket_rows(RoundedRectangle(size, size, size), _plan(making, given), at, 0.0)
 
 
 def _slot(making: Making, given: Given) -> Iterable[Row]:
@@ -236,7 +233,7 @@ def _slot(making: Making, given: Given) -> Iterable[Row]:
         raise ValueError("a slot has a width Q219 above 0 and a length Q218 of at least that")
     ends = {0: 0j, 1: -1 + 0j, 2: complex(b / a - 1.0), 3: complex(1.0 - b / a), 4: 1 + 0j}
     at = _place(making, given, complex(a, b), given["Q374"], ends)
-    return _cut(making, RoundedRectangle(a, b, b), given, at, given["Q374"])
+    return pocket_rows(RoundedRectangle(a, b, b), _plan(making, given), at, given["Q374"])
 
 
 def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
@@ -250,7 +247,7 @@ def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
         raise ValueError(text)
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
     for k in range(max(1, equal_steps(given["Q377"], 1.0))):
-        yield from _cut(making, shape, given, at, k * given["Q378"])
+        yield from pocket_rows(shape, _plan(making, given), at, k * given["Q378"])
 
 
 CYCLES: dict[int, Maker] = {

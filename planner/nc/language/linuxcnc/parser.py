@@ -192,7 +192,7 @@ class LinuxcncParser(LineParser):
         keyword = reader.peek().lower()
         if keyword not in KEYWORDS:
             raise reader.fault(f"after an O word one of {', '.join(sorted(KEYWORDS))} is expected")
-        reader.next += 1
+        reader.pop()
         if keyword == "call":
             self._call(reader, line, label)
         elif not isinstance(label, str):

@@ -211,8 +211,8 @@ def _skip(reader: LineTokens) -> None:
     while reader.peek() in ("(", "[") or depth:
         if reader.ended:
             raise reader.fault(") is missing")
-        depth += (reader.peek() in ("(", "[")) - (reader.peek() in (")", "]"))
-        reader.next += 1
+        found = reader.pop().text
+        depth += (found in ("(", "[")) - (found in (")", "]"))
 
 
 # What is read by its name. A new command is a line here and a method above.

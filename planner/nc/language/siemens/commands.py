@@ -119,8 +119,8 @@ class Commands(SiemensControl):
         while not reader.take(")"):
             if reader.peek() == ",":
                 given.append(None)
-            elif not reader.ended and reader.tokens[reader.next].kind == "text":
-                reader.next += 1
+            elif reader.kind() == "text":
+                reader.pop()
                 given.append(None)
             else:
                 given.append(reader.expression())
@@ -142,8 +142,7 @@ class Commands(SiemensControl):
         if reader.ended:
             self.cycle = None
             return
-        name = reader.peek()
-        reader.next += 1
+        name = reader.pop().text
         known = [one for one in cycles.ARGUMENTS if one not in cycles.POCKETS]
         if name not in known:
             raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
@@ -155,8 +154,7 @@ class Commands(SiemensControl):
         kind = SIEMENS.index(name.removeprefix("A")) + (ADDED if name.startswith("A") else 0)
         given: dict[str, tree.Expression] = {}
         while not reader.ended:
-            token, at = reader.tokens[reader.next], reader.at()
-            reader.next += 1
+            at, token = reader.at(), reader.pop()
             letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
             single = token.kind == "word" or len(token.text) == len(letter)
             if letter not in ("X", "Y", "Z", "RPL") or not single:
@@ -170,15 +168,13 @@ class Commands(SiemensControl):
         self.body.append(tree.made(place, "frame in force"))
 
     def _define(self, reader: LineTokens) -> None:
-        kind = reader.peek()
-        reader.next += 1
+        kind = reader.pop().text
         if kind not in TYPES:
             raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(TYPES))}", 0)
         while True:
-            name = reader.peek()
-            if reader.ended or reader.tokens[reader.next].kind != "name" or reader.peek(1) == "[":
+            if reader.kind() != "name" or reader.peek(1) == "[":
                 raise reader.fault("the name of a variable is expected here; arrays are not read")
-            reader.next += 1
+            name = reader.pop().text
             self.names.add(name)
             value = reader.expression() if reader.take("=") else tree.ZERO
             self.body.append(tree.assign(reader.place, (variable(name), value)))
@@ -209,8 +205,8 @@ class Commands(SiemensControl):
     def _given(self, reader: LineTokens, letter: str, at: int) -> tree.Expression | None:
         """The value behind an equals sign; None for a text, such as T="DRILL"."""
         reader.expect("=")
-        if not reader.ended and reader.tokens[reader.next].kind == "text":
-            reader.next += 1
+        if reader.kind() == "text":
+            reader.pop()
             return None
         kind = reader.peek()
         if kind in ("AC", "IC") and reader.peek(1) == "(":
@@ -229,29 +225,27 @@ class Commands(SiemensControl):
     def _is_call(self, reader: LineTokens) -> bool:
         """True if the line is a call by a name."""
         name, known = reader.peek(), self.names | IDLE | IDLE_CALLS | SAID.keys()
-        is_name = reader.tokens[reader.next].kind == "name" and _CALLED.fullmatch(name)
+        is_name = reader.kind() == "name" and _CALLED.fullmatch(name)
         if not is_name or name in known:
             return False
         behind = reader.peek(1)
         return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
 
     def _call(self, reader: LineTokens) -> None:
-        name = reader.peek()
-        reader.next += 1
+        name = reader.pop().text
         times: tree.Expression = tree.ONE
         given = self._arguments(reader)
         if match := _TIMES.fullmatch(reader.peek()):
-            reader.next += 1
+            reader.pop()
             times = tree.Number(float(match.group(1)))
         if not reader.ended:
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
 
     def _call_text(self, reader: LineTokens) -> None:
-        text = reader.peek().strip('"')
-        if reader.ended or reader.tokens[reader.next].kind != "text":
+        if reader.kind() != "text":
             raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
-        reader.next += 1
+        text = reader.pop().text.strip('"')
         stem = re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1])
         name = re.sub(r"(?i)(_SPF|\.SPF|_MPF|\.MPF)\Z", "", stem)
         self._append_call(reader, name.upper(), [], tree.ONE)
@@ -270,9 +264,9 @@ class Commands(SiemensControl):
         self.body.append(tree.Call(reader.place, name.lower(), None, name, times))
 
     def _procedure(self, reader: LineTokens) -> None:
-        if reader.ended or reader.tokens[reader.next].kind != "name":
+        if reader.kind() != "name":
             raise reader.fault("PROC is followed by the subprogram's name")
-        reader.next += 1
+        reader.pop()
         taken: list[tuple[tree.Parameter, tree.Expression]] = []
         if reader.take("("):
             while not reader.take(")"):

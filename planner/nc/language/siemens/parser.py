@@ -100,7 +100,7 @@ class SiemensParser(BlockWords):
             return
         read = _STATEMENTS.get(reader.peek())
         if read is not None:
-            reader.next += 1
+            reader.pop()
             read(self, reader)
             if not reader.ended:
                 raise reader.fault(f"{reader.peek()} is not expected here")

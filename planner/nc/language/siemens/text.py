@@ -74,7 +74,7 @@ class LineTokens(TokenReader):
 
     def leave(self) -> None:
         """Go past all that is left."""
-        self.next = len(self.tokens)
+        self.next = len(self.tokens) - 2
 
     def at(self) -> int:
         """Byte offset of the next token."""
@@ -111,7 +111,7 @@ class LineTokens(TokenReader):
             self.expect(")")
             return tree.op(_TWO.get(name, name), *operands)
         if _SYSTEM.match(name) and self.take("["):
-            axis = self.pop().text if not self.ended else ""
+            axis = self.pop().text
             self.expect("]")
             if axis not in ("X", "Y", "Z"):
                 raise self.fault(f"{name}[{axis}]: the position of X, Y or Z is known", token.at)
@@ -161,7 +161,7 @@ class SiemensControl(LineParser):
     def _if(self, reader: LineTokens) -> None:
         condition = reader.expression()
         if reader.peek().startswith("GOTO"):
-            reader.next += 1
+            reader.pop()
             body: list[tree.Statement] = []
             self._jump(reader, body)
             self.body.append(tree.If(reader.place, ((condition, body),), []))
@@ -184,10 +184,10 @@ class SiemensControl(LineParser):
         self.add_loop(closed, closed.condition)
 
     def _for(self, reader: LineTokens) -> None:
-        target = reader.parameter(reader.tokens[reader.next]) if not reader.ended else None
+        target = reader.parameter(reader.tokens[reader.next])
         if target is None:
             raise reader.fault("FOR needs a variable that is declared")
-        reader.next += 1
+        reader.pop()
         reader.expect("=")
         first = reader.expression()
         reader.expect("TO")
@@ -220,8 +220,7 @@ class SiemensControl(LineParser):
 
     def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
         """The label of a repeat, its counter, and how often. Raises ProgramFault for an unknown label."""
-        label = reader.peek()
-        reader.next += 1
+        label = reader.pop().text
         if label not in known:
             raise reader.fault(f"there is no label {label} above this line", 0)
         times: tree.Expression = tree.ONE
@@ -236,8 +235,7 @@ class SiemensControl(LineParser):
         self.add_loop(closed, tree.op("NOT", reader.expression()), "do")
 
     def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
-        label = reader.peek()
-        if not label:
+        if reader.ended:
             raise reader.fault("a label is expected here")
-        reader.next += 1
+        label = reader.pop().text
         body.append(tree.Goto(reader.place, tree.Number(float(self._number_of(label)))))

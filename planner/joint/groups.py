@@ -1,0 +1,195 @@
+"""Searches of many runs at once, their windows solved in groups.
+
+A search tells sweep by sweep what can be searched side by side, as tasks; a task tells window by window what is
+to be solved. Both are generators, resumed with what became of that. Windows that are ready wait until there are
+enough of them to find some of about the same length: a group takes as long as its longest. What a search finds
+does not depend on its group, nor on the number of threads. Searches are begun when windows are wanted, so that
+few of them are on their way at any time.
+"""
+
+from collections import deque
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
+from functools import partial
+from itertools import count
+from threading import Condition
+from typing import Any, NamedTuple, TypeVar
+
+from planner.base.sizes import SIZES
+from planner.base.threads import side_by_side, threads
+from planner.joint.window_solver import WIDTH, Asked, Solved, kind_of, solve_windows
+
+# Windows that wait when a group is put together, if there are so many.
+WAITING = 8 * WIDTH
+QUIET = SIZES.windows_shared  # steps: searches of fewer together are worth no thread
+Task = Generator[Asked, Solved, bool]  # returns whether it has ended well
+
+
+class Sweep(NamedTuple):
+    """Tasks that do not depend on one another, and whether all of them are needed: then the first one that does
+    not end well ends the sweep."""
+
+    tasks: list[Task]
+    all_needed: bool
+
+
+T = TypeVar("T")
+# Is sent how the tasks of its sweep have ended, those that have, in any order.
+Search = Generator[Sweep, list[bool], T]
+
+
+def searched(searches: Iterable[Search[T]], steps: int, tell: Callable[[], None] = lambda: None) -> list[T]:
+    """What the searches return, in their order.
+
+    steps : that they have together, about
+    tell  : called in this thread now and then
+    """
+    groups = Groups(searches)
+    if steps > QUIET:
+        side_by_side([groups.work] * threads(), groups.stop, tell)
+    else:
+        groups.work()
+    tell()
+    return [found for _, found in sorted(groups.found.items())]
+
+
+class _Running:
+    """A search on its way.
+
+    tasks : of its sweep, those that have not been begun
+    left  : how many have not ended
+    ended : how the others have; None before the first sweep
+    """
+
+    def __init__(self, number: int, search: Search[Any]):
+        self.number, self.search = number, search
+        self.tasks = deque[Task]()
+        self.left, self.all_needed = 0, False
+        self.ended: list[bool] | None = None
+
+    def given_up(self) -> bool:
+        """Whether a task that was needed has not ended well."""
+        return self.all_needed and not all(self.ended or ())
+
+
+class _Ready(NamedTuple):
+    """A task whose window waits."""
+
+    running: _Running
+    task: Task
+    asked: Asked
+
+
+def together(asked: list[Asked]) -> list[int]:
+    """Which windows to solve next, `WIDTH` of one kind at most: those that leave least of a group as long as its
+    longest idle, the longest where several do."""
+    steps = [len(one.window.u) for one in asked]
+    by_kind: dict[Hashable, list[int]] = {}
+    for at in sorted(range(len(asked)), key=lambda at: -steps[at]):
+        by_kind.setdefault(kind_of(asked[at]), []).append(at)
+    groups = [of[k : k + WIDTH] for of in by_kind.values() for k in range(max(len(of) - WIDTH, 0) + 1)]
+    return max(groups, key=lambda group: sum(steps[at] for at in group) / (WIDTH * steps[group[0]]))
+
+
+class Groups:
+    """Searches, from which any number of threads take windows (`work`).
+
+    found : what the searches have returned, by their number
+    """
+
+    def __init__(self, searches: Iterable[Search[Any]]):
+        self.found: dict[int, Any] = {}
+        self._new: Iterator[_Running] = map(_Running, count(), searches)
+        self._going: list[_Running] = []  # with tasks that have not been begun
+        self._ready: list[_Ready] = []
+        self._busy, self._stopped = 0, False
+        self._changed = Condition()
+
+    def stop(self) -> None:
+        """Solve no other window."""
+        with self._changed:
+            self._stopped = True
+            self._changed.notify_all()
+
+    def work(self) -> None:
+        """Solve windows until there is nothing left to do."""
+        while (what := self._next()) is not None:
+            try:
+                what()
+            finally:
+                with self._changed:
+                    self._busy -= 1
+                    self._changed.notify_all()
+
+    def _next(self) -> Callable[[], None] | None:
+        """What is to be done next; None at the end."""
+        with self._changed:
+            while True:
+                what = None if self._stopped else self._chosen()
+                if what is not None:
+                    self._busy += 1
+                if what is not None or self._stopped or not self._busy:
+                    return what
+                self._changed.wait()
+
+    def _chosen(self) -> Callable[[], None] | None:
+        if len(self._ready) < WAITING:
+            if self._going:
+                running = self._going[-1]
+                task = running.tasks.popleft()
+                if not running.tasks:
+                    self._going.pop()
+                return partial(self._resume, running, task)
+            if (new := next(self._new, None)) is not None:
+                return partial(self._go_on, new)
+        if not self._ready:
+            return None
+        group = together([one.asked for one in self._ready])
+        solve = partial(self._solve, [self._ready[at] for at in group])
+        self._ready = [one for at, one in enumerate(self._ready) if at not in group]
+        return solve
+
+    def _solve(self, group: list[_Ready]) -> None:
+        for one, solved in zip(group, solve_windows([one.asked for one in group]), strict=True):
+            self._resume(one.running, one.task, solved)
+
+    def _resume(self, running: _Running, task: Task, solved: Solved | None = None) -> None:
+        """Go on with a task to its next window, or its end."""
+        asked, ended = None, list[bool]()
+        try:
+            asked = next(task) if solved is None else task.send(solved)
+        except StopIteration as end:
+            ended.append(end.value)
+        with self._changed:
+            assert running.ended is not None
+            running.ended += ended
+            if asked is not None and not running.given_up():
+                self._ready.append(_Ready(running, task, asked))
+                return
+            running.left -= 1
+            if running.given_up():
+                self._forget(running)
+            over = not running.left
+        if over:
+            self._go_on(running)
+
+    def _forget(self, running: _Running) -> None:
+        """Begin and solve nothing else of a sweep."""
+        others = [one for one in self._ready if one.running is not running]
+        running.left -= len(self._ready) - len(others) + len(running.tasks)
+        running.tasks.clear()
+        self._ready, self._going = others, [one for one in self._going if one is not running]
+
+    def _go_on(self, running: _Running) -> None:
+        """Go on with a search to its next sweep, or its end."""
+        while not running.left:
+            try:
+                ended = running.ended
+                sweep = next(running.search) if ended is None else running.search.send(ended)
+            except StopIteration as end:
+                self.found[running.number] = end.value
+                return
+            with self._changed:
+                running.tasks.extend(sweep.tasks)
+                running.left, running.all_needed, running.ended = len(sweep.tasks), sweep.all_needed, []
+                if running.left:
+                    self._going.append(running)

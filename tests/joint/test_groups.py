@@ -1,0 +1,238 @@
+"""Windows of many searches in groups: what is found depends neither on the group nor on threads, and no group is larger, mixed or in
+vain."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from starts import MACHINE, PROGRAMS, begun, begun_on
+
+from planner.base.threads import use_threads
+from planner.joint import groups, own
+from planner.joint.groups import Sweep, searched
+from planner.joint.own import TubeOwn
+from planner.joint.window_solver import WIDTH
+from planner.machine.user_limit import PathLimit
+
+pytestmark = pytest.mark.usefixtures("threads_as_before")
+NAMES = ("corner", "arcs", "pentagon", "own", "powered", "turned")
+
+
+class Fence(PathLimit):
+    """A bound that jumps from one place to the next."""
+
+    name = "fence"
+
+    def velocity(self, at):
+        return np.where((at.x > 1.3) & (at.x < 4.7), 35.0, 90.0)
+
+    def acceleration(self, at):
+        return 2000.0 + 0.0 * at.x
+
+    def jerk(self, at):
+        return 2e5 + 0.0 * at.x
+
+
+LONG = 1 << 20  # steps: enough for threads
+
+
+def asked_for(steps: int, axes: int = 3) -> SimpleNamespace:
+    """A window of so many steps, of which nothing else is read here."""
+    return SimpleNamespace(window=SimpleNamespace(u=np.empty((steps, axes + 1))))
+
+
+def task(windows: list[SimpleNamespace], well: bool = True):
+    for one in windows:
+        assert (yield one) == one.window.u.shape
+    return well
+
+
+def search(sweeps: list[list[groups.Task]], told: list[list[bool]], all_needed: bool = False):
+    for tasks in sweeps:
+        told.append((yield Sweep(tasks, all_needed)))
+    return len(told)
+
+
+@pytest.fixture
+def solved(monkeypatch) -> list[list[tuple[int, int]]]:
+    """The groups that are solved: the shapes of their windows, which are the answers."""
+    seen: list[list[tuple[int, int]]] = []
+
+    def solve(asked):
+        seen.append([one.window.u.shape for one in asked])
+        return seen[-1]
+
+    monkeypatch.setattr(groups, "solve_windows", solve)
+    return seen
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_all_windows_are_solved_once_in_groups_of_one_kind_and_about_one_length(solved, threads):
+    use_threads(threads)
+    rng = np.random.default_rng(1)
+    windows = [
+        [[asked_for(int(n), int(rng.integers(2, 4))) for n in rng.integers(10, 90, 3)] for _ in range(4)]
+        for _ in range(30)
+    ]
+    told: list[list[list[bool]]] = [[] for _ in windows]
+    found = searched(
+        [
+            search([[task(w) for w in one[:3]], [], [task(w, False) for w in one[3:]]], t)
+            for one, t in zip(windows, told, strict=True)
+        ],
+        LONG,
+    )
+    assert found == [3] * 30
+    assert all([sorted(sweep) for sweep in one] == [[True] * 3, [], [False]] for one in told)
+    shapes = [shape for group in solved for shape in group]
+    assert sorted(shapes) == sorted(w.window.u.shape for one in windows for t in one for w in t)
+    assert max(map(len, solved)) == WIDTH
+    assert all(len({axes for _, axes in group}) == 1 for group in solved)
+    if threads == 1:
+        used = sum(map(sum, ([steps for steps, _ in group] for group in solved)))
+        assert used > 0.8 * WIDTH * sum(max(group)[0] for group in solved)
+
+
+def test_searches_are_begun_when_windows_are_wanted(solved):
+    use_threads(1)
+    begun_at, going = [], 0
+
+    def one():
+        nonlocal going
+        going += 1
+        begun_at.append(going)
+        yield from search([[task([asked_for(20), asked_for(20)])]], [])
+        going -= 1
+
+    searched((one() for _ in range(500)), LONG)
+    assert going == 0
+    assert max(begun_at) <= groups.WAITING + WIDTH
+
+
+def test_where_all_are_needed_the_first_that_fails_ends_the_sweep(solved):
+    use_threads(1)
+    told: list[list[bool]] = []
+    tasks = [task([asked_for(1000 - k)] * 2, k != 1) for k in range(500)]
+    assert searched([search([tasks, [task([asked_for(5)])]], told, all_needed=True)], LONG) == [2]
+    assert sorted(told[0])[0] is False
+    assert len(told[0]) < 20
+    assert told[1] == [True]
+    assert len(solved) < 2 * groups.WAITING
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("error", [OSError, KeyboardInterrupt])
+def test_an_error_or_an_interrupt_ends_all_searches(monkeypatch, solved, threads, error):
+    use_threads(threads)
+    solve, many = groups.solve_windows, 0
+
+    def breaks(asked):
+        nonlocal many
+        many += 1
+        if many == 5:
+            raise error
+        return solve(asked)
+
+    monkeypatch.setattr(groups, "solve_windows", breaks)
+    before = threading.active_count()
+    for steps in (LONG, 0):
+        many = 0
+        with pytest.raises(error):
+            searched([search([[task([asked_for(20)] * 3)]], []) for _ in range(5_000)], steps)
+        assert threading.active_count() == before
+        assert many < 5_000
+
+
+@pytest.fixture
+def small_windows(monkeypatch) -> None:
+    for name, steps in (("WINDOW", 40), ("OVERLAP", 8), ("JOIN_WITHIN", 4), ("LEAST", 15)):
+        monkeypatch.setattr(own, name, steps)
+
+
+@cache
+def jobs():
+    """Searches of runs of lines, arcs, laws of the user and turning axes, and what each finds by itself, one after
+    the other."""
+    solvers = [TubeOwn(gap=1e-3), TubeOwn(gap=1e-3, divide=False)]
+    runs = [*map(begun, NAMES), begun_on(PROGRAMS["pentagon"], machine=MACHINE.with_own([Fence()]))]
+    made = [(solver, *run) for run in runs for solver in solvers]
+    use_threads(1)
+    return made, [solver.solve(run, guess) for solver, run, guess in made]
+
+
+@pytest.mark.usefixtures("small_windows")
+@pytest.mark.parametrize(
+    ("threads", "width", "waiting", "seed"), [(1, 1, 1, 0), (1, 3, 3, 1), (1, 4, 32, 2), (2, 4, 8, 3)]
+)
+def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed):
+    """In windows of a few steps, some of which fail."""
+    made, alone = jobs()
+    assert any(one.steps is not None and one.windows > one.solved for one in alone)
+    assert any(one.steps is None for one in alone)
+    rng = np.random.default_rng(seed)
+
+    def shuffled(asked):
+        order = rng.permutation(len(asked)).tolist()
+        kind = groups.kind_of(asked[order[0]])
+        return [at for at in order if groups.kind_of(asked[at]) == kind][:width]
+
+    monkeypatch.setattr(groups, "together", shuffled)
+    monkeypatch.setattr(groups, "WAITING", waiting)
+    use_threads(threads)
+    order = rng.permutation(len(made)).tolist()
+    found = searched([made[k][0].search(*made[k][1:]) for k in order], LONG)
+    for one, other in zip(found, (alone[k] for k in order), strict=True):
+        assert one.sentence == other.sentence
+        assert (one.steps is None) == (other.steps is None)
+        if one.steps is None:
+            continue
+        assert (one.windows, one.solved, one.iterations) == (other.windows, other.solved, other.iterations)
+        assert one.price.tobytes() == other.price.tobytes()
+        for column in dataclasses.fields(one.steps):
+            assert getattr(one.steps, column.name).tobytes() == getattr(other.steps, column.name).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("divide", "width", "asked_for"), [(True, 1, 9), (True, 4, 9), (False, 1, 2), (False, 4, 4)]
+)
+def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
+    monkeypatch, divide, width, asked_for
+):
+    """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
+    whatever the group; where parts are of use, all are."""
+    run, guess = begun("pentagon")
+    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
+    monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
+    monkeypatch.setattr(own, "JOIN_WITHIN", 5)
+    monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
+    monkeypatch.setattr(groups, "WIDTH", width)
+    monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
+    windows, solve = set[bytes](), groups.solve_windows
+    second = None
+
+    def second_fails(asked):
+        nonlocal second
+        for one in asked:
+            windows.add(one.window.origin.tobytes())
+            if len(windows) == 2 and second is None:
+                second = one.window.origin.tobytes()
+        found = solve(asked)
+        return [
+            one._replace(done=False) if window.window.origin.tobytes() == second else one
+            for one, window in zip(found, asked, strict=True)
+        ]
+
+    monkeypatch.setattr(groups, "solve_windows", second_fails)
+    use_threads(1)
+    found = TubeOwn(divide=divide).solve(run, guess)
+    assert len(windows) == asked_for
+    if divide:
+        assert found.kept is not None
+        assert found.kept.any()
+    else:
+        assert found.steps is None

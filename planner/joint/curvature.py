@@ -29,10 +29,9 @@ from planner.joint.rows import (
     TUBE_NODE,
     VECTOR_OF_BOX,
     VECTORS,
-    A,
-    J,
     P,
     V,
+    bent_at,
     copy_lane,
     tangent_of,
 )
@@ -113,6 +112,7 @@ def put_model(sizes, group, rows, i, motion, room, W):
     G, row = room
     axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
     more = 8 * axes
+    bent = bent_at(sizes, group, i)
     W[:] = 0.0
     for m in range(4):
         vector = VECTOR_OF_BOX[m]
@@ -153,7 +153,7 @@ def put_model(sizes, group, rows, i, motion, room, W):
             moving += tangent * tangent
         slides = flat * rows.moves[i, c] / where(moving > 0.0, moving, 1.0)
         one_vector = square
-        if sizes.any_bent and c > 0:
+        if bent and c > 0:
             one_vector = where(group.bent[i] > 0.0, 0.0, square)
             put_second_row(sizes, group, rows, i, c, y, alpha, e, row)
             _add_square(sizes, W, row, square - one_vector)
@@ -166,7 +166,7 @@ def put_model(sizes, group, rows, i, motion, room, W):
         _add_vector(sizes, W, alpha, e, TUBE_VECTOR[c], G)
     for r in (more + H_MAX, more + H_MIN):
         W[4 * axes, 4 * axes] += z[r] * per_s[r] * group.per_h[i] * group.per_h[i]
-    if sizes.any_bent:
+    if bent:
         for m in range(3):
             vector, c, of = (
                 (V, 0, more + ORDER_NODE),
@@ -195,7 +195,7 @@ def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
     for lane in range(len(sizes.width)):
         if i >= bends.steps[lane]:
             continue
-        copy_lane(sizes, lane, x[i], u[i], scratch)
+        copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
         for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
             scratch.g[r] = pick(rows.z[i, more + r], lane)
         scratch.W[:] = 0.0
@@ -210,12 +210,14 @@ def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
                 priced += pick(rows.z[i, row], lane)
                 priced += pick(rows.z[i - 1, row], lane) if i else 0.0
             stay = stay_of(normal, scratch.x, scratch.u, priced)
-            for k in range(axes):
-                scratch.W[axes + k, axes + k] += stay
+            of = len(scratch.point)
+            for k in range(of, 2 * of):
+                scratch.W[k, k] += stay
         add_law_curvature(scratch.W, laws, i, pace, scratch.x, scratch.u, scratch.g[BETWEEN:])
-        for s in range(len(sizes.step)):
+        for s in range(len(bends.at)):
             for t in range(s + 1):
-                W[s, t] = put(W[s, t], lane, pick(W[s, t], lane) + scratch.W[s, t])
+                row, column = bends.at[s], bends.at[t]
+                W[row, column] = put(W[row, column], lane, pick(W[row, column], lane) + scratch.W[s, t])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -232,6 +234,7 @@ def put_force(sizes, group, rows, i, motion, aim, second, F, w):
     y, alpha, e = motion
     axes = len(sizes.axes)
     more = 8 * axes
+    bent = bent_at(sizes, group, i)
     w[:] = 0.0
     F[:] = 0.0
     for m in range(4):
@@ -256,9 +259,9 @@ def put_force(sizes, group, rows, i, motion, aim, second, F, w):
             q += group.centre[i]
         for k in range(axes):
             F[TUBE_VECTOR[c], k] += q * rows.n[i, c, k]
-            if sizes.any_bent and c > 0:
+            if bent and c > 0:
                 F[TUBE_SECOND[c], k] += q * rows.node[i, c, k]
-    if sizes.any_bent:
+    if bent:
         node = push_of(group, rows, i, more + ORDER_NODE, aim, second) / group.pace[i]
         mid = push_of(group, rows, i, more + ORDER_MID, aim, second) / group.pace[i]
         arc = push_of(group, rows, i, more + ARC, aim, second) * group.per_step[i]
@@ -291,6 +294,7 @@ def put_slopes(sizes, group, rows, i, motion, d, dy, out):
     y, alpha, e = motion
     axes = len(sizes.axes)
     more, dh = 8 * axes, d[4 * axes]
+    bent = bent_at(sizes, group, i)
     for m in range(VECTORS):
         for k in range(axes):
             total = e[m, k] * dh
@@ -315,12 +319,12 @@ def put_slopes(sizes, group, rows, i, motion, d, dy, out):
         total = 0.0 * dh
         for k in range(axes):
             total += rows.n[i, c, k] * dy[TUBE_VECTOR[c], k]
-            if sizes.any_bent and c > 0:
+            if bent and c > 0:
                 total += rows.node[i, c, k] * dy[TUBE_SECOND[c], k]
         out[more + TUBE_NODE + c] = total
     for r in range(more + ORDER_NODE, sizes.rows):
         out[r] = 0.0
-    if sizes.any_bent:
+    if bent:
         node, mid, arc = 0.0 * dh, 0.0 * dh, 0.0 * dh
         for k in range(axes):
             at_mid = tangent_of(sizes, group, rows, i, 1, k)

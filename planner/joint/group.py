@@ -3,6 +3,7 @@ numbers of all windows behind each other in the last dimension, filled up to the
 no rows.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,10 @@ from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.problem import StepWindow
 from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, SWITCH, TUBE_NODE
+
+# Numbers of axes that there are kernels for; windows of other numbers have axes beside that do not move, and those of more
+# a kernel of their own: it takes a minute to compile one.
+AXES = 3, 5
 
 
 class Sizes(NamedTuple):
@@ -79,92 +84,90 @@ class Bends(NamedTuple):
     steps: Array  # (W,) of each window
     legs: LegFormulas  # of all windows
     laws: tuple[LawRows, ...]  # of each
+    at: Array  # (4 A + 1,) where the numbers of its step are among those of the kernel's
 
 
 def group_of(
     windows: list[StepWindow], width: int
 ) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
     """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 3, W) of them."""
-    axes = windows[0].u.shape[1] - 1
+    of = windows[0].u.shape[1] - 1
+    axes = next((many for many in AXES if many >= of), of)
     counts = [len(one.u) for one in windows]
-    N, R = max(counts), max(one.limits.on.shape[1] for one in windows)
+    N = max(counts)
+    R = 8 * (axes - of) + max(one.limits.on.shape[1] for one in windows)
 
-    def stack(of: list[Any], fill: float = 0.0, rows: int = N) -> FloatArray:
+    def stack(each: list[Any], fill: float = 0.0, rows: int = N) -> FloatArray:
         """Numbers of all steps, those of lanes behind each other."""
-        out: FloatArray = np.full((rows, *np.shape(of[0])[1:], width), fill)
-        for lane, one in enumerate(of):
+        out: FloatArray = np.full((rows, *np.shape(each[0])[1:], width), fill)
+        for lane, one in enumerate(each):
             out[: len(one), ..., lane] = one
         return out
 
-    def each(name: str, fill: float = 0.0) -> FloatArray:
+    def points(each: list[FloatArray], fill: float = 0.0, rows: int = N) -> FloatArray:
+        """`stack` (.., A), with the axes that the kernel has beside."""
+        return np.insert(stack(each, fill, rows), [of] * (axes - of), fill, axis=1)
+
+    def limit(name: str, fill: float = 0.0) -> FloatArray:
         return stack([getattr(one.limits, name) for one in windows], fill)
 
-    first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
-    curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
-    together = [np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields]
-    legs = LegFormulas(*together)
-    offset = np.repeat(curves[:-1], np.diff(first))
-    legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
-    leg = [one.limits.leg + begin for one, begin in zip(windows, first, strict=False)]
-    of = np.concatenate(leg)
+    legs, leg, switch_leg = _legs_of(windows)
     square = (legs.drift**2).sum(axis=1)
     start = legs.base + legs.radius[:, None] * legs.e1
     passed = [one.limits.passed for one in windows]
     bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
-    vertex = [start[one.limits.switch_leg + begin] for one, begin in zip(windows, first, strict=False)]
-    boxes = [1.0 / one.limits.box for one in windows]
-    tube = 8 * axes + TUBE_NODE
-    on = np.zeros((N, R, width))
-    own = np.zeros((N, width), dtype=bool)
+    steps, rows = place_of(of, axes), rows_of(of, axes)
+    on, own = np.zeros((N, R, width)), np.zeros((N, width), dtype=bool)
     for lane, one in enumerate(windows):
         there = one.limits.on
-        on[: len(there), : there.shape[1], lane] = there
-        own[: len(there), lane] = there[:, 8 * axes + NORMAL_ROWS]
+        on[: len(there), rows(there.shape[1]), lane] = there
+        own[: len(there), lane] = there[:, 8 * of + NORMAL_ROWS]
     group = Group(
         real=stack([np.ones(count) for count in counts]),
         last=stack([np.arange(count) == count - 1 for count in counts]),
         on=on,
-        base=stack([legs.base[at] for at in leg]),
-        drift=stack([legs.drift[at] for at in leg]),
-        start=stack([start[at] for at in leg]),
-        per_drift=stack([1.0 / square[at] for at in leg], 1.0),
+        base=points([legs.base[at] for at in leg]),
+        drift=points([legs.drift[at] for at in leg]),
+        start=points([start[at] for at in leg]),
+        per_drift=stack([1.0 / np.where(square > 0.0, square, 1.0)[at] for at in leg], 1.0),
         length=stack([legs.length[at] for at in leg], 1.0),
         line=stack([(legs.radius[at] == 0.0) & ~now for at, now in zip(leg, passed, strict=True)]),
         bent=stack(bent),
         begins=stack([np.diff(at, prepend=-1) != 0 for at in leg]),
         ends=stack([np.diff(at, append=-1) != 0 for at in leg]),
-        at_vertex=each("at_vertex"),
-        per_box=stack(boxes, 1.0, 4),
-        room=1.0 / each("room", 1.0) ** 2,
-        room_node=1.0 / each("room_node", 1.0) ** 2,
-        feed=each("feed", 1.0) ** 2,
-        feed_node=1.0 / each("feed_node", 1.0) ** 2,
-        normal_node=1.0 / each("normal_node", 1.0) ** 2,
-        normal=each("normal", 1.0),
-        pace=each("pace", 1.0),
-        per_h=1.0 / each("h", 1.0),
-        h=each("h", 1.0),
-        h_max=each("h_max", 2.0),
-        h_min=each("h_min", 0.5),
+        at_vertex=limit("at_vertex"),
+        per_box=points([1.0 / one.limits.box for one in windows], 1.0, 4),
+        room=1.0 / limit("room", 1.0) ** 2,
+        room_node=1.0 / limit("room_node", 1.0) ** 2,
+        feed=limit("feed", 1.0) ** 2,
+        feed_node=1.0 / limit("feed_node", 1.0) ** 2,
+        normal=limit("normal", 1.0),
+        normal_node=1.0 / limit("normal_node", 1.0) ** 2,
+        pace=limit("pace", 1.0),
+        per_h=1.0 / limit("h", 1.0),
+        h=limit("h", 1.0),
+        h_max=limit("h_max", 2.0),
+        h_min=limit("h_min", 0.5),
         switch=stack([one.limits.switch / (one.limits.room_node * one.limits.pace) for one in windows]),
-        switch_at=stack(vertex),
-        smooth=2.0 * each("smooth") * each("h"),
-        centre=each("centre") * each("h") * on[:, tube],
-        per_step=1.0 / each("step_max", 1.0),
+        switch_at=points([start[at] for at in switch_leg]),
+        smooth=2.0 * limit("smooth") * limit("h"),
+        centre=limit("centre") * limit("h") * on[:, 8 * axes + TUBE_NODE],
+        per_step=1.0 / limit("step_max", 1.0),
         aside=stack([np.array([one.limits.aside]) for one in windows], 0.0, 1),
     )
-    lanes = [*windows, *[windows[0]] * (width - len(windows))]
     targets = any(now.any() for now in passed)
+    lanes = [*windows, *[windows[0]] * (width - len(windows))]
     bends = Bends(
         leg=stack(leg).astype(int),
         bent=stack(bent).astype(bool),
         passed=stack(passed).astype(bool),
-        turns=each("turns").astype(bool),
+        turns=limit("turns").astype(bool),
         bound=own,
-        target=each("target") if targets else np.zeros((0, 3, axes, width)),
+        target=limit("target") if targets else np.zeros((0, 3, of, width)),
         steps=np.array([*counts, *[0] * (width - len(windows))]),
         legs=legs,
         laws=tuple(one.limits.laws for one in lanes),
+        at=steps,
     )
     there = (
         targets or any(bool(now.any()) for now in bent),
@@ -172,11 +175,43 @@ def group_of(
         bool(on[:, 8 * axes + NORMAL_NODE].any()),
         bool(on[:, 8 * axes + SWITCH].any()),
     )
-    x = stack([one.x for one in windows], 0.0, N + 1)
-    u = stack([one.u for one in windows])
-    for lane, count in enumerate(counts):
+    x, u = np.zeros((N + 1, 3 * axes, width)), np.zeros((N, axes + 1, width))
+    u[:, axes] = 1.0
+    for lane, (one, count) in enumerate(zip(windows, counts, strict=True)):
+        x[: count + 1, steps[: 3 * of], lane] = one.x
         x[count + 1 :, :axes, lane] = x[count, :axes, lane]
-        u[count:, axes, lane] = 1.0
-    u[:, axes, len(windows) :] = 1.0
+        u[:count, steps[3 * of :] - 3 * axes, lane] = one.u
     sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *there)
     return sizes, group, bends, x, u, stack([one.place for one in windows])
+
+
+def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array], list[Array]]:
+    """The legs of all windows, and those of the steps of each window among them: their own, and `switch_leg`."""
+    first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
+    curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
+    legs = LegFormulas(
+        *(np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields)
+    )
+    offset = np.repeat(curves[:-1], np.diff(first))
+    legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
+    begins = list(zip(windows, first[:-1], strict=True))
+    return (
+        legs,
+        [one.limits.leg + begin for one, begin in begins],
+        [one.limits.switch_leg + begin for one, begin in begins],
+    )
+
+
+def place_of(of: int, axes: int) -> Array:
+    """(4 A + 1,) where the numbers of a step over A = `of` axes are in one over `axes`."""
+    return np.array([block * axes + k for block in range(4) for k in range(of)] + [4 * axes])
+
+
+def rows_of(of: int, axes: int) -> Callable[[int], Array]:
+    """Where the first so many rows of a step over `of` axes are in one over `axes`."""
+
+    def rows(count: int) -> Array:
+        row = np.arange(count)
+        return np.where(row < 8 * of, row // of * axes + row % of, row + 8 * (axes - of))
+
+    return rows

@@ -26,7 +26,6 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import (
-    WIDTH,
     anywhere,
     larger,
     magnitude,
@@ -41,8 +40,7 @@ from planner.base.lanes import (
     wide2,
     wide3,
 )
-from planner.joint.group import Bends, Group, Sizes, group_of
-from planner.joint.problem import StepWindow
+from planner.joint.group import Bends, Group, Sizes
 from planner.joint.recursion import END, Factor, Room, backward, factor_steps, forward, gaps
 from planner.joint.rows import NORMAL_ROWS, TUBE_NODE, VECTORS, Rows, Scratch, put_rows
 
@@ -83,15 +81,7 @@ class Tuning(NamedTuple):
     first_slack: float  # of the start, at least
 
 
-class Solved(NamedTuple):
-    """What the search of a window has come to; x, u and place as of `StepWindow`."""
-
-    done: bool  # whether the optimum has been reached
-    iterations: int
-    z: FloatArray  # (N, R) multipliers of the rows, in units of time
-
-
-class _Work(NamedTuple):
+class Work(NamedTuple):
     """Memory of a group: of its rows, of the recursion (recursion.py) and for places."""
 
     g: FloatArray
@@ -117,7 +107,7 @@ class _Work(NamedTuple):
     top: FloatArray
 
 
-def _work_of(sizes: Sizes, bends: Bends) -> _Work:
+def work_of(sizes: Sizes, bends: Bends) -> Work:
     """Memory of a group, all 0."""
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
@@ -125,10 +115,10 @@ def _work_of(sizes: Sizes, bends: Bends) -> _Work:
     shapes = [(N, R)] * 6 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
-    return _Work(*(np.zeros((*shape, W)) for shape in shapes))
+    return Work(*(np.zeros((*shape, W)) for shape in shapes))
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """Of all lanes, set as each of them ends."""
 
     x: FloatArray
@@ -143,7 +133,7 @@ _VECTORS, _BLOCKS, _THREE = size(VECTORS), size(4), size(3)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _lanes_of(sizes, group):
+def lanes_of(sizes, group):
     """The numbers of a group as lanes."""
     width = sizes.width
     return Group(
@@ -182,7 +172,7 @@ def _lanes_of(sizes, group):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _rows_of(sizes, work, place):
+def rows_in(sizes, work, place):
     """The rows in their memory."""
     w, axes, own = sizes.width, sizes.axes, sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS
     return Rows(
@@ -199,6 +189,46 @@ def _rows_of(sizes, work, place):
         wide3(work.node, w, _THREE, axes),
         wide3(work.tangent, w, _THREE, axes),
         wide3(work.own, w, own, sizes.step),
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def room_of(sizes, work, x):
+    """Memory for one step, of what x is of, on the stack of who calls."""
+    return Room(
+        matrix(x, _VECTORS, sizes.axes),
+        matrix(x, _VECTORS, sizes.axes),
+        matrix(x, _VECTORS, _BLOCKS),
+        matrix(x, _VECTORS, sizes.axes),
+        matrix(x, sizes.axes, sizes.axes),
+        vector(x, sizes.step),
+        matrix(x, sizes.step, sizes.step),
+        matrix(x, sizes.state, sizes.state),
+        matrix(x, sizes.state, sizes.state),
+        matrix(x, sizes.state, sizes.control),
+        matrix(x, sizes.control, sizes.state),
+        vector(x, sizes.state),
+        vector(x, sizes.state),
+        vector(x, sizes.control),
+        wide1(work.slope, sizes.width),
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def scratch_of(sizes, bends):
+    """Memory for one lane."""
+    L, of = sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS, len(bends.at) // 4
+    return Scratch(
+        np.zeros(3 * of),
+        np.zeros(of + 1),
+        np.zeros((3, of)),
+        np.zeros(of),
+        np.zeros(of),
+        np.zeros(of),
+        np.zeros(of),
+        np.zeros(L),
+        np.zeros((L, 4 * of + 1)),
+        np.zeros((4 * of + 1, 4 * of + 1)),
     )
 
 
@@ -277,16 +307,16 @@ def _end(sizes, lane, done, iteration, group, rows, x, u, found):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
-def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
+def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 3, W),
-    which is overwritten; tuning (7, W). What each comes to is set in `found`. Meanwhile at[0] is the iteration."""
-    width, group, axes = sizes.width, _lanes_of(sizes, numbers), len(sizes.axes)
+    which is overwritten; tuning (7, W). What each comes to is set in `found`."""
+    width, group = sizes.width, lanes_of(sizes, numbers)
     N, R, S, C = sizes.steps, sizes.rows, len(sizes.state), len(sizes.control)
     x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
-    rows = _rows_of(sizes, work, wide2(motion[2], width, _THREE))
+    rows = rows_in(sizes, work, wide2(motion[2], width, _THREE))
     tuned = wide1(tuning, width)
     tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
-    ends = _Found(
+    ends = Found(
         wide2(found.x, width, sizes.state),
         wide2(found.u, width, sizes.control),
         wide2(found.place, width, _THREE),
@@ -302,42 +332,12 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
         wide2(work.du, width, sizes.control),
     )
     gap = wide2(work.gap, width, sizes.state)
-    y, e = matrix(x, _VECTORS, sizes.axes), matrix(x, _VECTORS, sizes.axes)
-    room = Room(
-        y,
-        e,
-        matrix(x, _VECTORS, _BLOCKS),
-        matrix(x, _VECTORS, sizes.axes),
-        matrix(x, sizes.axes, sizes.axes),
-        vector(x, sizes.step),
-        matrix(x, sizes.step, sizes.step),
-        matrix(x, sizes.state, sizes.state),
-        matrix(x, sizes.state, sizes.state),
-        matrix(x, sizes.state, sizes.control),
-        matrix(x, sizes.control, sizes.state),
-        vector(x, sizes.state),
-        vector(x, sizes.state),
-        vector(x, sizes.control),
-        wide1(work.slope, width),
-    )
-    L = R - 8 * axes - NORMAL_ROWS
-    scratch = Scratch(
-        np.zeros(S),
-        np.zeros(C),
-        np.zeros((3, axes)),
-        np.zeros(axes),
-        np.zeros(axes),
-        np.zeros(axes),
-        np.zeros(axes),
-        np.zeros(L),
-        np.zeros((L, len(sizes.step))),
-        np.zeros((len(sizes.step), len(sizes.step))),
-    )
+    room, scratch = room_of(sizes, work, x), scratch_of(sizes, bends)
     zero = 0.0 * tune.pull
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
-    looking = y, e, wide2(work.nearest, width, _THREE), wide1(work.top, width)
+    looking = room.y, room.e, wide2(work.nearest, width, _THREE), wide1(work.top, width)
     put_rows(sizes, group, bends, x, u, rows, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)
@@ -348,7 +348,6 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
     for lane in range(len(sizes.width)):
         active = put(active, lane, 1.0 if bends.steps[lane] else 0.0)
     for iteration in range(ITERATIONS + 1):
-        at[0] = iteration
         products, broken, missed = _look(sizes, rows, zero)
         now = _durations(sizes, group, u, zero)
         close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)
@@ -404,28 +403,3 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found, at):
         put_rows(sizes, group, bends, x, u, rows, looking, scratch)
         gap_most, off = gaps(sizes, group, x, u, gap)
         _step(sizes, rows, along, dual)
-
-
-def solve_windows(windows: list[tuple[StepWindow, Tuning]], at: FloatArray) -> list[Solved]:
-    """Search up to `WIDTH` windows of the same number of axes side by side; x, u and place of each are overwritten with the
-    optimum near them. Meanwhile at[0] is the iteration."""
-    sizes, group, bends, *motion = group_of([one for one, _ in windows], WIDTH)
-    tuning = np.ones((len(Tuning._fields), WIDTH))
-    tuning[:, : len(windows)] = np.array([values for _, values in windows]).T
-    found = _Found(
-        *(np.zeros_like(one) for one in motion),
-        np.zeros(group.on.shape),
-        np.zeros(WIDTH, np.bool_),
-        np.zeros(WIDTH, np.int64),
-    )
-    work = _work_of(sizes, bends)
-    solve_group(sizes, group, bends, tuple(motion), tuning, work, found, at)
-    solved = []
-    for lane, (window, _) in enumerate(windows):
-        N, R = window.limits.on.shape
-        window.x[:], window.u[:] = found.x[: N + 1, :, lane], found.u[:N, :, lane]
-        window.place[:] = found.place[:N, :, lane]
-        solved.append(
-            Solved(bool(found.done[lane]), int(found.iterations[lane]), found.z[:N, :R, lane].copy())
-        )
-    return solved

@@ -47,7 +47,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, pick, put, root, smaller, where
+from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
 from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
@@ -270,7 +270,7 @@ def _put_passed(axes, bends, i, lane, group, y, rows):
     for c in range(3):
         per = pick(group.room_node[i] if c == 0 else group.room[i], lane)
         square = 0.0
-        for k in range(axes):
+        for k in range(bends.target.shape[2]):
             target = bends.target[i, c, k, lane]
             if c == 0 and pick(group.at_vertex[i], lane) > 0.0:
                 target = pick(group.start[i, k], lane)
@@ -288,9 +288,9 @@ def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
     legs, r, length = bends.legs, bends.leg[i, lane], bends.legs.length[bends.leg[i, lane]]
     at_vertex = pick(group.at_vertex[i], lane) > 0.0
     ends = pick(group.ends[i], lane) > 0.0 and pick(group.last[i], lane) == 0.0
-    point, c_of = scratch.point, scratch.y
+    point, c_of, of = scratch.point, scratch.y, len(scratch.point)
     slopes = Slopes(scratch.n, scratch.node, scratch.tangent)
-    for k in range(axes):
+    for k in range(of):
         c_of[0, k], c_of[1, k], c_of[2, k] = (
             pick(y[P, k], lane),
             pick(y[C1, k], lane),
@@ -303,7 +303,7 @@ def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
         scratch.node[:] = 0.0
         if c == 0:
             place, value = nearest_point(legs, r, c_of[0], place, point, scratch.tangent), 0.0
-            for k in range(axes):
+            for k in range(of):
                 if at_vertex:
                     point[k] = pick(group.start[i, k], lane)
                 off = c_of[0, k] - point[k]
@@ -316,11 +316,11 @@ def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
             elif ends:
                 place = length
             else:
-                place = nearest_point(legs, r, scratch.x[:axes], place, point, scratch.tangent)
+                place = nearest_point(legs, r, scratch.x[:of], place, point, scratch.tangent)
             fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= length
-            other = c_of[0] if c == 1 else scratch.x[:axes]
+            other = c_of[0] if c == 1 else scratch.x[:of]
             value, place = off_tangent(legs, r, c_of[c], other, Foot(place, fixed, c == 1), room, slopes)
-        for k in range(axes):
+        for k in range(of):
             rows.n[i, c, k] = put(rows.n[i, c, k], lane, scratch.n[k])
             rows.node[i, c, k] = put(rows.node[i, c, k], lane, scratch.node[k])
             rows.tangent[i, c, k] = put(rows.tangent[i, c, k], lane, scratch.tangent[k])
@@ -332,12 +332,14 @@ def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def copy_lane(sizes, lane, x, u, scratch):
-    """The node x (S,) and the controls u (C,) of one lane into the scratch."""
-    for k in range(len(sizes.state)):
-        scratch.x[k] = pick(x[k], lane)
-    for k in range(len(sizes.control)):
-        scratch.u[k] = pick(u[k], lane)
+def copy_lane(sizes, at, lane, x, u, scratch):
+    """The node x (S,) and the controls u (C,) of one lane into the scratch, which has only the axes of the window; at as of
+    `Bends`."""
+    states = len(scratch.x)
+    for k in range(states):
+        scratch.x[k] = pick(x[at[k]], lane)
+    for k in range(len(scratch.u)):
+        scratch.u[k] = pick(u[at[states + k] - len(sizes.state)], lane)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -345,7 +347,7 @@ def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
     """The rows with derivatives of their own."""
     axes, laws = len(sizes.axes), bends.laws[lane]
     g, slope, more = scratch.g, scratch.slope, 8 * axes + NORMAL_ROWS
-    copy_lane(sizes, lane, x[i], u[i], scratch)
+    copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
     pace, room = pick(group.pace[i], lane), 1.0 / np.sqrt(pick(group.room_node[i], lane))
     bound = bends.bound[i, lane]
     if bound:
@@ -357,8 +359,15 @@ def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
     put_law_rows(laws, i, pace, room, aside, scratch.x, scratch.u, g[BETWEEN:], slope[BETWEEN:])
     for r in range(0 if bound else BETWEEN, BETWEEN + laws.first[-1]):
         rows.g[i, more + r] = put(rows.g[i, more + r], lane, g[r])
-        for k in range(len(sizes.step)):
-            rows.own[i, r, k] = put(rows.own[i, r, k], lane, slope[r, k])
+        for k in range(len(bends.at)):
+            to = bends.at[k]
+            rows.own[i, r, to] = put(rows.own[i, r, to], lane, slope[r, k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def bent_at(sizes, group, i):
+    """Whether a window has a leg that is no line, or is passed, at step i."""
+    return sizes.any_bent and anywhere(group.line[i] < group.real[i])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -379,6 +388,7 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
     put_places(sizes, group, x, u, rows, nearest, top)
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
+        bent = bent_at(sizes, group, i)
         put_vectors(sizes, x[i], u[i], y, e)
         for m in range(4):
             for k in range(axes):
@@ -399,12 +409,12 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
                     point = where(group.at_vertex[i] > 0.0, group.start[i, k], point)
                 off = y[(P, C1, C2)[c], k] - point
                 square += off * off
-                if sizes.any_bent:
+                if bent:
                     rows.n[i, c, k] = where(group.line[i] > 0.0, off * per, rows.n[i, c, k])
                 else:
                     rows.n[i, c, k] = off * per
             g[more + TUBE_NODE + c] = 0.5 * (square * per - 1.0)
-        if sizes.any_bent:
+        if bent:
             for lane in range(len(sizes.width)):
                 if bends.passed[i, lane]:
                     _put_passed(axes, bends, i, lane, group, y, rows)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.joint.interior_point import Tuning, solve_window
+from planner.base.lanes import WIDTH
+from planner.joint.group import group_of, place_of, rows_of
+from planner.joint.interior_point import Found, Tuning, solve_group, work_of
 from planner.joint.problem import StepWindow
-
-WIDTH = 4  # windows that are solved together at most
 
 
 class Asked(NamedTuple):
@@ -32,9 +32,28 @@ def kind_of(asked: Asked) -> Hashable:
     return asked.window.u.shape[1]
 
 
-def solve_windows(asked: Sequence[Asked]) -> list[Solved]:
-    """Solve `WIDTH` windows of one kind at most; what is found in one of them does not depend on the others."""
-    return [
-        Solved(*solve_window(one.legs, one.limits, one.x, one.u, one.place, tuning, np.zeros(1)))
-        for one, tuning in asked
-    ]
+def solve_windows(asked: Sequence[Asked], width: int = WIDTH) -> list[Solved]:
+    """Solve `width` windows of one kind at most side by side; what is found in one of them does not depend on the others."""
+    sizes, group, bends, *motion = group_of([one.window for one in asked], width)
+    tuning = np.ones((len(Tuning._fields), width))
+    tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T
+    found = Found(
+        *(np.zeros_like(one) for one in motion),
+        np.zeros(group.on.shape),
+        np.zeros(width, np.bool_),
+        np.zeros(width, np.int64),
+    )
+    solve_group(sizes, group, bends, tuple(motion), tuning, work_of(sizes, bends), found)
+    return [_solved(one.window, lane, found) for lane, one in enumerate(asked)]
+
+
+def _solved(window: StepWindow, lane: int, found: Found) -> Solved:
+    """What was found in a lane; x, u and place go into the window."""
+    N, R = window.limits.on.shape
+    of, axes = window.u.shape[1] - 1, found.u.shape[1] - 1
+    at = place_of(of, axes)
+    window.x[:] = found.x[: N + 1, at[: 3 * of], lane]
+    window.u[:] = found.u[:N, at[3 * of :] - 3 * axes, lane]
+    window.place[:] = found.place[:N, :, lane]
+    z = found.z[:N, rows_of(of, axes)(R), lane]
+    return Solved(bool(found.done[lane]), int(found.iterations[lane]), z)

@@ -7,7 +7,7 @@ import numpy as np
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import pick, put, where
 from planner.joint.law_curvature import add_law_curvature
-from planner.joint.normal_rows import BETWEEN, add_normal_curvature, stay_of
+from planner.joint.normal_rows import add_normal_curvature, stay_of
 from planner.joint.rows import (
     ACROSS,
     ARC,
@@ -18,6 +18,7 @@ from planner.joint.rows import (
     FEED_ROWS,
     H_MAX,
     H_MIN,
+    LAW_ROWS,
     LONG,
     MID,
     NEXT,
@@ -188,32 +189,36 @@ def put_model(sizes, group, rows, i, motion, room, W):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch):
-    """W += the curvature of the rows with derivatives of their own, worked out for one lane after the other."""
+def add_normal(sizes, group, rows, i, x, u, W):
+    """W += the curvature of the rows of the normal acceleration, and what holds the velocity of nodes that have them."""
     axes = len(sizes.axes)
-    more = 8 * axes + NORMAL_ROWS
+    more, priced = 8 * axes + NORMAL_ROWS, 0.0 * u[i, axes]
+    z = rows.z[i]
+    add_normal_curvature(
+        sizes, W, group.normal[i], group.pace[i], group.turns[i], x[i], u[i], z[more], z[more + 1]
+    )
+    for row in (8 * axes + NORMAL_NODE, more, more + 1):
+        priced += z[row]
+        if i:
+            priced += rows.z[i - 1, row]
+    stay = group.bound[i] * stay_of(sizes, group.normal[i], x[i], u[i], priced)
+    for k in range(axes, 2 * axes):
+        W[k, k] += stay
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def add_laws(sizes, group, bends, rows, i, x, u, W, scratch):
+    """W += the curvature of the rows of the laws, worked out for one lane after the other."""
+    more = 8 * len(sizes.axes) + LAW_ROWS
     for lane in range(len(sizes.width)):
         if i >= bends.steps[lane]:
             continue
         copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
-        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
+        for r in range(sizes.rows - more):
             scratch.g[r] = pick(rows.z[i, more + r], lane)
         scratch.W[:] = 0.0
-        pace, laws = pick(group.pace[i], lane), bends.laws[lane]
-        if bends.bound[i, lane]:
-            normal = pick(group.normal[i], lane)
-            of = scratch.g[:BETWEEN]
-            add_normal_curvature(scratch.W, normal, pace, bends.turns[i, lane], scratch.x, scratch.u, of)
-            priced = 0.0
-            for m in range(3):
-                row = 8 * axes + (NORMAL_NODE, NORMAL_ROWS, NORMAL_ROWS + 1)[m]
-                priced += pick(rows.z[i, row], lane)
-                priced += pick(rows.z[i - 1, row], lane) if i else 0.0
-            stay = stay_of(normal, scratch.x, scratch.u, priced)
-            of = len(scratch.point)
-            for k in range(of, 2 * of):
-                scratch.W[k, k] += stay
-        add_law_curvature(scratch.W, laws, i, pace, scratch.x, scratch.u, scratch.g[BETWEEN:])
+        pace = pick(group.pace[i], lane)
+        add_law_curvature(scratch.W, bends.laws[lane], i, pace, scratch.x, scratch.u, scratch.g)
         for s in range(len(bends.at)):
             for t in range(s + 1):
                 row, column = bends.at[s], bends.at[t]

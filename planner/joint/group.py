@@ -32,7 +32,8 @@ class Sizes(NamedTuple):
     rows: int  # R
     any_bent: bool  # whether there are legs that are no lines, or are passed
     any_own: bool  # whether there are rows with derivatives of their own
-    any_normal: bool  # whether there are rows of the normal acceleration at nodes
+    any_normal: bool  # whether there are rows of the normal acceleration
+    any_laws: bool  # whether there are laws
     any_switch: bool  # whether there are rows of changes of feed
 
 
@@ -59,6 +60,8 @@ class Group(NamedTuple):
     feed_node: FloatArray  # (N, W)
     normal: FloatArray  # (N, W) the limit
     normal_node: FloatArray  # (N, W)
+    bound: FloatArray  # (N, W) 1 where there are rows of the normal acceleration between nodes
+    turns: FloatArray  # (N, W) 1 where the step turns far
     pace: FloatArray  # (N, W)
     per_h: FloatArray  # (N, W) 1/h of the guess
     h: FloatArray  # (N, W)
@@ -78,8 +81,6 @@ class Bends(NamedTuple):
     leg: Array  # (N, W) of `legs`
     bent: Array  # (N, W) whether it is an arc or a curve
     passed: Array  # (N, W) whether it is passed
-    turns: Array  # (N, W) whether the step turns far
-    bound: Array  # (N, W) whether it has rows of the normal acceleration
     target: FloatArray  # (N or 0, 3, A, W)
     steps: Array  # (W,) of each window
     legs: LegFormulas  # of all windows
@@ -117,7 +118,7 @@ def group_of(
     passed = [one.limits.passed for one in windows]
     bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
     steps, rows = place_of(of, axes), rows_of(of, axes)
-    on, own = np.zeros((N, R, width)), np.zeros((N, width), dtype=bool)
+    on, own = np.zeros((N, R, width)), np.zeros((N, width))
     for lane, one in enumerate(windows):
         there = one.limits.on
         on[: len(there), rows(there.shape[1]), lane] = there
@@ -143,6 +144,8 @@ def group_of(
         feed_node=1.0 / limit("feed_node", 1.0) ** 2,
         normal=limit("normal", 1.0),
         normal_node=1.0 / limit("normal_node", 1.0) ** 2,
+        bound=own,
+        turns=limit("turns"),
         pace=limit("pace", 1.0),
         per_h=1.0 / limit("h", 1.0),
         h=limit("h", 1.0),
@@ -161,18 +164,18 @@ def group_of(
         leg=stack(leg).astype(int),
         bent=stack(bent).astype(bool),
         passed=stack(passed).astype(bool),
-        turns=limit("turns").astype(bool),
-        bound=own,
         target=limit("target") if targets else np.zeros((0, 3, of, width)),
         steps=np.array([*counts, *[0] * (width - len(windows))]),
         legs=legs,
         laws=tuple(one.limits.laws for one in lanes),
         at=steps,
     )
+    normal, laws = bool(own.any()), any(len(one.limits.laws.kind) > 0 for one in windows)
     there = (
         targets or any(bool(now.any()) for now in bent),
-        bool(own.any()) or any(len(one.limits.laws.kind) > 0 for one in windows),
-        bool(on[:, 8 * axes + NORMAL_NODE].any()),
+        normal or laws,
+        normal or bool(on[:, 8 * axes + NORMAL_NODE].any()),
+        laws,
         bool(on[:, 8 * axes + SWITCH].any()),
     )
     x, u = np.zeros((N + 1, 3 * axes, width)), np.zeros((N, axes + 1, width))

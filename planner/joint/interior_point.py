@@ -96,6 +96,7 @@ class Work(NamedTuple):
     node: FloatArray
     tangent: FloatArray
     own: FloatArray
+    between: FloatArray
     K: FloatArray
     L: FloatArray
     push: FloatArray
@@ -113,7 +114,7 @@ def work_of(sizes: Sizes, bends: Bends) -> Work:
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
     bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
     shapes = [(N, R)] * 6 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
-    shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
+    shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
     return Work(*(np.zeros((*shape, W)) for shape in shapes))
 
@@ -157,6 +158,8 @@ def lanes_of(sizes, group):
         wide1(group.feed_node, width),
         wide1(group.normal, width),
         wide1(group.normal_node, width),
+        wide1(group.bound, width),
+        wide1(group.turns, width),
         wide1(group.pace, width),
         wide1(group.per_h, width),
         wide1(group.h, width),
@@ -189,6 +192,7 @@ def rows_in(sizes, work, place):
         wide3(work.node, w, _THREE, axes),
         wide3(work.tangent, w, _THREE, axes),
         wide3(work.own, w, own, sizes.step),
+        wide1(work.between, w),
     )
 
 

@@ -25,9 +25,12 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.laws import REST, ordinates, put_along, through
+from planner.base.lanes import anywhere, larger, magnitude, matrix, root, size, where
+from planner.joint.laws import REST
 
 BETWEEN = 2  # ordinates between the nodes
+_TWO, _THREE, _FOUR = size(2), size(3), size(4)
+THIRD = 1.0 / 3.0
 # What a change of the velocity by itself costs in one iteration: this, and so many times the multipliers of the
 # rows that it is in [-]. Without it windows go on to the last iteration at corners that are passed slowly.
 STAY, STAY_PRICED = 0.1, 0.3
@@ -50,120 +53,155 @@ def turns_far(velocity: FloatArray) -> Array:
     return far
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_turning_rows(bound, x, u, g, out):
-    """`put_normal_rows` of a step that turns far."""
-    axes, per = len(u) - 1, 1.0 / (bound * bound)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _put_factors(axes, x, u, w, by_b, by_w):
+    """Of a step with the node x (3 A,) and the controls u (A+1,) the ordinates w (3, A), and what c of both rows is: the sum
+    of b_m x by_b[2 r + m] and of by_w[2 r + n] x w_(r + n), by_b and by_w (4, A)."""
     h = u[axes]
-    out[:] = 0.0
-    g[0], g[1] = -0.5, -0.5
     for k in range(axes):
-        a, j = x[2 * axes + k], u[k]
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
         end = a + h * j
-        g[0], g[1] = g[0] + 0.5 * per * a * a, g[1] + 0.5 * per * end * end
-        out[0, 2 * axes + k] = per * a
-        out[1, 2 * axes + k], out[1, 3 * axes + k] = per * end, per * end * h
-        out[1, 4 * axes] += per * end * j
+        w[0, k], w[1, k], w[2, k] = v, v + 0.5 * h * a, v + 0.5 * h * (a + end)
+        by_b[0, k], by_b[1, k] = 2.0 * THIRD * w[1, k], THIRD * w[0, k]
+        by_b[2, k], by_b[3, k] = THIRD * w[2, k], 2.0 * THIRD * w[1, k]
+        by_w[0, k], by_w[1, k] = THIRD * end, 2.0 * THIRD * a
+        by_w[2, k], by_w[3, k] = 2.0 * THIRD * end, THIRD * a
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _factors(pace, x, u):
-    """Of a step the ordinates b (2, A); d (2,) of the rows, its derivatives of_d (2, 3, A) by w, and what is kept of it
-    at least; by_b (2, 2, A) and by_w (2, 3, A): c of a row is the sum of b_m x by_b_m, and of by_w_n x w_n."""
-    axes = len(u) - 1
-    room = np.zeros((26, axes))  # one piece of memory: asking for it takes as long as what is done with it
-    w, b, by_b, by_w, of_d = room[:3], room[3:5], room[5:9], room[9:15], room[15:24].reshape((3, 3, axes))
-    d, counts = np.zeros(3), room[24]
-    counts[:] = 1.0
-    ordinates(x, u, counts, w, b)
-    least = LEAST * put_along(w, REST * pace, d, of_d)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _along(axes, w, rest):
+    """Ordinates of v.e between the nodes, with the directions e of w0 and w2; the speeds there, and the products
+    w_m.e that they are made of."""
+    first, last = rest * rest, rest * rest
     for k in range(axes):
-        by_b[0, k], by_b[1, k] = 2.0 * w[1, k] / 3.0, w[0, k] / 3.0
-        by_b[2, k], by_b[3, k] = w[2, k] / 3.0, 2.0 * w[1, k] / 3.0
-        by_w[0, k], by_w[1, k] = b[1, k] / 3.0, 2.0 * b[0, k] / 3.0
-        by_w[4, k], by_w[5, k] = 2.0 * b[1, k] / 3.0, b[0, k] / 3.0
-    return b, d[1:], of_d[1:], least, by_b.reshape((2, 2, axes)), by_w.reshape((2, 3, axes))
+        first, last = first + w[0, k] * w[0, k], last + w[2, k] * w[2, k]
+    first, last = root(first), root(last)
+    per, per_last, zero = 1.0 / first, 1.0 / last, 0.0 * first
+    w1_e0, w2_e0, w0_e1, w1_e1 = zero, zero, zero, zero
+    for k in range(axes):
+        e0, e1 = w[0, k] * per, w[2, k] * per_last
+        w1_e0, w2_e0 = w1_e0 + w[1, k] * e0, w2_e0 + w[2, k] * e0
+        w0_e1, w1_e1 = w0_e1 + w[0, k] * e1, w1_e1 + w[1, k] * e1
+    d = THIRD * (w0_e1 + 2.0 * w1_e0), THIRD * (2.0 * w1_e1 + w2_e0)
+    return d, (first, last), (w1_e0, w2_e0, w0_e1, w1_e1)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_normal_rows(bound, pace, turns, x, u, g, out):
+def put_normal_rows(sizes, bound, pace, turns, x, u, g, out):
     """The rows of a step with the node x (3 A,) and the controls u (A+1,), whose normal acceleration is at most
-    `bound`, into g (2,), and their derivatives by p, v, a, j and h into out (2, 4 A + 1)."""
-    if turns:
-        _put_turning_rows(bound, x, u, g, out)
-        return
-    axes = len(u) - 1
-    b, d, of_d, least, times_b, times_w = _factors(pace, x, u)
-    slopes = np.zeros((5, axes))
-    by_w, by_b = slopes[:3], slopes[3:]
-    out[:] = 0.0
+    `bound`, into g (2,), and their derivatives by p, v, a, j and h into out (2, 4 A + 1); `turns`: 1 where it turns far."""
+    axes = len(sizes.axes)
+    h = u[axes]
+    w, by_b, by_w = matrix(x, _THREE, sizes.axes), matrix(x, _FOUR, sizes.axes), matrix(x, _FOUR, sizes.axes)
+    _put_factors(axes, x, u, w, by_b, by_w)
+    d, (first, last), (w1_e0, w2_e0, w0_e1, w1_e1) = _along(axes, w, REST * pace)
+    least, far = LEAST * (first + last), turns > 0.0
+    at_node = 1.0 / (bound * bound)
     for r in range(BETWEEN):
-        square = 0.0
-        per = 1.0 / (bound * max(d[r], least)) ** 2
-        push = per * bound * bound * abs(d[r])
+        of_d = d[r]
+        kept = bound * larger(of_d, least)
+        per, square, by_h = 1.0 / (kept * kept), 0.0 * h, 0.0 * h
+        push = per * bound * bound * magnitude(of_d)
+        near, turned = 0.0 * h, -0.5 + 0.0 * h
         for k in range(axes):
-            by_b[0, k], by_b[1, k] = 0.0, 0.0
-            for m in range(3):
-                by_w[m, k] = -push * of_d[r, m, k]
+            a, j, e0, e1 = x[2 * axes + k], u[k], w[0, k] / first, w[2, k] / last
+            b = a, a + h * j
+            if r == 0:
+                of_w0, of_w1 = (
+                    THIRD * (e1 + 2.0 * (w[1, k] - w1_e0 * e0) / first),
+                    2.0 * THIRD * e0,
+                )
+                of_w2 = THIRD * (w[0, k] - w0_e1 * e1) / last
+            else:
+                of_w0, of_w1 = THIRD * (w[2, k] - w2_e0 * e0) / first, 2.0 * THIRD * e1
+                of_w2 = THIRD * (e0 + 2.0 * (w[1, k] - w1_e1 * e1) / last)
+            of_w0, of_w1, of_w2 = -push * of_w0, -push * of_w1, -push * of_w2
+            of_b0, of_b1 = 0.0 * h, 0.0 * h
             for n in range(axes):
-                c = b[0, k] * times_b[r, 0, n] - times_b[r, 0, k] * b[0, n]
-                c += b[1, k] * times_b[r, 1, n] - times_b[r, 1, k] * b[1, n]
+                b_n = x[2 * axes + n], x[2 * axes + n] + h * u[n]
+                c = b[0] * by_b[2 * r, n] - by_b[2 * r, k] * b_n[0]
+                c += b[1] * by_b[2 * r + 1, n] - by_b[2 * r + 1, k] * b_n[1]
                 square += 0.5 * c * c
-                for m in range(2):
-                    by_b[m, k] += per * c * times_b[r, m, n]
-                for m in range(3):
-                    by_w[m, k] -= per * c * times_w[r, m, n]
-        g[r] = 0.5 * (per * square - push * d[r])
-        through(x, u, by_w, by_b, 1.0, out[r])
+                c = per * c
+                of_b0, of_b1 = of_b0 + c * by_b[2 * r, n], of_b1 + c * by_b[2 * r + 1, n]
+                if r == 0:
+                    of_w0, of_w1 = of_w0 - c * by_w[0, n], of_w1 - c * by_w[1, n]
+                else:
+                    of_w1, of_w2 = of_w1 - c * by_w[2, n], of_w2 - c * by_w[3, n]
+            out[r, k] = 0.0
+            out[r, axes + k] = where(far, 0.0, of_w0 + of_w1 + of_w2)
+            # where the step turns far: |a| <= bound at its node, at its end
+            of_a = at_node * b[r]
+            turned += 0.5 * of_a * b[r]
+            out[r, 2 * axes + k] = where(far, of_a, h * (0.5 * of_w1 + of_w2) + of_b0 + of_b1)
+            out[r, 3 * axes + k] = where(far, r * h * of_a, h * (0.5 * h * of_w2 + of_b1))
+            by_h += where(far, r * j * of_a, 0.5 * of_w1 * a + of_w2 * b[1] + of_b1 * j)
+        out[r, 4 * axes] = by_h
+        g[r] = where(far, turned, 0.5 * (per * square - push * of_d))
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def add_normal_curvature(W, bound, pace, turns, x, u, z):
+def add_normal_curvature(sizes, W, bound, pace, turns, x, u, z0, z1):
     """W (4 A + 1, 4 A + 1), lower triangle, += what is surely positive of the curvature of the rows: that of
-    |c|^2 as if c were linear. z (2,): multipliers."""
-    if z[0] == 0.0 and z[1] == 0.0:
-        return
-    if turns:
-        axes, per = len(u) - 1, 1.0 / (bound * bound)
-        for k in range(axes):
-            at = 2 * axes + k, 3 * axes + k, 4 * axes
-            for r in range(2):
-                by = 1.0, r * u[axes], r * u[k]
-                for n in range(3):
-                    for m in range(n + 1):
-                        W[at[n], at[m]] += z[r] * per * by[n] * by[m]
-        return
-    axes, h = len(u) - 1, u[len(u) - 1]
-    _, d, _, least, times_b, times_w = _factors(pace, x, u)
-    slope = np.empty(7)  # the derivatives of c[k, m] by the axes m and k, and by h
-    index = np.empty(7, np.int64)
-    index[6] = 4 * axes
+    |c|^2 as if c were linear. z0 and z1: multipliers."""
+    axes = len(sizes.axes)
+    h, at = u[axes], 4 * axes
+    w, by_b, by_w = matrix(x, _THREE, sizes.axes), matrix(x, _FOUR, sizes.axes), matrix(x, _FOUR, sizes.axes)
+    _put_factors(axes, x, u, w, by_b, by_w)
+    d, (first, last), _ = _along(axes, w, REST * pace)
+    least, far = LEAST * (first + last), turns > 0.0
+    slope = matrix(x, _TWO, _THREE)  # the derivatives of c[k, m] by v, a and j of both axes
     for r in range(BETWEEN):
-        by = z[r] / (bound * max(d[r], least)) ** 2
+        price = z1 if r else z0
+        kept = bound * larger(d[r], least)
+        by = where(far, 0.0, price / (kept * kept))
         for k in range(axes):
             for m in range(k):  # c[k, m]
-                slope[6] = 0.0
+                of_h = 0.0 * h
                 for s in range(2):
                     own, other, sign = (k, m, -1.0) if s else (m, k, 1.0)
                     a, j = x[2 * axes + own], u[own]
-                    w0, w1, w2 = times_w[r, 0, other], times_w[r, 1, other], times_w[r, 2, other]
-                    b0, b1 = -times_b[r, 0, other], -times_b[r, 1, other]
-                    index[s], index[2 + s], index[4 + s] = axes + own, 2 * axes + own, 3 * axes + own
-                    slope[s] = sign * (w0 + w1 + w2)
-                    slope[2 + s] = sign * (h * (0.5 * w1 + w2) + b0 + b1)
-                    slope[4 + s] = sign * h * (0.5 * h * w2 + b1)
-                    slope[6] += sign * (0.5 * w1 * a + w2 * (a + h * j) + b1 * j)
-                for s in range(7):
-                    for t in range(s + 1):
-                        W[index[s], index[t]] += by * slope[s] * slope[t]
+                    w0, w1, w2 = 0.0 * h, by_w[1 + r, other], 0.0 * h
+                    if r == 0:
+                        w0 = by_w[0, other]
+                    else:
+                        w2 = by_w[3, other]
+                    b0, b1 = -by_b[2 * r, other], -by_b[2 * r + 1, other]
+                    slope[s, 0] = sign * (w0 + w1 + w2)
+                    slope[s, 1] = sign * (h * (0.5 * w1 + w2) + b0 + b1)
+                    slope[s, 2] = sign * h * (0.5 * h * w2 + b1)
+                    of_h += sign * (0.5 * w1 * a + w2 * (a + h * j) + b1 * j)
+                W[at, at] += by * of_h * of_h
+                for s in range(2):
+                    column = m if s == 0 else k
+                    for n in range(3):
+                        one = by * slope[s, n]
+                        W[at, (1 + n) * axes + column] += one * of_h
+                        for t in range(2):
+                            other = m if t == 0 else k
+                            for q in range(n + 1):
+                                if q < n or other <= column:
+                                    W[(1 + n) * axes + column, (1 + q) * axes + other] += one * slope[t, q]
+    if anywhere(far):
+        for r in range(BETWEEN):
+            by = where(far, (z1 if r else z0) / (bound * bound), 0.0)
+            for k in range(axes):
+                a, j = 2 * axes + k, 3 * axes + k
+                W[a, a] += by
+                W[j, a] += by * (r * h)
+                W[j, j] += by * (r * h * h)
+                W[at, a] += by * (r * u[k])
+                W[at, j] += by * (r * h * u[k])
+                W[at, at] += by * (r * u[k] * u[k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def stay_of(bound, x, u, priced):
+def stay_of(sizes, bound, x, u, priced):
     """What (dv)^2 of the node x (3 A,) costs in one iteration, half of it; `priced`: the sum of the multipliers of the
     rows that its velocity is in."""
-    axes = len(u) - 1
-    square = (SLOW * bound * u[axes]) ** 2
+    axes = len(sizes.axes)
+    slow = SLOW * bound * u[axes]
+    square = slow * slow
     for k in range(axes):
-        square += x[axes + k] ** 2
+        square += x[axes + k] * x[axes + k]
     return (STAY + STAY_PRICED * priced) / square

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, where
-from planner.joint.curvature import add_own_curvature, put_force, put_model, put_slopes
+from planner.joint.curvature import add_laws, add_normal, put_force, put_model, put_slopes
 from planner.joint.rows import SIXTH, put_shares, put_vectors
 
 END = 1e9  # rho [-], at first; with 1e6 the last node's gap stays at 1e-5 where prox has grown
@@ -159,8 +159,10 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
         put_shares(u[i, axes], turn, room.alpha)
         motion = room.y, room.alpha, room.e
         put_model(sizes, group, rows, i, motion, (room.G, room.row), W)
-        if sizes.any_own:
-            add_own_curvature(sizes, group, bends, rows, i, x, u, W, scratch)
+        if sizes.any_normal:
+            add_normal(sizes, group, rows, i, x, u, W)
+        if sizes.any_laws:
+            add_laws(sizes, group, bends, rows, i, x, u, W, scratch)
         W[S + axes, S + axes] += 2.0 * pull * group.per_h[i] * group.per_h[i]
         for k in range(axes):
             W[S + k, S + k] += group.smooth[i] * group.per_box[0, k] * group.per_box[0, k]

@@ -116,6 +116,7 @@ class Rows(NamedTuple):
     node: FloatArray  # (N or 0, 3, A) on arcs by the second vectors
     tangent: FloatArray  # (N or 0, 3, A) of the leg, on arcs
     own: FloatArray  # (N or 0, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
+    between: FloatArray  # (2,) for the rows of the normal acceleration of a step
 
 
 class Scratch(NamedTuple):
@@ -343,25 +344,18 @@ def copy_lane(sizes, at, lane, x, u, scratch):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_own(sizes, bends, i, lane, group, x, u, rows, scratch):
-    """The rows with derivatives of their own."""
-    axes, laws = len(sizes.axes), bends.laws[lane]
-    g, slope, more = scratch.g, scratch.slope, 8 * axes + NORMAL_ROWS
+def _put_laws(sizes, bends, i, lane, group, x, u, rows, scratch):
+    """The rows of the laws of one lane."""
+    laws, more = bends.laws[lane], 8 * len(sizes.axes) + LAW_ROWS
     copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
     pace, room = pick(group.pace[i], lane), 1.0 / np.sqrt(pick(group.room_node[i], lane))
-    bound = bends.bound[i, lane]
-    if bound:
-        normal = pick(group.normal[i], lane)
-        put_normal_rows(
-            normal, pace, bends.turns[i, lane], scratch.x, scratch.u, g[:BETWEEN], slope[:BETWEEN]
-        )
     aside = pick(group.aside[0], lane)
-    put_law_rows(laws, i, pace, room, aside, scratch.x, scratch.u, g[BETWEEN:], slope[BETWEEN:])
-    for r in range(0 if bound else BETWEEN, BETWEEN + laws.first[-1]):
-        rows.g[i, more + r] = put(rows.g[i, more + r], lane, g[r])
+    put_law_rows(laws, i, pace, room, aside, scratch.x, scratch.u, scratch.g, scratch.slope)
+    for r in range(laws.first[-1]):
+        rows.g[i, more + r] = put(rows.g[i, more + r], lane, scratch.g[r])
         for k in range(len(bends.at)):
             to = bends.at[k]
-            rows.own[i, r, to] = put(rows.own[i, r, to], lane, slope[r, k])
+            rows.own[i, BETWEEN + r, to] = put(rows.own[i, BETWEEN + r, to], lane, scratch.slope[r, k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -435,9 +429,14 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
             g[more + SWITCH] = square
         if sizes.any_normal:
             _ball(axes, y, ACROSS, group.normal_node[i], more + NORMAL_NODE, g)
-        if sizes.any_own:
+        if sizes.any_normal:
+            put_normal_rows(
+                sizes, group.normal[i], group.pace[i], group.turns[i], x[i], u[i], rows.between, rows.own[i]
+            )
+            g[more + NORMAL_ROWS], g[more + NORMAL_ROWS + 1] = rows.between[0], rows.between[1]
+        if sizes.any_laws:
             for lane in range(len(sizes.width)):
                 if i < bends.steps[lane]:
-                    _put_own(sizes, bends, i, lane, group, x, u, rows, scratch)
+                    _put_laws(sizes, bends, i, lane, group, x, u, rows, scratch)
         for r in range(R):
             g[r] = where(group.on[i, r] > 0.0, g[r], -1.0)

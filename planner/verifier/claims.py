@@ -84,7 +84,9 @@ def claims_of(readings: list[Observed], limits: Limits, names: Iterable[str], in
             known=MappingProxyType(known), open_mm=bow, between=f"{WAYS[interpolation]} from row to row"
         )
     left_open, unknown, bent = readings[1].known[[OPEN, UNKNOWN, BENT]]
-    of_axes = {f"{quantity}.{letter}" for quantity in DERIVATIVES for letter in limits.axes}
+    # where jerk is not limited acceleration may jump, and the jerk is what periods show of that
+    quantities = DERIVATIVES if limits.jerk_limited else DERIVATIVES[:2]
+    of_axes = {f"{quantity}.{letter}" for quantity in quantities for letter in limits.axes}
     known = {name: Known.EXACT if name in of_axes and not unknown else Known.SAMPLED for name in names}
     if not unknown:
         known |= {name: Known.CERTIFIED for name in known if name == "feed"}

@@ -129,7 +129,7 @@ def look_at_axes(
     """Take in what a block of samples shows of the axes, of the normal acceleration and of the columns.
 
     between : what lies between the samples too, of velocity and acceleration
-    sure    : the columns are those of the positions, and nothing lies between that they do not show
+    sure    : the columns are those of the positions, nothing lies between that they do not show, and no acceleration jumps
     """
     t, axes, linear = block.t, len(limits.axes), limits.linear
     columns = [block.velocity, block.acceleration, block.jerk]

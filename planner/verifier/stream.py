@@ -173,7 +173,8 @@ class Watch:
             block.t, columns, edges, edge, bounds, skip, self._pieces, place.piece,
             np.empty((3, axes)), found, self.seen.known,
         )  # fmt: skip
-        look_at_axes(block, limits, worst, found, sure=bool(self.seen.known[UNKNOWN] == unknown))
+        sure = limits.jerk_limited and self.seen.known[UNKNOWN] == unknown
+        look_at_axes(block, limits, worst, found, sure=bool(sure))
         # where the block changes the larger F counts, and where the motion is lost none
         feed = np.where(place.last >= 0, place.feed_max, np.inf)
         feed[:skip] = np.inf

@@ -203,6 +203,13 @@ def test_of_a_file_what_lies_between_rows_is_assumed():
     )
 
 
+def test_where_jerk_is_not_limited_it_is_sampled():
+    motion, path, asked = on_a_line()
+    known = verify(sample(motion, M.dt), path, M, motion=asked, not_limited=("jerk",)).claims.known
+    assert known["acceleration.x"] is Known.EXACT
+    assert known["jerk.x"] is Known.SAMPLED
+
+
 def test_the_words_stand_in_the_summary():
     motion, path, asked = on_a_line()
     verdict = verify(sample(motion, M.dt), path, M, motion=asked)

@@ -79,6 +79,8 @@ class Window:
 
 def near(laws: RunLaws, window: Window) -> Array:
     """(M,) which laws a window needs: those that its motion is near to, and the feed."""
+    if not len(laws):
+        return np.zeros(0, dtype=bool)
     steps = np.arange(window.lo, window.hi)
     most = np.zeros(len(laws))
     for part in (INSIDE, 0.5, 1.0 - INSIDE):

@@ -32,6 +32,13 @@ def kind_of(asked: Asked) -> Hashable:
     return asked.window.u.shape[1]
 
 
+def alike(asked: Asked) -> Hashable:
+    """The kind of a window, and what its iterations and their cost depend on most."""
+    window = asked.window
+    bent = bool(window.limits.passed.any() or window.legs.radius.any())
+    return kind_of(asked), asked.tuning.gap, bent, len(window.which)
+
+
 def solve_windows(asked: Sequence[Asked]) -> list[Solved]:
     """Solve `WIDTH` windows of one kind at most; what is found in one of them does not depend on the others."""
     return [

@@ -80,6 +80,7 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         ringing=(),
         lost_after=None,
         notes=(),
+        not_limited=("jerk",),
         faults=() if passed else (TOO_FAST,),
         sentences=[] if passed else [str(TOO_FAST)],
         summary=lambda: {
@@ -88,6 +89,8 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
             "contour_error_mm": 0.0123,
             "vertex_error_mm": 0.02,
             "end_error_mm": 0.0,
+            "not_limited": ["jerk"],
+            "faults": [] if passed else [str(TOO_FAST)],
         },
     )
 

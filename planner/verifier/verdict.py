@@ -176,6 +176,12 @@ class Verdict:
         return frozenset(fault.kind for fault in self.faults)
 
     @property
+    def not_limited(self) -> tuple[str, ...]:
+        """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
+        free = {name.partition(".")[0] for name, check in self.limits.items() if not check.limited}
+        return tuple(sorted(free))
+
+    @property
     def sentences(self) -> list[str]:
         """The faults in words."""
         return [fault.sentence for fault in self.faults]
@@ -205,4 +211,6 @@ class Verdict:
             "end_error_mm": self.end_error_mm,
             "ringing": [mode.summary() for mode in self.ringing],
             "lost_after_line": self.lost_after,
+            "not_limited": self.not_limited,
+            "faults": self.sentences,
         }

@@ -12,7 +12,7 @@ from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.sensitivity.records import GridHistory, PriceList
-from planner.verifier import CornerCheck, Fault, Kind
+from planner.verifier import Claims, CornerCheck, Fault, Kind, Known
 
 SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
 
@@ -67,6 +67,10 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
             "acceleration.x": check(0.75),
             "jerk.x": check(3.5, limited=False),
         },
+        claims=Claims(
+            known={"velocity.x": Known.EXACT, "velocity.y": Known.EXACT, "contour error": Known.CERTIFIED},
+            open_mm=1e-4,
+        ),
         contour_error_mm=0.0123,
         linear_error_mm=None,
         vertex_error_mm=0.02,
@@ -76,6 +80,7 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
         ringing=(),
         lost_after=None,
         notes=(),
+        not_limited=("jerk",),
         faults=() if passed else (TOO_FAST,),
         sentences=[] if passed else [str(TOO_FAST)],
         summary=lambda: {
@@ -84,6 +89,8 @@ def make_verdict(*, passed: bool = True, turns: bool = True) -> Any:
             "contour_error_mm": 0.0123,
             "vertex_error_mm": 0.02,
             "end_error_mm": 0.0,
+            "not_limited": ["jerk"],
+            "faults": [] if passed else [str(TOO_FAST)],
         },
     )
 

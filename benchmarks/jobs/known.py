@@ -122,10 +122,10 @@ def turns(random: np.random.Generator) -> Known:
 
 
 SORTS: tuple[tuple[Callable[[np.random.Generator], Known], int], ...] = (
-    (capped, 600),
-    (to_a_point, 900),
+    (capped, 400),
+    (to_a_point, 1000),
     (turning_back, 900),
-    (stopping, 300),
+    (stopping, 400),
     (turns, 300),
 )
 

@@ -43,7 +43,9 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
             return of_function(value)
         if isinstance(value, ModuleType):
             return value.__name__
-        if hasattr(value, "_defn"):  # one of numba's intrinsics (lanes.py): it belongs together with all of its file
+        if hasattr(
+            value, "_defn"
+        ):  # one of numba's intrinsics (lanes.py): it belongs together with all of its file
             return _text_of(value._defn.__code__.co_filename)
         if isinstance(value, type):
             return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"

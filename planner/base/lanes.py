@@ -11,6 +11,7 @@ that shall be numbers in machine code, so that loops are unrolled, are lengths o
 # mypy: ignore-errors
 
 import operator
+from typing import ClassVar
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -82,7 +83,7 @@ def _binary(operation, result, instruction):
 
     @infer_global(operation)
     class _Template(ConcreteTemplate):
-        cases = [signature(result, of, of)]
+        cases: ClassVar = [signature(result, of, of)]
 
     @lower_builtin(operation, of, of)
     def _lower(context, builder, sig, args):
@@ -111,7 +112,7 @@ _binary(operator.or_, mask, ir.IRBuilder.or_)
 
 @infer_global(operator.neg)
 class _Negative(ConcreteTemplate):
-    cases = [signature(lanes, lanes)]
+    cases: ClassVar = [signature(lanes, lanes)]
 
 
 @lower_builtin(operator.neg, lanes)

@@ -9,17 +9,7 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import METHODS, method_name
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    ForceOption,
-    Job,
-    JsonOption,
-    MachineOption,
-    QuietOption,
-    ThreadsOption,
-    ToleranceOption,
-    takes_reading,
-)
+from planner.commands import options
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import (
     BAD_INPUT,
@@ -42,15 +32,15 @@ ALL = "all"
 
 
 @guarded
-@takes_reading
+@options.takes_reading
 def compare_command(
-    job: Job,
-    machine: MachineOption = None,
+    job: options.Job,
+    machine: options.MachineOption = None,
     method: Annotated[
         str,
         typer.Option("--method", "--methods", metavar="A,B,...", help="methods to compare (default: all)"),
     ] = ALL,
-    tolerance: ToleranceOption = None,
+    tolerance: options.ToleranceOption = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", "--out", metavar="FILE", help="write the comparison (.json, .csv)"),
@@ -63,10 +53,10 @@ def compare_command(
             help="write a page with the motions side by side (.html) for a browser",
         ),
     ] = None,
-    force: ForceOption = False,
-    threads: ThreadsOption = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    threads: options.ThreadsOption = None,
+    quiet: options.QuietOption = False,
+    as_json: options.JsonOption = False,
     *,
     reading: Reading,
 ) -> None:
@@ -92,12 +82,12 @@ def compare_command(
     from planner.report.replace import check_file, write_whole
     from planner.report.tables import assumed_lines
 
-    inputs = [job, Path(machine or DEFAULT_MACHINE)]
+    inputs = [job, Path(machine or options.DEFAULT_MACHINE)]
     if output is not None:
         check_file(output, inputs, suffixes=SUFFIXES, force=force)
     if report is not None:
         check_file(report, inputs, force=force)
-    limits = load_machine(machine or DEFAULT_MACHINE)
+    limits = load_machine(machine or options.DEFAULT_MACHINE)
     program = read_program(job, limits, reading)
     rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
     about = about_job(str(job), limits, tolerance)

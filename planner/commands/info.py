@@ -7,22 +7,19 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.files import readable
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    ForceOption,
-    Job,
-    JsonOption,
-    MachineOption,
-    takes_reading,
-)
+from planner.commands import options
 from planner.commands.terminal import BAD_INPUT, guarded, say, say_json, show
 from planner.nc.reading import Reading
 
 
 @guarded
-@takes_reading
+@options.takes_reading
 def info_command(
-    job: Job, machine: MachineOption = None, as_json: JsonOption = False, *, reading: Reading
+    job: options.Job,
+    machine: options.MachineOption = None,
+    as_json: options.JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Show what a program contains, and the line of every construct that is not supported."""
     from planner.machine import load_machine
@@ -30,7 +27,7 @@ def info_command(
     from planner.report.summary import info_summary
     from planner.report.tables import info_table
 
-    found = inspect_program(job, load_machine(machine or DEFAULT_MACHINE), reading)
+    found = inspect_program(job, load_machine(machine or options.DEFAULT_MACHINE), reading)
     if as_json:
         say_json(info_summary(found))
     else:
@@ -40,15 +37,15 @@ def info_command(
 
 
 @guarded
-@takes_reading
+@options.takes_reading
 def expand_command(
-    job: Job,
-    machine: MachineOption = None,
+    job: options.Job,
+    machine: options.MachineOption = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="the file to write (default: print the program)"),
     ] = None,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
     *,
     reading: Reading,
 ) -> None:
@@ -61,7 +58,9 @@ def expand_command(
     from planner.report.replace import write_new
 
     data = load(job)
-    found = flat_program(data, load_machine(machine or DEFAULT_MACHINE), reading, source=source_name(job))
+    found = flat_program(
+        data, load_machine(machine or options.DEFAULT_MACHINE), reading, source=source_name(job)
+    )
     text = data if found is None else readable(found[0]).encode()
     if output is None:
         typer.echo(text, nl=False)

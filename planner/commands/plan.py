@@ -11,20 +11,7 @@ import typer
 
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import users_of
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    ForceOption,
-    Format,
-    Jobs,
-    JsonOption,
-    MachineOption,
-    QuietOption,
-    ThreadsOption,
-    ToleranceOption,
-    given_options,
-    takes_planning,
-    takes_reading,
-)
+from planner.commands import options
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import Reading
@@ -39,13 +26,13 @@ NO_CORNERS = "no corners to list: the program has no corner without a full stop"
 
 
 @guarded
-@takes_reading
-@takes_planning
+@options.takes_reading
+@options.takes_planning
 def plan_command(
     context: typer.Context,
-    jobs: Jobs,
-    machine: MachineOption = None,
-    tolerance: ToleranceOption = None,
+    jobs: options.Jobs,
+    machine: options.MachineOption = None,
+    tolerance: options.ToleranceOption = None,
     shaped: Annotated[
         bool,
         typer.Option(
@@ -63,8 +50,8 @@ def plan_command(
         ),
     ] = None,
     file_format: Annotated[
-        Format | None,
-        typer.Option("--format", help=f"format of the trajectory in DIR (default: {Format.parquet})"),
+        options.Format | None,
+        typer.Option("--format", help=f"format of the trajectory in DIR (default: {options.Format.parquet})"),
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="write pictures into DIR (PNG)")] = False,
     report: Annotated[
@@ -80,10 +67,10 @@ def plan_command(
         Path | None,
         typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
     ] = None,
-    as_json: JsonOption = False,
-    threads: ThreadsOption = None,
-    quiet: QuietOption = False,
-    force: ForceOption = False,
+    as_json: options.JsonOption = False,
+    threads: options.ThreadsOption = None,
+    quiet: options.QuietOption = False,
+    force: options.ForceOption = False,
     *,
     how: dict[str, Any],
     reading: Reading,
@@ -113,7 +100,7 @@ def plan_command(
         from planner.planning.methods.registry import check_settings
 
         check_settings(**how)
-        handed_on = given_options(context, ("output", "threads", "quiet", "as_json"))
+        handed_on = options.given_options(context, ("output", "threads", "quiet", "as_json"))
         code = plan_many(jobs, handed_on, output, threads=threads, quiet=quiet, as_json=as_json)
         if code:
             raise typer.Exit(code)
@@ -125,17 +112,17 @@ def plan_command(
     from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary
 
-    form = file_format or Format.parquet
+    form = file_format or options.Format.parquet
     if output is not None:
-        inputs = [job, Path(machine or DEFAULT_MACHINE)]
+        inputs = [job, Path(machine or options.DEFAULT_MACHINE)]
         check_places(output, inputs, file_format=form.value, plots=plot, force=force, report=report)
     if trace is not None:
-        check_file(trace, [job, Path(machine or DEFAULT_MACHINE)], force=force)
+        check_file(trace, [job, Path(machine or options.DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
     with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan(
             job,
-            machine or DEFAULT_MACHINE,
+            machine or options.DEFAULT_MACHINE,
             tolerance=tolerance,
             reading=reading,
             progress=progress,

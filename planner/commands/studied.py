@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    Job,
-    JsonOption,
-    MachineOption,
-    QuietOption,
-    ThreadsOption,
-    ToleranceOption,
-    takes_planning,
-    takes_reading,
-    taking,
-)
+from planner.commands import options
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, say_json, show
 from planner.nc.reading import Reading
@@ -33,9 +22,9 @@ else:
 
 
 _JOB: dict[str, Any] = {
-    "job": get_args(Job),
-    "machine": get_args(MachineOption),
-    "tolerance": get_args(ToleranceOption),
+    "job": get_args(options.Job),
+    "machine": get_args(options.MachineOption),
+    "tolerance": get_args(options.ToleranceOption),
     "how": (dict, None),  # in the place of these two come the options of planning and of the reader
     "reading": (Reading, None),
 }
@@ -45,8 +34,8 @@ def takes_studied_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the options of a job, of planning and of the reader; it gets them as one argument,
     `studied`."""
     usual = dict.fromkeys(_JOB, None) | {"job": inspect.Parameter.empty}
-    of_job = taking(command, "studied", _JOB, usual, lambda given: _studied_job(**given))
-    return takes_reading(takes_planning(of_job))
+    of_job = options.taking(command, "studied", _JOB, usual, lambda given: _studied_job(**given))
+    return options.takes_reading(options.takes_planning(of_job))
 
 
 def _studied_job(
@@ -61,7 +50,7 @@ def _studied_job(
     check_settings(**how)
     if tolerance is not None and not 0.0 < tolerance < float("inf"):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
-    limits = load_machine(machine or DEFAULT_MACHINE)
+    limits = load_machine(machine or options.DEFAULT_MACHINE)
     program = read_program(job, limits, reading)
     return StudiedJob(program=program, machine=limits, tolerance=tolerance, how=how)
 
@@ -89,9 +78,9 @@ def what_if_command(
             help="another value, such as axes.y.jerk=4e5, y.velocity=+10%, tolerance=20um or feed=1.2; repeat it for more",
         ),
     ] = None,
-    as_json: JsonOption = False,
-    threads: ThreadsOption = None,
-    quiet: QuietOption = False,
+    as_json: options.JsonOption = False,
+    threads: options.ThreadsOption = None,
+    quiet: options.QuietOption = False,
     *,
     studied: StudiedJob,
 ) -> None:
@@ -141,9 +130,9 @@ def sweep_command(
     force: Annotated[
         bool, typer.Option("--force", help="begin anew in a directory that holds something else")
     ] = False,
-    as_json: JsonOption = False,
-    threads: ThreadsOption = None,
-    quiet: QuietOption = False,
+    as_json: options.JsonOption = False,
+    threads: options.ThreadsOption = None,
+    quiet: options.QuietOption = False,
     *,
     studied: StudiedJob,
 ) -> None:

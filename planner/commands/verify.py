@@ -16,14 +16,7 @@ import typer
 
 from planner.base.errors import InputError
 from planner.base.names import known_name
-from planner.commands.options import (
-    DEFAULT_MACHINE,
-    JsonOption,
-    QuietOption,
-    ToleranceOption,
-    TrajectoryArgument,
-    takes_reading,
-)
+from planner.commands import options
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import AS_USUAL, Reading
@@ -34,9 +27,9 @@ if TYPE_CHECKING:
 
 
 @guarded
-@takes_reading
+@options.takes_reading
 def verify_command(
-    trajectory: TrajectoryArgument,
+    trajectory: options.TrajectoryArgument,
     job: Annotated[
         Path | None, typer.Argument(metavar="JOB", help="NC program (default: the one that TRAJECTORY names)")
     ] = None,
@@ -46,10 +39,10 @@ def verify_command(
             "-m",
             "--machine",
             metavar="FILE",
-            help=f"machine file, or name of a built-in machine (default: the one in TRAJECTORY, else {DEFAULT_MACHINE})",
+            help=f"machine file, or name of a built-in machine (default: the one in TRAJECTORY, else {options.DEFAULT_MACHINE})",
         ),
     ] = None,
-    tolerance: ToleranceOption = None,
+    tolerance: options.ToleranceOption = None,
     not_limited: Annotated[
         list[str] | None,
         typer.Option(
@@ -57,15 +50,15 @@ def verify_command(
             help="report this limit without judging it, for example jerk for a plan that does not limit it",
         ),
     ] = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    quiet: options.QuietOption = False,
+    as_json: options.JsonOption = False,
     *,
     reading: Reading,
 ) -> None:
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.nc.reader import read_program
     from planner.report.judging import FileSays, judge
-    from planner.report.summary import corner_summary, uniform, verdict_summary
+    from planner.report.summary import json_ready, uniform
     from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
     from planner.verifier import NOT_LIMITED_NAMES
@@ -98,13 +91,13 @@ def verify_command(
     notes += says.remedies(verdict, unjudged)
     if as_json:
         about = {
-            "corners": corner_summary(verdict.corners),
+            "corners": verdict.corners.summary(),
             "machine": limits.name,
             "tolerance_mm": uniform(budgets),
             "cycle_time_s": time,
             "notes": notes,
         }
-        say_json({"assumptions": program.assumptions, **verdict_summary(verdict), **about})
+        say_json(json_ready({"assumptions": program.assumptions, **verdict.summary(), **about}))
     else:
         for note in notes:
             say(f"note: {note}", err=True)
@@ -126,4 +119,4 @@ def _machine(machine: str | None, trajectory: Path, says: FileSays) -> tuple[Mac
 
     if machine is None and says.machine is not None:
         return machine_from_dict(says.machine, source=f"{trajectory} (its own machine)"), True
-    return load_machine(machine or DEFAULT_MACHINE), False
+    return load_machine(machine or options.DEFAULT_MACHINE), False

@@ -16,10 +16,13 @@ from typing import Any, NamedTuple, TypeVar
 
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
-from planner.joint.window_solver import WIDTH, Asked, Solved, kind_of, solve_windows
+from planner.joint.window_solver import WIDTH, Asked, Solved, alike, kind_of, solve_windows
 
 # Windows that wait when a group is put together, if there are so many.
 WAITING = 8 * WIDTH
+# What windows together that are not alike are worth against others [-]: they take different numbers of iterations,
+# and rows that only one of them has.
+MIXED = 0.8
 QUIET = SIZES.windows_shared  # steps: searches of fewer together are worth no thread
 Task = Generator[Asked, Solved, bool]  # returns whether it has ended well
 
@@ -77,17 +80,34 @@ class _Ready(NamedTuple):
     running: _Running
     task: Task
     asked: Asked
+    sort: "Sort"
 
 
-def together(asked: list[Asked]) -> list[int]:
+class Sort(NamedTuple):
+    """By what windows are put together."""
+
+    steps: int
+    kind: Hashable
+    alike: Hashable
+
+
+def together(waiting: list[Sort]) -> list[int]:
     """Which windows to solve next, `WIDTH` of one kind at most: those that leave least of a group as long as its
-    longest idle, the longest where several do."""
-    steps = [len(one.window.u) for one in asked]
-    by_kind: dict[Hashable, list[int]] = {}
-    for at in sorted(range(len(asked)), key=lambda at: -steps[at]):
-        by_kind.setdefault(kind_of(asked[at]), []).append(at)
-    groups = [of[k : k + WIDTH] for of in by_kind.values() for k in range(max(len(of) - WIDTH, 0) + 1)]
-    return max(groups, key=lambda group: sum(steps[at] for at in group) / (WIDTH * steps[group[0]]))
+    longest idle, and rather windows that are alike."""
+    steps, kinds, alikes = zip(*waiting, strict=True)
+    longest_first = sorted(range(len(steps)), key=lambda at: -steps[at])
+    best, most = [0], 0.0
+    for keys, worth in ((alikes, 1.0), (kinds, MIXED)):
+        of_one: dict[Hashable, list[int]] = {}
+        for at in longest_first:
+            of_one.setdefault(keys[at], []).append(at)
+        for of in of_one.values():
+            for k in range(max(len(of) - WIDTH, 0) + 1):
+                group = of[k : k + WIDTH]
+                filled = worth * sum(steps[at] for at in group) / (WIDTH * steps[group[0]])
+                if filled > most:
+                    best, most = group, filled
+    return best
 
 
 class Groups:
@@ -143,7 +163,7 @@ class Groups:
                 return partial(self._go_on, new)
         if not self._ready:
             return None
-        group = together([one.asked for one in self._ready])
+        group = together([one.sort for one in self._ready])
         solve = partial(self._solve, [self._ready[at] for at in group])
         self._ready = [one for at, one in enumerate(self._ready) if at not in group]
         return solve
@@ -163,7 +183,8 @@ class Groups:
             assert running.ended is not None
             running.ended += ended
             if asked is not None and not running.given_up():
-                self._ready.append(_Ready(running, task, asked))
+                sort = Sort(len(asked.window.u), kind_of(asked), alike(asked))
+                self._ready.append(_Ready(running, task, asked, sort))
                 return
             running.left -= 1
             if running.given_up():

@@ -180,18 +180,18 @@ def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelle
     nodes [mm]."""
     p, v = state[:, 0], state[:, 1]
     third = h[:, None] / 3
-    controls = np.stack([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
+    controls = np.concatenate([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
     last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
     begin = np.append(0, last[:-1] + 1)
     per_length = run.length / (travelled[last + 1] - travelled[begin])
-    places = np.empty((len(leg), 4))
     number, many = np.arange(len(leg)) - begin[leg], last - begin + 1
-    for k, (control, fraction) in enumerate(zip(controls, (0.0, 1 / 3, 2 / 3, 1.0), strict=True)):
-        there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
-        x = (there - travelled[begin][leg]) * per_length[leg]
-        for _ in range(NEAREST_STEPS):
-            miss, along = control - run.points(leg, x), run.tangents(leg, x)
-            x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[leg])
-        places[:, k] = np.where(run.passed[leg], run.length[leg] * (number + fraction) / many[leg], x)
+    fraction = np.array([[0.0], [1 / 3], [2 / 3], [1.0]])
+    there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
+    x, of = ((there - travelled[begin][leg]) * per_length[leg]).ravel(), np.tile(leg, 4)
+    for _ in range(NEAREST_STEPS):
+        miss, along = controls - run.points(of, x), run.tangents(of, x)
+        x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[of])
+    even = run.length[leg] * (number + fraction) / many[leg]
+    places = np.ascontiguousarray(np.where(run.passed[leg], even, x.reshape(4, -1)).T)
     places[begin, 0], places[last, 3] = 0.0, run.length
     return np.maximum.accumulate((places + run.offset[leg][:, None]).ravel()).reshape(-1, 4)

@@ -38,6 +38,8 @@ def tightened(over: FloatArray, number: int) -> FloatArray:
 def law_shares(run: TubeRun, cut: CutMotion, node: Array) -> FloatArray:
     """(n, M) shares that a cut motion uses at nodes `node` (n,) of the laws that do not depend on its jerk, which is free
     there; 0 of the others."""
+    if not len(run.laws):
+        return np.zeros((len(node), 0))
     state = cut.state[node]
     motion = np.concatenate([state, np.zeros_like(state[:, :1])], axis=1)
     free = [law.quantity == JERK for law in run.laws.laws]

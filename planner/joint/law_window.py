@@ -79,6 +79,8 @@ class Window:
 
 def near(laws: RunLaws, window: Window) -> Array:
     """(M,) which laws a window needs: those that its motion is near to, and the feed."""
+    if not len(laws):
+        return np.zeros(0, dtype=bool)
     steps = np.arange(window.lo, window.hi)
     most = np.zeros(len(laws))
     for part in (INSIDE, 0.5, 1.0 - INSIDE):
@@ -102,7 +104,9 @@ def law_rows(
 
     narrow : (N, M) by what their bounds are multiplied [-]
     """
-    lo, hi, axes, many = window.lo, window.hi, len(laws.axis), window.hi - window.lo
+    lo, hi, axes, many = window.lo, window.hi, window.state.shape[2], window.hi - window.lo
+    if not len(which):
+        return _no_laws(many, axes), np.empty((many, 0), dtype=bool)
     kind = laws.kinds(which, window.state[lo])
     pin, pinned = _pin(laws, window, which, units)
     steps = np.arange(lo, hi)
@@ -142,9 +146,9 @@ def law_rows(
     heading = np.divide(
         state[:, 1] * length / second, speed, out=np.zeros_like(state[:, 1]), where=speed > 0.0
     )
-    one = np.ones((many, min(len(which), 1)))  # the column of `PIN`
-    kind = np.concatenate([kind, np.full(one.shape[1], rows.PIN)])
-    counts = np.array([*(laws.laws[m].counts for m in which), np.zeros(axes)])[: len(kind)]
+    one = np.ones((many, 1))  # the column of `PIN`
+    kind = np.append(kind, rows.PIN)
+    counts = np.array([*(laws.laws[m].counts for m in which), np.zeros(axes)])
     begin, end = np.hstack([begin, one]), np.hstack([end, one])
     first = np.append(0, np.cumsum(np.array(rows.ROWS_OF)[kind]))
     found = LawRows(
@@ -166,6 +170,29 @@ def law_rows(
         pinned=pinned,
     )
     return found, _present(found, window, np.hstack([free, ~one.astype(bool)]))
+
+
+def _no_laws(many: int, axes: int) -> LawRows:
+    """Of `many` steps."""
+    none, nodes = np.empty((many, 0)), many + 1
+    return LawRows(
+        kind=np.empty(0, dtype=np.int64),
+        first=np.zeros(1, dtype=np.int64),
+        counts=np.empty((0, axes)),
+        node=none,
+        begin=none,
+        end=none,
+        tilt=np.empty((many, 0, axes)),
+        at=np.zeros((nodes, axes)),
+        joint=np.zeros(1, dtype=np.int64),
+        gradient=np.empty((nodes, 0, axes)),
+        bend=np.empty((nodes, 0, axes, axes)),
+        convex=np.empty((nodes, 2, 0, axes, axes)),
+        third=np.empty((nodes, 0)),
+        heading=np.zeros((nodes, axes)),
+        pin=np.zeros((many, axes)),
+        pinned=np.zeros(many),
+    )
 
 
 def _stacked(models: list[FloatArray], shape: tuple[int, ...], at: int = 1) -> FloatArray:

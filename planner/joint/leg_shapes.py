@@ -50,14 +50,22 @@ def shapes_of(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, F
     return shape
 
 
-def words_of(toolpath: Toolpath, row: Array) -> tuple[FloatArray, FloatArray, str]:
-    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes; and why
-    no motion can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not, so
-    that F is a limit of its own; it has to be of the same axes everywhere, and to change with the feed in all
-    of them."""
-    groups, by = feed_groups(toolpath.axes), goes_by(toolpath)[row]
+def word_shares(toolpath: Toolpath) -> tuple[Array, FloatArray]:
+    """(M,) the group of axes that F goes by on each segment, and the share of the length in all axes that they
+    move [-]."""
+    by = goes_by(toolpath)
     share = np.where(by == ROTARY, toolpath.radius, 1.0)
-    share = share / path_per_length(toolpath.axes, toolpath.radius, toolpath)[row]
+    return by, share / path_per_length(toolpath.axes, toolpath.radius, toolpath)
+
+
+def words_of(
+    toolpath: Toolpath, row: Array, of: tuple[Array, FloatArray]
+) -> tuple[FloatArray, FloatArray, str]:
+    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes, from
+    `word_shares`; and why no motion can be looked for. Inside the tolerance x, y and z may take what the
+    rotary axes need not, so that F is a limit of its own; it has to be of the same axes everywhere, and to
+    change with the feed in all of them."""
+    groups, by, share = feed_groups(toolpath.axes), of[0][row], of[1][row]
     feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
     every = np.ones(len(groups))
     if not (finite & (share < 1.0 - ROUNDING)).any():

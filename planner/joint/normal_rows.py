@@ -102,7 +102,7 @@ def put_normal_rows(sizes, bound, pace, turns, x, u, g, out):
         kept = bound * larger(of_d, least)
         per, square, by_h = 1.0 / (kept * kept), 0.0 * h, 0.0 * h
         push = per * bound * bound * magnitude(of_d)
-        near, turned = 0.0 * h, -0.5 + 0.0 * h
+        turned = -0.5 + 0.0 * h
         for k in range(axes):
             a, j, e0, e1 = x[2 * axes + k], u[k], w[0, k] / first, w[2, k] / last
             b = a, a + h * j

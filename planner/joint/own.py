@@ -13,6 +13,7 @@ is said.
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -145,8 +146,12 @@ class _Search:
         self.price = np.zeros((len(guess), columns(run)))
         self.iterations, self.windows, self.solved = list[int](), 0, 0
         self._keeps = keeps_of(run)
-        self._strain = strain(run, guess)
+        self._begun = guess
         self._done, self._all = list[int](), len(guess)  # steps of all windows
+
+    @cached_property
+    def _strain(self) -> FloatArray:
+        return strain(self.run, self._begun)
 
     def sweeps(self) -> Generator[Sweep, list[bool], bool]:
         """All windows, and then all joins; whether it was not given up."""
@@ -166,6 +171,8 @@ class _Search:
     def _slow(self, nodes: list[int]) -> None:
         """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as
         narrowed as they may be: no motion keeps them there."""
+        if not nodes:
+            return
         run, at = self.run, np.array(nodes, dtype=int)
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
         v, a = state[at, 1], state[at, 2]

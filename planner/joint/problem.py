@@ -203,6 +203,8 @@ def _targets(run: TubeRun, leg: Array, of: Array, place: FloatArray) -> FloatArr
     """(N, 3, A) where the nodes and the inner control points of the steps `of` (n,), whose legs are passed, belong
     to: at the places (N, 4) along the run [mm]."""
     targets: FloatArray = np.zeros((len(leg), 3, len(run.axis)))
+    if not len(of):
+        return targets
     local = place[of] - run.offset[leg[of]][:, None]
     for c, (node, sign) in enumerate(((0, 0.0), (0, 1.0), (3, -1.0))):
         third = sign * (local[:, 3] - local[:, 0])[:, None] / 3.0

@@ -13,13 +13,14 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import REVERSAL_ANGLE
+from planner.joint.budgets import HALF
 from planner.joint.checks import normal_shares
 from planner.joint.groups import Search
 from planner.joint.guess import Cut, Guess, least_of_legs, unit_of
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn, keeps_of
 from planner.joint.price import LAWS, NORMAL, ROOM, VERTEX
-from planner.joint.run import HALF, TubeRun
+from planner.joint.run import TubeRun
 
 # Of the normal acceleration that a motion was found to have, what budgets leave room for [-]: with less the
 # search has to hold it down in more places and takes longer, with more the path gets less of the tolerance.

@@ -30,17 +30,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.budget import error_rate, normal_anywhere
 from planner.feedrate.constraints.limits import JERK, Limits
 from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.joint.budgets import HALF, budgets_of
 from planner.joint.laws import PUSH
-from planner.joint.leg_shapes import edges_of, shapes_of, word_change, words_of
+from planner.joint.leg_shapes import edges_of, shapes_of, word_change, word_shares, words_of
 from planner.joint.own_laws import RunLaws, laws_of
 from planner.machine import Machine
 from planner.machine.user_limit import QUANTITIES
@@ -54,19 +53,6 @@ SHARP = 0.25
 # An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`;
 # `python -m benchmarks.net.ablation ROWS --net NET --without PASSED`).
 PASSED = 2.0
-# Of the tolerance that chords and filters take at most, as long as nothing tells better: where a corner is as fast as
-# can be, eq. (20) [-].
-HALF = 0.5
-
-
-class Budgets(NamedTuple):
-    """The parts of the tolerance that R legs and the R+1 vertices around them may use, eps_ap, and what the
-    rest of it allows."""
-
-    leg: FloatArray  # (R,) [mm]
-    vertex: FloatArray  # (R+1,) 0 at both ends [mm]
-    across: FloatArray  # (R,) normal acceleration [mm/s2]
-    reserved: FloatArray  # (R,) that is asked for [mm/s2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -231,10 +217,11 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
     limits = Limits.of(machine, toolpath.axes)
     edges = edges_of(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
-    for begin, end in pairwise(stops):
+    of_all, shares = budgets_of(toolpath, machine, edges), word_shares(toolpath)
+    for begin, end in pairwise(stops.tolist()):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
-        budgets = budgets_of(toolpath, machine, first)
+        budgets = of_all.part(begin, end)
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
         shape = shapes_of(toolpath, row, vertex)
         curved = toolpath.curve[row] >= 0
@@ -243,7 +230,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
         held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
-        word, counts, differs = words_of(toolpath, row)
+        word, counts, differs = words_of(toolpath, row, shares)
         yield TubeRun(
             axis=np.flatnonzero(moves),
             left=_kept_as_it_is(toolpath, slice(first[0], first[-1])) or differs,
@@ -300,35 +287,6 @@ def _laws(
         edges=np.cumsum(toolpath.length[segments])[:-1],
         block=toolpath.block[segments],
     )
-
-
-def budgets_of(
-    toolpath: Toolpath,
-    machine: Machine,
-    first: Array,
-    reserved: FloatArray | None = None,
-    share: FloatArray | float = HALF,
-) -> Budgets:
-    """The budgets by eq. (18)-(20) for the legs that hold the segments first[r] : first[r+1], first (R+1,).
-
-    reserved : (R,) normal acceleration that chords and filters get room for [mm/s2]; None for the largest
-               that the axes can give
-    share    : (R,) of the tolerance that they take at most [-]
-    """
-    reachable = normal_anywhere(machine, toolpath.axes)
-    rate = error_rate(machine)
-    row = first[:-1]  # the segment that stands for its leg
-    tol_leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
-    most = np.full(len(tol_leg), reachable) if reserved is None else np.minimum(reserved, reachable)
-    share = np.broadcast_to(share, len(row))
-    chords = np.minimum(rate * most, share * tol_leg)
-    at_vertex = np.minimum(
-        toolpath.tolerance[first], np.minimum(np.append(tol_leg, np.inf), np.append(np.inf, tol_leg))
-    )
-    beside, at_most = (np.maximum(np.append(one, 0.0), np.append(0.0, one)) for one in (chords, share))
-    vertex_ap = at_vertex - np.minimum(beside, at_most * at_vertex)
-    vertex_ap[[0, -1]] = 0.0
-    return Budgets(tol_leg - chords, vertex_ap, chords / rate, most)
 
 
 def with_reserve(

@@ -27,9 +27,8 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
     square = (speed**2).sum(axis=1)
     across = push - ((speed * push).sum(axis=1) / np.maximum(square, 1e-30))[:, None] * speed
     local = place[:-1] - run.offset[leg]
-    far = np.stack(
-        [_distance(run, leg, c, local) for c in (p, p + h * v / 3, p + h * (2 * v / 3 + h * a / 6))]
-    )
+    controls = np.concatenate([p, p + h * v / 3, p + h * (2 * v / 3 + h * a / 6)])
+    far = _distance(run, np.tile(leg, 3), controls, np.tile(local, 3)).reshape(3, -1)
     used = far.max(axis=0) / run.room[leg]
     begins = np.flatnonzero(np.diff(leg, prepend=leg[0]) > 0)
     vertex = leg[begins]

@@ -6,16 +6,19 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.motion.axis_motion import AxisMotion
 from planner.motion.timing import MotionInTime
-from planner.motion.trajectory import Trajectory, joined
+from planner.motion.trajectory import Trajectory
 
 # Times closer than this are the same [s]: rounding of sums of durations.
 SAME_TIME = 1e-9
+RATES = ("velocity", "acceleration", "jerk", "feed")  # 0 at standstill
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,30 +67,45 @@ class Spliced:
     @cached_property
     def length(self) -> FloatArray:
         """(n+1,) arc length at the start of each run, and at the end [mm]."""
-        ends = (run.motion.at(np.array([run.begin, run.end]), 1.0).s for run in self.runs)
-        return np.append(0.0, np.cumsum([s[-1] - s[0] for s in ends]))
+        return np.append(0.0, np.cumsum(np.diff(self._own_length, axis=1)))
+
+    @cached_property
+    def _own_length(self) -> FloatArray:
+        """(n, 2) arc length in the motion of each run where that begins and ends [mm]."""
+        return np.array([run.motion.at(np.array([run.begin, run.end]), 1.0).s for run in self.runs])
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
         period."""
         of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
-        chunks = []
+        edges = np.append(np.flatnonzero(np.diff(of, prepend=-1)), len(of))
         # Without times there are the columns of the first run, without rows.
-        for k in np.unique(of) if len(of) else [0]:
-            run, asked = self.runs[k], times[of == k]
-            local = run.begin + (asked - self.begin[k])
-            if run.moving:  # rounding of times: its end belongs to the next one
-                local = np.minimum(local, np.nextafter(run.end, run.begin))
-            single, which = np.unique(np.minimum(local, run.end), return_inverse=True)
-            seen = run.motion.at(single, dt)
-            columns = {name: getattr(seen, name)[which] for name in ("position", "block", "line")}
-            columns["s"] = self.length[k] + seen.s[which] - run.motion.at(np.array([run.begin]), dt).s[0]
-            over = local >= run.end  # there another motion may begin
-            for name in ("velocity", "acceleration", "jerk", "feed"):
-                columns[name] = getattr(seen, name)[which]
+        parts = [(int(of[lo]), lo, hi) for lo, hi in pairwise(edges.tolist())] or [(0, 0, 0)]
+        seen = [self._seen(k, times[lo:hi], dt) for k, lo, hi in parts]
+        columns: dict[str, Any] = {
+            name: np.concatenate([one[name] for _, one in seen]) for name in seen[0][1]
+        }
+        return dataclasses.replace(seen[0][0], t=times, **columns)
+
+    def _seen(self, k: int, times: FloatArray, dt: float) -> tuple[Trajectory, dict[str, Array]]:
+        """The motion of run k at some of these times, and the columns at all of them."""
+        run = self.runs[k]
+        local = run.begin + (times - self.begin[k])
+        if run.moving:  # rounding of times: its end belongs to the next one
+            local = np.minimum(local, np.nextafter(run.end, run.begin))
+        single = np.minimum(local, run.end)
+        which: Array | slice = slice(None)
+        if not (np.diff(single) > 0.0).all():
+            single, which = np.unique(single, return_inverse=True)
+        seen = run.motion.at(single, dt)
+        columns = {name: getattr(seen, name)[which] for name in ("position", "block", "line", "s", *RATES)}
+        columns["s"] = self.length[k] + columns["s"] - self._own_length[k, 0]
+        over = local >= run.end  # there another motion may begin
+        if over.any():
+            for name in RATES:
+                columns[name] = columns[name].copy()
                 columns[name][over] = 0.0
-            chunks.append(dataclasses.replace(seen, t=asked, **columns))
-        return joined(chunks)
+        return seen, columns
 
     def whole(self) -> AxisMotion:
         """As one motion; every run has to be all of a motion that is given axis by axis."""

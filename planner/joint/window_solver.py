@@ -32,6 +32,13 @@ def kind_of(asked: Asked) -> Hashable:
     return asked.window.u.shape[1]
 
 
+def alike(asked: Asked) -> Hashable:
+    """The kind of a window, and what its iterations and their cost depend on most."""
+    window = asked.window
+    bent = bool(window.limits.passed.any() or window.legs.radius.any())
+    return kind_of(asked), asked.tuning.gap, bent, len(window.which)
+
+
 def solve_windows(asked: Sequence[Asked], width: int = WIDTH) -> list[Solved]:
     """Solve `width` windows of one kind at most side by side; what is found in one of them does not depend on the others."""
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)

@@ -196,7 +196,7 @@ def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
     if len(stops) < 3 or len(stops) != len(full_stops(toolpath)):
         return None
     runs = RunsInTime(making.motion, job)
-    broken, few = broken_runs(runs.edges(), verdict), ALONE_SHARE * (len(stops) - 1)
+    broken, few = broken_runs(runs.edges, verdict), ALONE_SHARE * (len(stops) - 1)
     if not 0 < len(broken) <= few:
         return None
     parts = [None if k in broken else [runs.spliced(k)] for k in range(len(stops) - 1)]
@@ -207,7 +207,7 @@ def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
         return None
     grid = made.grid
     if grid is not None:
-        grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges(), found.begin))
+        grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges, found.begin))
     return made.delivering(found.delivered, grid=grid, notes=(*made.notes, *found.notes))
 
 

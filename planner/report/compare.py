@@ -20,7 +20,7 @@ from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import read_program
 from planner.nc.reading import AS_USUAL, Reading
-from planner.report.summary import summary, verdict_summary
+from planner.report.summary import summary
 
 if TYPE_CHECKING:
     from planner.machine.user_limit import OwnLimit
@@ -173,7 +173,7 @@ def row_of_plan(method: str, plan: Plan) -> Row:
         sentence=plan.sentence if verdict.passed else str(verdict.faults[0]),
         cycle_time=plan.trajectory.cycle_time,
         worst=worst,
-        free=tuple(verdict_summary(verdict)["not_limited"]),
+        free=verdict.not_limited,
         contour_error=verdict.contour_error_mm,
         vertex_error=verdict.vertex_error_mm,
         corner_ratio=_known(verdict.corners.worst_ratio),

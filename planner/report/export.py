@@ -23,7 +23,7 @@ from planner.planning.job.at_tip import joints_of
 from planner.report.judging import KEPT, KEPT_POINTS, KEPT_TEXT
 from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
-from planner.report.summary import json_ready, not_limited, summary, tool_point_summary, uniform, versions
+from planner.report.summary import json_ready, summary, tool_point_summary, uniform, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
 from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
 
@@ -97,7 +97,8 @@ def write_plan(
             "sha256": sums,
             "notes": [*plan.notes, *notes],
         }
-        _write_json(new / SUMMARY, said)
+        in_words = json.dumps(said, indent=2, allow_nan=False)
+        (new / SUMMARY).write_text(in_words + "\n", encoding="utf-8")
     return names
 
 
@@ -151,7 +152,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "dt_s": trajectory.dt,
             "tolerance_mm": uniform(plan.toolpath.tolerance),
             "reading": plan.program.reading.changed(),
-            "not_limited": not_limited(plan.verdict) if plan.verdict is not None else [],
+            "not_limited": plan.verdict.not_limited if plan.verdict is not None else (),
             "units": units(
                 trajectory.axes,
                 extruder=plan.toolpath.extrusion is not None,
@@ -178,7 +179,3 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
 def _is_source(plan: Plan, file: Path) -> bool:
     """Whether the plan's program was read from that file, which must then not be replaced."""
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
-
-
-def _write_json(path: Path, value: dict[str, Any]) -> None:
-    path.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")

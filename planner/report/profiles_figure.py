@@ -60,7 +60,7 @@ def profiles_figure(plan: Plan) -> Figure:
             handlelength=1.2,
             columnspacing=1.4,
         )
-    free = _free_quantities(plan)
+    free = () if plan.verdict is None else plan.verdict.not_limited
     row = iter(rows[2 if band else 1 :])
     for quantity in below:
         for one in quantity.series:
@@ -165,12 +165,6 @@ def _limit_lines(panel: Axes, values: FloatArray, limit: float) -> None:
     panel.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
     for side in (limit, -limit):
         panel.axhline(side, color=VERMILION, linewidth=0.8, linestyle=(0, (4, 2)))
-
-
-def _free_quantities(plan: Plan) -> set[str]:
-    if plan.verdict is None:
-        return set()
-    return {name.partition(".")[0] for name, check in plan.verdict.limits.items() if not check.limited}
 
 
 def _time_unit(seconds: float) -> tuple[float, str]:

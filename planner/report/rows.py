@@ -91,6 +91,7 @@ def verdict_rows(verdict: Verdict) -> Rows:
     rows.append(("corners", verdict.corners.sentence()))
     for mode in verdict.ringing:
         rows.append((f"rings at {mode.frequency:g} Hz", _ringing_text(mode)))
+    rows.append(("known between setpoints", verdict.claims.sentence()))
     rows.append((VERDICT, PASSED if verdict.passed else FAILED))
     return rows + [("", fault) for fault in first_of(verdict.sentences, FAULTS_SHOWN)]
 

@@ -19,7 +19,6 @@ from planner.report.rows import beside_summary, optimum_summary, plan_rows
 if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo
     from planner.planning.job.plan import Plan
-    from planner.verifier import CornerCheck, Verdict
 
 NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
@@ -44,8 +43,8 @@ def summary(plan: Plan) -> dict[str, Any]:
             "stop_time_s": plan.stop_time,
             "least_time_s": plan.least_time,
             "tolerance_mm": uniform(plan.toolpath.tolerance),
-            "verdict": verdict_summary(verdict) if verdict is not None else None,
-            "corners": corner_summary(plan.corners) if plan.corners is not None else NO_CORNERS,
+            "verdict": verdict.summary() if verdict is not None else None,
+            "corners": plan.corners.summary() if plan.corners is not None else NO_CORNERS,
             **optimum_summary(plan.grid, plan.prices),
             "reading": plan.program.reading.changed(),
             "blocks": len(plan.program),
@@ -57,21 +56,6 @@ def summary(plan: Plan) -> dict[str, Any]:
             "told": plan_rows(plan),
         }
     )
-
-
-def verdict_summary(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers: the largest ratio to each limit, errors, faults."""
-    return json_ready({**verdict.summary(), "not_limited": not_limited(verdict), "faults": verdict.sentences})
-
-
-def corner_summary(corners: CornerCheck) -> dict[str, Any]:
-    """Eq. 18-20 at the programmed corners in numbers."""
-    return json_ready(corners.summary())
-
-
-def not_limited(verdict: Verdict) -> list[str]:
-    """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
-    return sorted({name.partition(".")[0] for name, check in verdict.limits.items() if not check.limited})
 
 
 def info_summary(info: ProgramInfo) -> dict[str, Any]:

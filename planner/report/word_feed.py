@@ -47,8 +47,6 @@ from planner.machine import Machine
 from planner.motion.trajectory import Trajectory, joined
 
 if TYPE_CHECKING:
-    from planner.geometry.toolpath import Toolpath
-    from planner.motion.trajectory import Trajectory
     from planner.nc.program import Program
 
 
@@ -74,7 +72,7 @@ class WordFeed:
         for group in range(ROTARY + 1):
             here = goes_by == group
             feed[here] = np.sqrt(squares[here][:, self._groups == group].sum(axis=1))
-        feed[goes_by == ROTARY] *= self._degrees
+        feed[goes_by == ROTARY] /= RAD_PER_DEG * self._toolpath.radius
         return feed
 
     def programmed(self, program: Program, block: Array) -> FloatArray:
@@ -92,10 +90,6 @@ class WordFeed:
         found: FloatArray = feed / path_per_length(toolpath.axes, toolpath.radius, toolpath)
         found[self._goes_by == ROTARY] /= RAD_PER_DEG
         return found
-
-    @property
-    def _degrees(self) -> float:
-        return 1.0 / (RAD_PER_DEG * self._toolpath.radius)
 
     def _segment(self, block: Array) -> Array:
         """The segment of each block; of blocks that are unknown or move nowhere one beside them."""

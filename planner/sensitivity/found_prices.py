@@ -23,9 +23,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint import price
+from planner.joint.budgets import Budgets, budgets_of
 from planner.joint.own_laws import Where, motion_at
 from planner.joint.parts import FoundRun
-from planner.joint.run import budgets_of
 from planner.machine import Machine
 from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, more_of, price_list
 from planner.sensitivity.records import PlacePrices, PriceList
@@ -162,15 +162,26 @@ def _of_limits(
 def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], changed: Machine) -> float:
     """dT/d(ln limit) through eq. (20), from a machine with `STEP` more of a limit [s]."""
     total = 0.0
-    for run in runs:
-        one = run.found.run
-        before, after = (
-            budgets_of(toolpath, of, one.first, one.reserved, one.share) for of in (machine, changed)
-        )
+    for run, before, after in zip(
+        runs, _budgets(toolpath, machine, runs), _budgets(toolpath, changed, runs), strict=True
+    ):
         total += float(run.room @ np.log(after.leg / before.leg))
         total += float(run.normal @ np.log(after.across / before.across))
         total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
     return total / STEP
+
+
+def _budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices]) -> list[Budgets]:
+    """Those of the runs, made again all at once: behind each run there is a leg that nobody reads."""
+    found = [run.found.run for run in runs]
+    first = np.concatenate([one.first for one in found])
+    reserved, share = (
+        np.concatenate([np.append(getattr(one, name), 0.0) for one in found])[:-1]
+        for name in ("reserved", "share")
+    )
+    made = budgets_of(toolpath, machine, first, reserved, share)
+    begin = np.cumsum([0, *(len(one) + 1 for one in found)]).tolist()
+    return [made.part(lo, lo + len(one)) for lo, one in zip(begin, found, strict=False)]
 
 
 class _OfTolerance:
@@ -186,9 +197,9 @@ class _OfTolerance:
         self.together = np.zeros(len(toolpath) + 1)
         vertex, segment = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath))
         wider = dataclasses.replace(toolpath, tolerance=toolpath.tolerance * (1.0 + STEP))
-        for run in runs:
-            first, reserved, share = run.found.run.first, run.found.run.reserved, run.found.run.share
-            before, after = (budgets_of(one, machine, first, reserved, share) for one in (toolpath, wider))
+        budgets = (_budgets(one, machine, runs) for one in (toolpath, wider))
+        for run, before, after in zip(runs, *budgets, strict=True):
+            first = run.found.run.first
             room, normal = (
                 np.log(a / b) / STEP for a, b in ((after.leg, before.leg), (after.across, before.across))
             )

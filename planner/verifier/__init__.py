@@ -5,6 +5,8 @@ taken from, at times that it chooses itself; and nothing else of the package: no
 constraint, no solver. What it checks, and how sharp each check is:
 
     reading.py    where it looks between the samples
+    between.py    what lies between two of those times, where the motion is a cubic there: extremes, not samples
+    claims.py     how each figure is known: exact, certified, sampled, assumed
     limits.py     velocity, acceleration, jerk per axis, normal acceleration: on the columns and on differences of the delivered
                   positions
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
@@ -37,6 +39,7 @@ constraint, no solver. What it checks, and how sharp each check is:
 The positions are the truth; `Trajectory.block`, `line`, `s` and `feed` are never looked at.
 """
 
+from planner.verifier.claims import Claims, Known
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import OF_CHORDS, Fault, Kind
 from planner.verifier.given import DERIVATIVES, WHOLE, Given, fit_axes
@@ -51,10 +54,12 @@ __all__ = [
     "OF_CHORDS",
     "WHOLE",
     "AfterFilters",
+    "Claims",
     "CornerCheck",
     "Fault",
     "Given",
     "Kind",
+    "Known",
     "LimitCheck",
     "Ringing",
     "ThreadCheck",

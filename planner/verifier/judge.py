@@ -9,6 +9,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier import contour, error_allocation, findings, samples
+from planner.verifier.claims import claims_of
 from planner.verifier.exact import exact_faults
 from planner.verifier.excess import Kind
 from planner.verifier.extruder import extruder_seen
@@ -122,6 +123,7 @@ def verify(
         passed=not faults,
         excesses=tuple(sorted(excesses, key=lambda each: each.begin)),
         limits=checks,
+        claims=claims_of(readings, limits, checks, machine.interpolation),
         contour=contour_check,
         corners=corners,
         vertex=apart.vertex_check(toolpath),

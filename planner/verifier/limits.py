@@ -33,6 +33,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
+from planner.verifier.between import Between
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.pieces import RATIO_ROUNDING
 from planner.verifier.power import units_of
@@ -122,19 +123,29 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
     ]
 
 
-def look_at_axes(block: SampleBlock, limits: Limits, worst: Worst) -> None:
-    """Take in what a block of samples shows of the axes, of the normal acceleration and of the columns."""
+def look_at_axes(
+    block: SampleBlock, limits: Limits, worst: Worst, between: Between | None = None, sure: bool = False
+) -> None:
+    """Take in what a block of samples shows of the axes, of the normal acceleration and of the columns.
+
+    between : what lies between the samples too, of velocity and acceleration
+    sure    : the columns are those of the positions, nothing lies between that they do not show, and no acceleration jumps
+    """
     t, axes, linear = block.t, len(limits.axes), limits.linear
-    columns = block.velocity, block.acceleration, block.jerk
-    seen = differences(t, block.position, position_error(block, limits))
-    for order, (column, difference) in enumerate(zip(columns, seen, strict=True)):
-        allowed = limits.per_axis[order]
+    columns = [block.velocity, block.acceleration, block.jerk]
+    if between is not None:
+        columns[:2] = between.velocity, between.acceleration
+    for order, column in enumerate(columns):
         if limits.judged[order]:
-            worst.take(order * axes, np.abs(column), allowed, COLUMN, block, span=order)
-        worst.take(order * axes, less_error(difference), allowed, DIFFERENCE, block)
+            worst.take(order * axes, np.abs(column), limits.per_axis[order], COLUMN, block, span=order)
     period = np.diff(t, prepend=-np.inf)[:, None]
-    if limits.judged[0]:
-        _look_at_gaps(block, limits, worst, seen[0], 1.0 / period)
+    if not sure:
+        seen = differences(t, block.position, position_error(block, limits))
+        for order, difference in enumerate(seen):
+            allowed = limits.per_axis[order]
+            worst.take(order * axes, less_error(difference), allowed, DIFFERENCE, block)
+        if limits.judged[0]:
+            _look_at_gaps(block, limits, worst, seen[0], 1.0 / period)
     how = COLUMN if limits.judged[:2].all() else DIFFERENCE
     if how == COLUMN:
         normal = _normal(block.velocity[:, linear], block.acceleration[:, linear])

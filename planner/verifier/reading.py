@@ -107,7 +107,9 @@ class Reader:
         on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
-        between = Watch(pieces, self.limits, parts=1, note="between the samples")
+        between = Watch(
+            pieces, self.limits, parts=1, edges=np.asarray(self.motion.t), note="between the samples"
+        )
         self.comparison.begin()
         parts = motion_between(self.motion, *self._times)
         part = next(parts, None)

@@ -12,10 +12,17 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory
+from planner.verifier.between import UNKNOWN, look_between, nothing_between
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
 from planner.verifier.kernel import kernel
-from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
+from planner.verifier.limits import (
+    FEED,
+    GROUPS,
+    ROWS_ALONE,
+    look_at_axes,
+    rows_of,
+)
 from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.power import look_at_power
@@ -23,7 +30,7 @@ from planner.verifier.stops import AtStop
 from planner.verifier.switches import Bounds, Chords
 from planner.verifier.tangential import look_at_tangential
 from planner.verifier.user_limits import look_at_user_limits
-from planner.verifier.worst import BACK, Limits, SampleBlock, Worst
+from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst
 
 BLOCK_SAMPLES = SIZES.judged_at_once
 COLUMNS = ("t", "position", *DERIVATIVES)
@@ -45,6 +52,8 @@ class Observed:
     t_first: float = np.nan
     t_last: float = -np.inf
     gap_max: float = 0.0  # longest period [s]
+    # (3,) what is left open between the times (between.py)
+    known: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def noted(self, text: str) -> str:
         """A text with the note of this reading behind it."""
@@ -66,17 +75,26 @@ class Watch:
 
     parts : into how many a period is divided to be matched
     cubic : between samples the motion runs on cubics, not on chords
+    edges : (L,) where the pieces of a motion begin that is looked at between its samples [s]; None for samples
     seen  : what it has shown so far
     """
 
     def __init__(
-        self, pieces: ProgramPieces, limits: Limits, *, parts: int, cubic: bool = False, note: str = ""
+        self,
+        pieces: ProgramPieces,
+        limits: Limits,
+        *,
+        parts: int,
+        cubic: bool = False,
+        edges: FloatArray | None = None,
+        note: str = "",
     ):
         axes = pieces.vertex.shape[1]
         self.seen = Observed(match=new_match(pieces), worst=Worst(rows_of(limits), axes), note=note)
         self._pieces, self._limits, self._parts, self._cubic = pieces, limits, parts, cubic
         self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
         self._travelled = 0.0
+        self._edges, self._feed_before = edges, 0.0
         jerk = limits.per_axis[2] if limits.jerk_limited else np.full(axes, np.inf)
         self._at_stop = AtStop(limits.acceleration_at_stop, jerk, limits.rounding)
         bounds = Bounds(
@@ -119,7 +137,11 @@ class Watch:
         of_axes = map(np.asfortranarray, (position, velocity, acceleration, jerk))
         columns = dict(zip(COLUMNS[1:], of_axes, strict=True))
         block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
-        look_at_axes(block, limits, seen.worst)
+        if self._edges is None:
+            look_at_axes(block, limits, seen.worst)
+        else:
+            stacked = np.stack([position, velocity, acceleration, jerk])
+            self._take_between(block, self._edges, stacked, place)
         look_at_tangential(block, limits, seen.worst)
         power = GROUPS * len(limits.axes) + ROWS_ALONE
         look_at_power(block, limits, seen.worst, power)
@@ -134,6 +156,31 @@ class Watch:
             speed = np.sqrt(np.einsum("na,na->n", velocity, velocity))
         chords = Chords(t, np.zeros(len(t)), np.zeros(len(t)), speed, place.piece, position)
         self._feeds.take(chords, skip, place.first, place.last)
+
+    def _take_between(
+        self, block: SampleBlock, edges: FloatArray, columns: FloatArray, place: Located
+    ) -> None:
+        """Take in a block of a motion and what lies between its times; `columns` (4, n, A) as in `look_between`."""
+        limits, worst, skip = self._limits, self.seen.worst, block.skip
+        axes = len(limits.axes)
+        found, edge = (
+            nothing_between(len(block.t), axes),
+            int(np.searchsorted(edges, block.t[max(skip - 1, 0)], "right")),
+        )
+        unknown = self.seen.known[UNKNOWN]
+        bounds = limits.per_axis + np.array([[0.0], [0.0], [0.0 if limits.jerk_limited else np.inf]])
+        look_between(
+            block.t, columns, edges, edge, bounds, skip, self._pieces, place.piece,
+            np.empty((3, axes)), found, self.seen.known,
+        )  # fmt: skip
+        sure = limits.jerk_limited and self.seen.known[UNKNOWN] == unknown
+        look_at_axes(block, limits, worst, found, sure=bool(sure))
+        # where the block changes the larger F counts, and where the motion is lost none
+        feed = np.where(place.last >= 0, place.feed_max, np.inf)
+        feed[:skip] = np.inf
+        feed[skip:] = np.maximum(feed[skip:], np.append(self._feed_before, feed[skip:-1]))
+        self._feed_before = float(feed[-1])
+        worst.take(GROUPS * axes + FEED, found.speed[:, None], feed[:, None], COLUMN, block)
 
     def finish(self) -> None:
         """No more samples: judge what had to wait for them."""

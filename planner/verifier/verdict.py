@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.base.arrays import FloatArray, freeze
+from planner.verifier.claims import Claims
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import Excess, Fault, Kind, placed
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
@@ -108,6 +109,7 @@ class Verdict:
     passed           : True if every check holds, apart from quantities that are "not limited"
     limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration
                        (if the machine limits it)
+    claims           : how each figure is known (claims.py)
     contour          : the largest distance of the motion from the path, as far as it could be followed,
                        against the tolerance there
     vertex           : the largest distance of a programmed vertex from the motion, of those that are known,
@@ -142,6 +144,7 @@ class Verdict:
 
     passed: bool
     limits: dict[str, LimitCheck]
+    claims: Claims
     contour: LimitCheck
     vertex: LimitCheck
     corners: CornerCheck
@@ -173,6 +176,12 @@ class Verdict:
         return frozenset(fault.kind for fault in self.faults)
 
     @property
+    def not_limited(self) -> tuple[str, ...]:
+        """Quantities that are reported only: "jerk" for jerk.x, jerk.y ..."""
+        free = {name.partition(".")[0] for name, check in self.limits.items() if not check.limited}
+        return tuple(sorted(free))
+
+    @property
     def sentences(self) -> list[str]:
         """The faults in words."""
         return [fault.sentence for fault in self.faults]
@@ -196,9 +205,12 @@ class Verdict:
         return behind | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},
+            "known": self.claims.summary(),
             "contour_error_mm": self.contour_error_mm,
             "vertex_error_mm": self.vertex_error_mm,
             "end_error_mm": self.end_error_mm,
             "ringing": [mode.summary() for mode in self.ringing],
             "lost_after_line": self.lost_after,
+            "not_limited": self.not_limited,
+            "faults": self.sentences,
         }

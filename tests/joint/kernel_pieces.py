@@ -9,8 +9,9 @@ import numpy as np
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import matrix, size, vector, wide1, wide2, wide3
 from planner.joint.curvature import put_model, put_slopes
-from planner.joint.group import Bends, Group, Sizes, group_of
+from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
 from planner.joint.interior_point import Work, lanes_of, room_of, rows_in, scratch_of, work_of
+from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
 from planner.joint.recursion import Factor, backward, factor_steps, forward, gaps
 from planner.joint.rows import VECTORS, put_rows, put_shares, put_vectors
 
@@ -106,11 +107,55 @@ def put_gaps(sizes, numbers, x, u, out):
     return gaps(sizes, lanes_of(sizes, numbers), at, control, wide2(out, w, sizes.state))
 
 
+def sizes_of(axes: int) -> Sizes:
+    """Of one step without rows."""
+    return Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(1), 1, 0, *[False] * 5)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _normal_rows(sizes, bound, pace, turns, x, u, g, out):
+    w = sizes.width
+    put_normal_rows(
+        sizes, bound, pace, turns, wide1(x, w), wide1(u, w), wide1(g, w), wide2(out, w, sizes.step)
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _normal_curvature(sizes, bound, pace, turns, x, u, z, out):
+    w = sizes.width
+    W = wide2(out, w, sizes.step)
+    add_normal_curvature(sizes, W, bound, pace, turns, wide1(x, w), wide1(u, w), z[0], z[1])
+
+
+def normal_rows(bound: float, pace: float, turns: bool, x: Any, u: Any) -> Any:
+    """(2,) the rows of the normal acceleration of a step x (3 A,), u (A+1,), and (2, 4 A + 1) their derivatives."""
+    g, out = np.zeros((2, 1)), np.zeros((2, 4 * len(u) - 3, 1))
+    _normal_rows(
+        sizes_of(len(u) - 1), bound, pace, float(turns), x[:, None].copy(), u[:, None].copy(), g, out
+    )
+    return g[:, 0], out[..., 0]
+
+
+def normal_curvature(bound: float, pace: float, turns: bool, x: Any, u: Any, z: Any) -> Any:
+    """(4 A + 1, 4 A + 1) their model, the lower triangle."""
+    W = np.zeros((4 * len(u) - 3, 4 * len(u) - 3, 1))
+    _normal_curvature(
+        sizes_of(len(u) - 1), bound, pace, float(turns), x[:, None].copy(), u[:, None].copy(), z, W
+    )
+    return W[..., 0]
+
+
 def rows_at(window: Any, x: Any, u: Any) -> Any:
     """(N, R) the rows of a window of two or three axes at another motion."""
     alone = Alone.of(window._replace(x=x, u=u))
     look(*alone)
-    return alone.work.g[:, :, 0]
+    return rows_out(window, alone.work.g)
 
 
-__all__ = ["Alone", "look", "models", "newton", "np", "put_gaps", "rows_at", "slopes"]
+def rows_out(window: Any, numbers: Any) -> Any:
+    """(N, R) of a window's rows, of numbers (N, R', 1) of the kernel's."""
+    of, axes = (
+        window.u.shape[1] - 1,
+        (numbers.shape[1] - window.limits.on.shape[1]) // 8 + window.u.shape[1] - 1,
+    )
+    return numbers[:, rows_of(of, axes)(window.limits.on.shape[1]), 0]

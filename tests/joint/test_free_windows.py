@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_pieces import Alone, look, models, newton, put_gaps, rows_at, rows_out, slopes
 from starts import MACHINE, PROGRAMS, begun
 
 from benchmarks.jobs import problems, random_lines
@@ -12,14 +13,13 @@ from planner.base.arrays import read_only
 from planner.geometry.build import toolpath_from_program
 from planner.joint import groups, laws, own, rows
 from planner.joint.checks import normal_shares, worst_shares
-from planner.joint.curvature import Barrier
+from planner.joint.group import place_of
 from planner.joint.guess import guess_from
 from planner.joint.legs import put_places
 from planner.joint.motion import integrated
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
 from planner.joint.problem import window_of
-from planner.joint.recursion import END, Factor, NewtonStep, factor_steps, forces, gaps, newton_step
 from planner.joint.run import tube_runs_of
 from planner.joint.solvers import SOLVERS
 from planner.motion.vertex_times import passing_times
@@ -30,25 +30,6 @@ CORNER, ARCS = PROGRAMS["corner"], PROGRAMS["arcs"]
 # Share of the time by which ipopt may end elsewhere, begun where the own solver ended [-]; 1.5e-4 was seen (pentagon).
 SAME = {"corner": 2e-4, "arcs": 2e-4, "pentagon": 2e-4, "pushed": 1e-4, "turned": 2e-4}
 MISSED = own.TRIES[0][1]
-
-
-def linear_of(window, x, u):
-    """The rows at a motion."""
-    steps, kinds = window.limits.on.shape
-    axes = u.shape[1] - 1
-    lin = rows.Linear(
-        g=np.zeros((steps, kinds)),
-        n=np.zeros((steps, kinds, axes)),
-        node=np.zeros((steps, 3, axes)),
-        alpha=np.zeros((steps, rows.VECTORS, 4)),
-        e=np.zeros((steps, rows.VECTORS, axes)),
-        tangent=np.zeros((steps, 3, axes)),
-        place=window.place.copy(),
-        radius=np.zeros((steps, 3)),
-        own=np.zeros((steps, rows.BETWEEN + kinds - rows.count(axes), 4 * axes + 1)),
-    )
-    rows.put_rows(window.legs, window.limits, x, u, lin)
-    return lin
 
 
 # --- its pieces ----------------------------------------------------------------------------------------------------------------
@@ -63,9 +44,13 @@ def test_slopes_are_the_differences_of_the_rows(name):
     rng = np.random.default_rng(2)
     dx, du = 1e-6 * rng.normal(size=x.shape), 1e-6 * rng.normal(size=u.shape)
     dx[0] = 0.0
-    at, after, before = (linear_of(window, x + k * dx, u + k * du) for k in (0, 1, -1))
-    slope = np.zeros_like(at.g)
-    rows.slopes(window.limits, at, dx, du, slope)
+    at, after, before = (rows_at(window, x + k * dx, u + k * du) for k in (0, 1, -1))
+    alone = Alone.of(window)
+    look(*alone)
+    change, out = np.zeros((len(u), 4 * (alone.u.shape[1] - 1) + 1, 1)), np.zeros_like(alone.work.g)
+    change[:, place_of(u.shape[1] - 1, alone.u.shape[1] - 1), 0] = np.hstack([dx[:-1], du])
+    slopes(*alone, change, out)
+    slope = rows_out(window, out)
     more = 8 * (u.shape[1] - 1)
     exact = window.limits.on.copy()
     kept = [more + rows.FEED_ROWS + k for k in range(3)]
@@ -75,76 +60,100 @@ def test_slopes_are_the_differences_of_the_rows(name):
         window.limits.laws.kind, *(window.limits.laws.first[k:] for k in (0, 1)), strict=False
     ):
         pushed = slice(more + rows.LAW_ROWS + lo, more + rows.LAW_ROWS + hi)
-        exact[:, pushed] &= (kind != laws.PUSH) | (np.abs(at.g[:, pushed]) < 1e-4)
+        exact[:, pushed] &= (kind != laws.PUSH) | (np.abs(at[:, pushed]) < 1e-4)
     exact[:, kept] = False
     assert exact.any(axis=0).sum() > 12
-    np.testing.assert_allclose(slope[exact], ((after.g - before.g) / 2)[exact], rtol=2e-3, atol=2e-9)
+    np.testing.assert_allclose(slope[exact], ((after - before) / 2)[exact], rtol=2e-3, atol=2e-9)
 
 
 def test_rows_of_the_feed_are_its_bernstein_coefficients():
     """|y| <= r where the coefficient of the squared feed is no more than F^2: their differences agree."""
-    window = window_of(*begun("corner"), 0, len(begun("corner")[1]), MISSED)
+    run, guess = begun("corner")
+    window = window_of(run, guess, 0, len(guess), MISSED)
     axes = window.u.shape[1] - 1
     rng = np.random.default_rng(3)
-    for _ in range(20):
-        x, u = rng.normal(size=3 * axes), rng.normal(size=axes + 1)
-        y, alpha, e = (
-            np.zeros((rows.VECTORS, axes)),
-            np.zeros((rows.VECTORS, 4)),
-            np.zeros((rows.VECTORS, axes)),
-        )
-        rows.vectors_of_step(x, u, axes, y, alpha, e)
-        radius, feed = np.zeros(3), 10.0
-        rows.put_radii(x, u, axes, feed, radius)
-        v, a, j, h = x[axes : 2 * axes], x[2 * axes :], u[:axes], u[axes]
-        w = [v, v + h * a / 2, v + h * a + h * h * j / 2]
-        wanted = [w[0] @ w[1], (2 * w[1] @ w[1] + w[0] @ w[2]) / 3, w[1] @ w[2]]
-        found = (y[rows.FEED_1 : rows.FEED_3 + 1] ** 2).sum(axis=1) - radius**2 + feed**2
-        np.testing.assert_allclose(found, wanted, atol=1e-12)
+    x, u = rng.normal(size=window.x.shape), rng.uniform(0.1, 1.0, size=window.u.shape)
+    feed = 10.0 + rng.uniform(size=len(u))
+    limits = window.limits._replace(feed=feed, on=np.ones_like(window.limits.on))
+    g = rows_at(window._replace(limits=limits), x, u)[:, 8 * axes + rows.FEED_ROWS :][:, :3]
+    p, v, a, j, h = x[:-1, :axes], x[:-1, axes : 2 * axes], x[:-1, 2 * axes :], u[:, :axes], u[:, axes:]
+    w = [v, v + h * a / 2, v + h * a + h * h * j / 2]
+
+    def times(one, other):
+        return (one * other).sum(axis=1)
+
+    wanted = [times(w[0], w[1]), (2 * times(w[1], w[1]) + times(w[0], w[2])) / 3, times(w[1], w[2])]
+    y = [v + h * a / 4, v + h * a / 2 + h * h * j / 12, v + 3 * h * a / 4 + h * h * j / 4]
+    for m in range(3):
+        square = times(y[m], y[m])
+        radius = square / (2.0 * g[:, m] + 1.0)  # its square
+        np.testing.assert_allclose(square - radius + feed**2, wanted[m], atol=1e-9)
+    assert np.isfinite(p).all()
 
 
 def test_the_recursion_solves_the_system_of_all_steps():
-    """Against the dense system of optimality conditions, with the last node's gap weighted as in the recursion."""
+    """Against the least of the quadratic model by all controls at once, with the last node's gap weighted as in the
+    recursion."""
     window = window_of(*begun("corner"), 0, 12, MISSED)
-    x, u, limits = window.x, window.u, window.limits
-    (steps, controls), states = u.shape, x.shape[1]
-    lin, rng = linear_of(window, x, u), np.random.default_rng(4)
-    z = np.where(limits.on, rng.uniform(0.1, 1.0, limits.on.shape), 0.0)
-    ratio = np.where(limits.on, rng.uniform(0.1, 1.0, limits.on.shape), 0.0)
-    q = np.where(limits.on, rng.normal(size=limits.on.shape), 0.0)
-    factor = Factor(
-        np.zeros((steps, controls, states)),
-        np.zeros((steps, controls, controls)),
-        np.zeros((steps + 1, states, states)),
+    alone = Alone.of(window)
+    sizes, group, _, x, u, _, work = alone
+    rng, N, (S, C) = np.random.default_rng(4), sizes.steps, (x.shape[1], u.shape[1])
+    A = C - 1
+    look(*alone)
+    there = group.on > 0.0
+    work.s[:] = np.where(there, rng.uniform(0.5, 1.0, there.shape), 1.0)
+    work.per_s[:] = 1.0 / work.s
+    work.z[:] = np.where(there, rng.uniform(0.1, 1.0, there.shape), 0.0)
+    work.gap[:] = 1e-3 * rng.normal(size=work.gap.shape)
+    pull, rho, aim, end = 0.5, 1e6, 0.01, rng.normal(size=(S, 1))
+    W = np.zeros((N, S + C, S + C, 1))
+    models(*alone, W)
+    assert newton(*alone, pull, rho, aim, end) == 0.0
+    W = W[..., 0]
+    W += np.swapaxes(np.tril(W, -1), 1, 2)
+    W[:, -1, -1] += 2.0 * pull * group.per_h[:, 0] ** 2
+    for k in range(A):
+        W[:, S + k, S + k] += group.smooth[:, 0] * group.per_box[0, k, 0] ** 2
+    # the gradient, by slopes of the rows along each direction
+    w = np.zeros((N, S + C))
+    q = there * (aim + work.z * (work.g + work.s)) / work.s
+    q[:, 8 * A + rows.TUBE_NODE] += group.centre
+    for k in range(S + C):
+        change, out = np.zeros((N, S + C, 1)), np.zeros_like(work.g)
+        change[:, k] = 1.0
+        slopes(*alone, change, out)
+        w[:, k] = (q * out)[..., 0].sum(axis=1)
+    w[:, -1] += 1.0 + 2.0 * pull * (u[:, A, 0] - group.h[:, 0]) * group.per_h[:, 0] ** 2
+    w[:, S : S + A] += group.smooth * u[:, :A, 0] * group.per_box[0, :, 0] ** 2
+    # nodes as affine functions of all controls, by differences of the kinematics, which are exact for them
+    node, shift = np.zeros((N + 1, S, N * C)), np.zeros((N + 1, S))
+    for i in range(N):
+        h, base = u[i, A, 0], np.zeros((N, S, 1))
+        B = np.zeros((S, C))
+        put_gaps(sizes, group, x, u, base)
+        for c in range(C):
+            more, less, out, back = u.copy(), u.copy(), np.zeros_like(base), np.zeros_like(base)
+            more[i, c], less[i, c] = more[i, c] + 1e-5, less[i, c] - 1e-5
+            put_gaps(sizes, group, x, more, out)
+            put_gaps(sizes, group, x, less, back)
+            B[:, c] = (out - back)[i, :, 0] / 2e-5
+        step = np.kron([[1.0, h, h * h / 2.0], [0.0, 1.0, h], [0.0, 0.0, 1.0]], np.eye(A))
+        node[i + 1], shift[i + 1] = step @ node[i], step @ shift[i] + work.gap[i, :, 0]
+        node[i + 1][:, i * C : (i + 1) * C] += B
+    H, f = rho * node[N].T @ node[N], node[N].T @ (rho * shift[N] + end[:, 0])
+    for i in range(N):
+        of_step = np.zeros((S + C, N * C))
+        of_step[:S] = node[i]
+        of_step[S:, i * C : (i + 1) * C] = np.eye(C)
+        at = np.concatenate([shift[i], np.zeros(C)])
+        H += of_step.T @ W[i] @ of_step
+        f += of_step.T @ (W[i] @ at + w[i])
+    wanted = -np.linalg.solve(H, f)
+    found = work.du[..., 0].ravel()
+    np.testing.assert_allclose(found, wanted, rtol=1e-5, atol=1e-6 * np.abs(wanted).max())
+    np.testing.assert_allclose(
+        work.dx[..., 0], node @ wanted + shift, rtol=1e-5, atol=1e-6 * np.abs(work.dx).max()
     )
-    assert factor_steps(x, u, window.legs, limits, lin, Barrier(z, ratio), 0.5, END, factor)
-    w, gap = np.zeros((steps, states + controls)), np.zeros((steps, states))
-    forces(limits, lin, q, 0.5, u, w)
-    gaps(x, u, gap)
-    gap += 1e-3 * rng.normal(size=gap.shape)
-
-    def moved(gradient, off):
-        dx, du, after = np.zeros((steps + 1, states)), np.zeros((steps, controls)), np.zeros((steps, states))
-        newton_step(x, u, off, gradient, np.zeros(states), factor, NewtonStep(dx, du, after))
-        return dx, du, after
-
-    dx, du, after = moved(w, gap)
-    # the kinematics hold to first order ...
-    step = 1e-7
-    moved_gap = np.zeros_like(gap)
-    gaps(x + step * dx, u + step * du, moved_gap)
-    base = np.zeros_like(gap)
-    gaps(x, u, base)
-    lead = (moved_gap - base) / step
-    np.testing.assert_allclose(lead[:-1], -gap[:-1], atol=1e-5 * np.abs(gap).max() + 1e-5)
-    # ... and the step is the minimum of a convex model: the opposite force leads to the opposite step, and forces do no work uphill
-    back = moved(-w, -gap)
-    np.testing.assert_allclose(back[1], -du, atol=1e-9 * np.abs(du).max())
-    free = moved(w, np.zeros_like(gap))
-    assert (w[:, states:] * free[1]).sum() + (w[:, :states] * free[0][:-1]).sum() < 0
-    np.testing.assert_allclose(free[0][-1], 0.0, atol=1e-6)
-    np.testing.assert_allclose(dx[-1], 0.0, atol=1e-5)
-    assert np.isfinite(after).all()
 
 
 def test_shares_are_those_of_a_fine_sampling():

@@ -14,7 +14,7 @@ from starts import MACHINE, PROGRAMS, begun, begun_on
 
 from planner.base.threads import use_threads
 from planner.joint import groups, own
-from planner.joint.groups import Sweep, searched
+from planner.joint.groups import Sort, Sweep, searched
 from planner.joint.own import TubeOwn
 from planner.joint.window_solver import WIDTH
 from planner.machine.user_limit import PathLimit
@@ -43,7 +43,13 @@ LONG = 1 << 20  # steps: enough for threads
 
 def asked_for(steps: int, axes: int = 3) -> SimpleNamespace:
     """A window of so many steps, of which nothing else is read here."""
-    return SimpleNamespace(window=SimpleNamespace(u=np.empty((steps, axes + 1))))
+    window = SimpleNamespace(
+        u=np.empty((steps, axes + 1)),
+        limits=SimpleNamespace(passed=np.zeros(1, bool)),
+        legs=SimpleNamespace(radius=np.zeros(1)),
+        which=(),
+    )
+    return SimpleNamespace(window=window, tuning=SimpleNamespace(gap=1e-3))
 
 
 def task(windows: list[SimpleNamespace], well: bool = True):
@@ -96,6 +102,13 @@ def test_all_windows_are_solved_once_in_groups_of_one_kind_and_about_one_length(
     if threads == 1:
         used = sum(map(sum, ([steps for steps, _ in group] for group in solved)))
         assert used > 0.8 * WIDTH * sum(max(group)[0] for group in solved)
+
+
+def test_windows_that_are_alike_are_together_where_there_are_enough():
+    few = [Sort(50, 3, 1e-3), Sort(49, 3, 1e-5)]
+    many = [*few, Sort(48, 3, 1e-3), Sort(47, 3, 1e-5)] * 2
+    assert sorted(groups.together(few)) == [0, 1]
+    assert {many[at].alike for at in groups.together(many)} == {1e-3}
 
 
 def test_searches_are_begun_when_windows_are_wanted(solved):
@@ -176,10 +189,9 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed)
     assert any(one.steps is None for one in alone)
     rng = np.random.default_rng(seed)
 
-    def shuffled(asked):
-        order = rng.permutation(len(asked)).tolist()
-        kind = groups.kind_of(asked[order[0]])
-        return [at for at in order if groups.kind_of(asked[at]) == kind][:width]
+    def shuffled(waiting):
+        order = rng.permutation(len(waiting)).tolist()
+        return [at for at in order if waiting[at].kind == waiting[order[0]].kind][:width]
 
     monkeypatch.setattr(groups, "together", shuffled)
     monkeypatch.setattr(groups, "WAITING", waiting)

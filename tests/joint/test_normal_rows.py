@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernel_pieces import normal_curvature, normal_rows
 
-from planner.joint.normal_rows import BETWEEN, LEAST, TURNED, add_normal_curvature, put_normal_rows, turns_far
+from planner.joint.normal_rows import LEAST, TURNED, turns_far
 
 PACE = 1.0
 
@@ -34,9 +35,7 @@ def largest(x, u):
 
 
 def row_of(x, u, bound, turns=False):
-    value, slope = np.zeros(BETWEEN), np.zeros((BETWEEN, 4 * (len(u) - 1) + 1))
-    put_normal_rows(bound, PACE, turns, x, u, value, slope)
-    return value, slope
+    return normal_rows(bound, PACE, turns, x, u)
 
 
 def formula(x, u, bound):
@@ -107,8 +106,7 @@ def test_their_curvature_is_positive_and_that_of_a_step_that_turns_is_exact():
     size = 4 * axes + 1
     for turns in (False, True):
         x, u = step_of(rng, axes, 0.5)
-        W = np.zeros((size, size))
-        add_normal_curvature(W, 2.0, PACE, turns, x, u, np.array([0.3, 0.7]))
+        W = normal_curvature(2.0, PACE, turns, x, u, np.array([0.3, 0.7]))
         W += np.tril(W, -1).T
         assert np.linalg.eigvalsh(W).min() >= -1e-9 * np.abs(W).max()
         assert np.abs(W).max() > 0.0

@@ -36,7 +36,6 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Literal
 
 import numpy as np
 
@@ -44,7 +43,6 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.machine import Machine
 
-ControlName = Literal["grbl", "klipper", "marlin"]
 # Turning angles below this pass at any speed [rad]: 1 - s would be lost in rounding.
 STRAIGHT = 1e-6
 STANDING = (
@@ -55,15 +53,16 @@ SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
-    """A control's planner."""
+    """A control's planner; the names are those of [control] in a machine file."""
 
     name: str
-    deviation: float | None = None  # junction deviation [mm]; None for Klipper
-    square_corner: float | None = None  # speed at a corner of 90 degrees [mm/s]; None for grbl and Marlin
-    cruise_ratio: float = 0.5  # minimum cruise ratio of Klipper [-]
+    junction_deviation: float | None = None  # [mm]; None for Klipper
+    # speed at a corner of 90 degrees [mm/s]; None for grbl and Marlin
+    square_corner_velocity: float | None = None
+    minimum_cruise_ratio: float = 0.5  # of Klipper [-]
     acceleration: float | None = None  # largest along the path [mm/s2]; None where it has none of its own
     # jump of velocity by axis [mm/s] that a corner may have, instead of a deviation
-    jump: Mapping[str, float] = field(default_factory=dict)
+    corner_jump: Mapping[str, float] = field(default_factory=dict)
     blocks: int | None = None  # how many blocks it looks ahead; None for all
     block_time: float = 0.0  # least time of a block [s]
 
@@ -73,9 +72,9 @@ class Control:
 # Config_Reference, square_corner_velocity 5, minimum_cruise_ratio 0.5. Lines of some 30 characters at 115,200
 # baud take 2.6 ms (grbl, Marlin); Klipper reads a file.
 CONTROLS: dict[str, Control] = {
-    "grbl": Control(name="grbl", deviation=0.01, blocks=15, block_time=0.0026),
-    "klipper": Control(name="klipper", square_corner=5.0),
-    "marlin": Control(name="marlin", deviation=0.013, blocks=15, block_time=0.0026),
+    "grbl": Control(name="grbl", junction_deviation=0.01, blocks=15, block_time=0.0026),
+    "klipper": Control(name="klipper", square_corner_velocity=5.0),
+    "marlin": Control(name="marlin", junction_deviation=0.013, blocks=15, block_time=0.0026),
 }
 
 
@@ -84,14 +83,7 @@ def as_set(control: Control, machine: Machine) -> Control:
     given = machine.control
     if given is None or given.name != control.name:
         return control
-    values: dict[str, Any] = {
-        "deviation": given.junction_deviation,
-        "square_corner": given.square_corner_velocity,
-        "cruise_ratio": given.minimum_cruise_ratio,
-        "acceleration": given.acceleration,
-        "jump": given.corner_jump or None,
-    }
-    return dataclasses.replace(control, **{key: value for key, value in values.items() if value is not None})
+    return dataclasses.replace(control, **given.model_dump(exclude_defaults=True))
 
 
 def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array]:
@@ -137,12 +129,12 @@ def predicted_time(
     if control.block_time:
         top = np.minimum(top, length / control.block_time)
     accel = np.minimum(along(way, acceleration), accel_max)
-    jump = np.array([control.jump.get(letter, np.inf) for letter in axes]) if control.jump else None
+    jump = np.array([control.corner_jump.get(letter, np.inf) for letter in axes])
     corner = _corner_sq(way, length, accel, acceleration, accel_max, jump, control)
     bound = np.append(np.append(0.0, np.minimum(corner, np.minimum(top[1:], top[:-1]) ** 2)), 0.0)
     bound[stands] = 0.0
-    if control.square_corner is not None:
-        lost = 2.0 * length * np.minimum(accel, (1.0 - control.cruise_ratio) * accel_max)
+    if control.square_corner_velocity is not None:
+        lost = 2.0 * length * np.minimum(accel, (1.0 - control.minimum_cruise_ratio) * accel_max)
         parts = [0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)]
         return sum(
             _smoothed_time(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
@@ -166,7 +158,7 @@ def along(way: FloatArray, limit: FloatArray) -> FloatArray:
 def _along_the_path(machine: Machine, control: Control) -> tuple[float, float]:
     """Largest speed [mm/s] and acceleration [mm/s2] along the path, whatever the axes allow; inf where the
     control has none."""
-    if control.square_corner is None:
+    if control.square_corner_velocity is None:
         return np.inf, control.acceleration or np.inf
     plane = [machine.axes[letter] for letter in "xy"]
     speed = machine.feed_max or min(axis.velocity for axis in plane)
@@ -179,29 +171,29 @@ def _corner_sq(
     accel: FloatArray,
     limit: FloatArray,
     accel_max: float,
-    jump: FloatArray | None,
+    jump: FloatArray,
     control: Control,
 ) -> FloatArray:
     """(n-1,) square of the speed at the corners between blocks [mm2/s2]."""
     bisector = way[1:] - way[:-1]
     half_turn = np.arctan2(np.linalg.norm(bisector, axis=1), np.linalg.norm(way[1:] + way[:-1], axis=1))
     straight = 2.0 * half_turn < STRAIGHT
-    if jump is not None:
+    if control.corner_jump:
         return np.where(straight, np.inf, along(bisector, jump) ** 2)
     half_turn = np.where(straight, 1.0, half_turn)
     s = np.cos(half_turn)
     ratio = s / (1.0 - s)
-    if control.square_corner is not None:
+    if control.square_corner_velocity is not None:
         a = np.minimum(accel[1:], accel[:-1])
-        found = ratio * (np.sqrt(2.0) - 1.0) * control.square_corner**2 * a / accel_max
+        found = ratio * (np.sqrt(2.0) - 1.0) * control.square_corner_velocity**2 * a / accel_max
         shorter = np.minimum(accel[1:] * length[1:], accel[:-1] * length[:-1])
         found = np.minimum(found, 0.5 * shorter / np.tan(half_turn))
     else:
-        assert control.deviation is not None
+        assert control.junction_deviation is not None
         size = np.linalg.norm(bisector, axis=1, keepdims=True)
         a = along(np.divide(bisector, size, out=np.zeros_like(bisector), where=size > 0), limit)
         a = np.minimum(a, accel_max)
-        found = a * control.deviation * ratio
+        found = a * control.junction_deviation * ratio
         if control.name == "marlin":
             small = (length[1:] < SMALL_BLOCK) & (2.0 * half_turn < SMALL_TURN)
             found = np.where(small, np.minimum(found, a * length[1:] / (2.0 * half_turn)), found)

@@ -34,7 +34,6 @@ from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
 
 DEPTH = 4000  # rows that wait in the FIFO: four seconds at 1 ms, while the disk may be busy
-AXES_MAX = 20  # pins of one streamer
 _NANOSECONDS = 1e9  # in a second: HAL gives a thread's period in them
 _ROWS_AT_ONCE = SIZES.text_rows
 # mm in a length unit of the streamed positions.

@@ -94,14 +94,13 @@ def heidenhain(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     return _origin(making)
 
 
-def in_force(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def in_force(making: Making, given: Mapping[str, float]) -> None:
     """The frame, behind the row of `siemens` or `heidenhain`."""
     matrix, shift = making.travel.programmed
     if (matrix == np.eye(3)).all():
         shift = np.zeros(3)  # a G52
     if making.travel.active or (matrix != np.eye(3)).any():
         making.travel.set_frame(matrix, shift)
-    return []
 
 
 def _factor(given: float) -> float:
@@ -121,36 +120,32 @@ def _origin(making: Making) -> list[Row]:
     return [[("G", 52.0), *zip(AXES, values.tolist(), strict=True)]]
 
 
-def compensate(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def compensate(making: Making, given: Mapping[str, float]) -> None:
     """Radius compensation: side 1 left, -1 right, 0 off."""
     making.travel.compensate(round(given["side"]), making.assume)
-    return []
 
 
-def _oversize(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _oversize(making: Making, given: Mapping[str, float]) -> None:
     """DR of a tool call, by which the tool's radius is larger than in its table until the next call."""
     making.travel.oversize = given["DR"] * making.unit
-    return []
 
 
-def _approach(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _approach(making: Making, given: Mapping[str, float]) -> None:
     """APPR of a kind (index in KINDS), with X Y Z of the first contour point, LEN, R, CCA, F and side."""
     side = round(given["side"])
     first = _target(making, given) * making.unit
     found = Approach(**_way(making, given), first=first, side=side or -1, compensated=side != 0)
     found.check("APPR")
     making.travel.approach(found, making.assume)
-    return []
 
 
-def depart(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def depart(making: Making, given: Mapping[str, float]) -> None:
     """DEP of a kind (index in KINDS), with X Y Z, LEN, R, CCA and F."""
     found = Departure(**_way(making, given), end=_target(making, given) * making.unit, raised="Z" in given)
     found.check("DEP")
     if found.kind == "LCT" and not {"X", "Y"} & set(given):
         raise ValueError("DEP LCT needs its end as X and Y")
     making.travel.depart(found)
-    return []
 
 
 def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
@@ -166,12 +161,11 @@ def _way(making: Making, given: Mapping[str, float]) -> dict[str, Any]:
     }
 
 
-def corner(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def corner(making: Making, given: Mapping[str, float]) -> None:
     """A rounding or chamfer at the end of the next move: kind (index in corner_moves.KINDS) and size."""
     if given["size"] < 0.0:
         raise ValueError("a rounding or chamfer is not negative")
     making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.place.line)
-    return []
 
 
 def _direction(making: Making) -> complex:
@@ -252,14 +246,13 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 
 
-def _assume(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def _assume(making: Making, given: Mapping[str, float]) -> None:
     """Sentences of ASSUMED by their names. Raises ValueError where nothing may be assumed."""
     for name in given:
         making.assume(ASSUMED[name])
-    return []
 
 
-def out_of_plane(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+def out_of_plane(making: Making, given: Mapping[str, float]) -> None:
     """A coordinate that the plane of the pole in force does not allow. Raises ValueError."""
     raise ValueError(f"a coordinate that lies {OUT_OF_PLANE}")
 

@@ -26,7 +26,8 @@ ASSUMED = {
     "tool centre feed": "F holds for the tool's centre (CFTCP); CFC and CFIN, the control's default, have it on the contour of arcs",
 }
 Row = list[tuple[str, float]]
-Maker = Callable[["Making", Mapping[str, float]], Iterable[Row]]
+Cycle = Callable[["Making", Mapping[str, float]], Iterable[Row]]
+Maker = Callable[["Making", Mapping[str, float]], Iterable[Row] | None]
 ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
 _ROUNDING = 1e-9  # of a number of steps
 _COARSE = {
@@ -59,9 +60,9 @@ class Making:
     execute: Callable[[list[TravelRow]], None]
     _rows: list[TravelRow] = field(default_factory=list)
 
-    def take(self, rows: Iterable[Row]) -> None:
+    def take(self, rows: Iterable[Row] | None) -> None:
         """Rows to execute, all of them at the end, or where their maker asks for it by `flush`."""
-        for row in rows:
+        for row in rows or ():
             words = [(ord(letter), value, self.place.at) for letter, value in row]
             self._rows.append(TravelRow(words, self.place.line, self.frame))
         self.flush()

@@ -87,7 +87,7 @@ def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
     began = time.perf_counter()
     joints = joint_setpoints(plan.trajectory, chain)
     found = verify_joints(
-        joints, plan.toolpath, machine, tool_length=chain.length, not_limited=_not_limited(plan.verdict)
+        joints, plan.toolpath, machine, tool_length=chain.length, not_limited=plan.verdict.not_limited
     )
     spent = plan.timings.get("verify", 0.0) + time.perf_counter() - began
     return dataclasses.replace(
@@ -126,9 +126,3 @@ def _both(tip: Verdict, joints: Verdict) -> Verdict:
 
 def _larger(one: float | None, other: float | None) -> float | None:
     return None if one is None or other is None else max(one, other)
-
-
-def _not_limited(verdict: Verdict) -> tuple[str, ...]:
-    return tuple(
-        dict.fromkeys(n.partition(".")[0] for n, check in verdict.limits.items() if not check.limited)
-    )

@@ -2,6 +2,7 @@
 of one run."""
 
 import dataclasses
+from functools import cached_property
 
 import numpy as np
 
@@ -43,9 +44,10 @@ class RunsInTime:
 
     def spliced(self, k: int) -> SplicedRun:
         """The motion along run k, with the standstill before it, and the one at the end of the job."""
-        begin, end = self.edges()[k : k + 2].tolist()
+        begin, end = self.edges[k : k + 2].tolist()
         return SplicedRun(motion=self.motion, begin=begin, end=end)
 
+    @cached_property
     def edges(self) -> FloatArray:
         """(G+1,) when the standstill before each run begins, and the end of the motion [s]."""
         return np.concatenate([[0.0], self.arrival[1:-1], [self.motion.end]])

@@ -146,8 +146,7 @@ class Plan(Shown):
         (sensitivity/least_time.py); None unless solved, behind filters, and for axes of which it is not known."""
         if self.verdict is None or self.program.tool_point is not None:
             return None
-        free = {name.partition(".")[0] for name, check in self.verdict.limits.items() if not check.limited}
-        return least_time(self.toolpath, self.machine, tuple(sorted(free)))
+        return least_time(self.toolpath, self.machine, self.verdict.not_limited)
 
     @property
     def solved(self) -> bool:

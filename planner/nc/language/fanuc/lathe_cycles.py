@@ -55,11 +55,10 @@ class LatheCycles:
             "G94": partial(self._single, cut=partial(turning.facing, lathe_cuts.single_cut)),
         }
 
-    def _begin_at_once(self, making: Making, given: Given) -> Iterable[Row]:
+    def _begin_at_once(self, making: Making, given: Given) -> None:
         self._start = self._state.programmed().copy()
-        return []
 
-    def _begin(self, making: Making, given: Given) -> Iterable[Row]:
+    def _begin(self, making: Making, given: Given) -> None:
         """The blocks that follow are read aside."""
         if self._aside is not None:
             raise ValueError("a cycle stands in the profile of another one; write it behind that")
@@ -71,7 +70,6 @@ class LatheCycles:
         self.run.tee = lambda words: None
         # any feed does: moves whose feed depends on the diameter are divided
         state.feed_mode, state.feed = "per minute", 1.0
-        return []
 
     def leave(self) -> SourcePlace | None:
         """Take back what a profile without an end set aside; returns where its cycle stands, or None."""

@@ -31,6 +31,7 @@ from typing import Any
 
 from planner.nc.language.making import (
     BREAK,
+    Cycle,
     HolePlan,
     Maker,
     Making,
@@ -250,7 +251,7 @@ def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
         yield from pocket_rows(shape, _plan(making, given), at, k * given["Q378"])
 
 
-CYCLES: dict[int, Maker] = {
+CYCLES: dict[int, Cycle] = {
     1: _old_pecking,
     200: lambda making, given: _pecked(making, given, above=given["Q210"]),
     201: lambda making, given: _at_once(making, given, given["Q208"]),

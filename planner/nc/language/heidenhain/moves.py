@@ -144,21 +144,15 @@ class Moves:
         ends |= {axis: text.absolute(axis, end) for axis, end in given.axes.items() if axis == _AXES[normal]}
         return dict(sorted(ends.items()))
 
-    def polar_line(self, block: text.Block, given: text.Items) -> text.Rows:
-        """LP: a straight move to polar coordinates."""
+    def to_polar(self, block: text.Block, given: text.Items) -> text.Rows:
+        """LP and CTP: L and, in the working plane, CT to polar coordinates."""
+        move, planes = (
+            (self.straight, (0, 1, _WORKING)) if block.function == "LP" else (self.tangent_arc, (_WORKING,))
+        )
 
         def rows(normal: int) -> text.Rows | None:
-            ends = self.polar_ends(block, given, normal)
-            return None if ends is None else self.straight(block, given, ends)
-
-        return [*self.polar(block, given), *self.by_plane(block, rows)]
-
-    def polar_tangent(self, block: text.Block, given: text.Items) -> text.Rows:
-        """CTP: CT to polar coordinates, in the working plane."""
-
-        def rows(normal: int) -> text.Rows | None:
-            ends = None if normal != _WORKING else self.polar_ends(block, given)
-            return None if ends is None else self.tangent_arc(block, given, ends)
+            ends = self.polar_ends(block, given, normal) if normal in planes else None
+            return None if ends is None else move(block, given, ends)
 
         return [*self.polar(block, given), *self.by_plane(block, rows)]
 

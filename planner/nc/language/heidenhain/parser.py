@@ -151,7 +151,7 @@ class HeidenhainParser(Definitions):
         lines: text.Rows = [*before, *self._side(block, given)]
         if name == "LP":
             self._need_pole(block)
-            lines += self.moves.polar_line(block, given)
+            lines += self.moves.to_polar(block, given)
         else:
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
         return [*lines, *([text.looked_up(block)] if machine else []), *after]
@@ -175,7 +175,7 @@ class HeidenhainParser(Definitions):
         before += self._side(block, given)
         if name == "CTP":
             self._need_pole(block)
-            return [*before, *self.moves.polar_tangent(block, given), *after]
+            return [*before, *self.moves.to_polar(block, given), *after]
         if name == "CP":
             rows = self.moves.polar_arc(block, given)
             self._need_pole(block)

@@ -33,8 +33,8 @@ from dataclasses import replace
 
 from planner.nc.language import tree
 from planner.nc.language.making import (
+    Cycle,
     HolePlan,
-    Maker,
     Making,
     Pecks,
     Row,
@@ -197,7 +197,7 @@ def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
     yield [("G", 0.0), ("X", x), ("Y", y), ("Z", hole.retract)]
 
 
-def _straight(name: str, *behind: Row, out: bool = False) -> Maker:
+def _straight(name: str, *behind: Row, out: bool = False) -> Cycle:
     """Down at the feed, then what comes `behind`, and with `out` back at the feed, else at rapid speed."""
 
     def rows(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
@@ -230,7 +230,7 @@ def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
     yield go(hole.retract)
 
 
-def _pocket(name: str) -> Maker:
+def _pocket(name: str) -> Cycle:
     def rows(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
         _required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
         for key in ("AP1", "AP2", "AD"):
@@ -304,7 +304,7 @@ def _plan(making: Making, name: str, given: Mapping[str, float], radius: float) 
     )
 
 
-_CYCLES: dict[str, Maker] = {
+_CYCLES: dict[str, Cycle] = {
     "CYCLE81": _straight("CYCLE81"),
     "CYCLE82": _straight("CYCLE82"),
     "CYCLE83": _deep,
@@ -319,8 +319,8 @@ _CYCLES: dict[str, Maker] = {
 }
 
 
-def _keeping_modes(maker: Maker) -> Maker:
-    return lambda making, given: around(making, maker(making, given), feed=False)
+def _keeping_modes(cycle: Cycle) -> Cycle:
+    return lambda making, given: around(making, cycle(making, given), feed=False)
 
 
-MAKERS = {name: _keeping_modes(maker) for name, maker in _CYCLES.items()}
+MAKERS = {name: _keeping_modes(cycle) for name, cycle in _CYCLES.items()}

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import matrix, size, vector, wide1, wide2, wide3
+from planner.base.lanes import size, vector, wide1, wide2, wide3
 from planner.joint.curvature import put_model, put_slopes
 from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
 from planner.joint.interior_point import Work, lanes_of, room_of, rows_in, scratch_of, work_of
@@ -35,76 +35,86 @@ class Alone(NamedTuple):
         return cls(sizes, group, bends, x, u, place, work_of(sizes, bends))
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def look(sizes, numbers, bends, x, u, place, work):
-    """Put the rows into `work`."""
-    group, w = lanes_of(sizes, numbers), sizes.width
-    at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
-    y, e = matrix(at, _VECTORS, sizes.axes), matrix(at, _VECTORS, sizes.axes)
-    room = y, e, wide2(work.nearest, w, _THREE), wide1(work.top, w)
-    rows = rows_in(sizes, work, wide2(place, w, _THREE))
-    put_rows(sizes, group, bends, at, control, rows, room, scratch_of(sizes, bends))
+LOOK, SLOPES, MODELS, NEWTON, GAPS = range(5)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def slopes(sizes, numbers, bends, x, u, place, work, change, out):
-    """out (N, R, 1) = what the rows change by where steps change by `change` (N, 4 A + 1, 1)."""
-    group, w = lanes_of(sizes, numbers), sizes.width
+def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings, end):
+    """One of these, into `work` or `out`."""
+    group, w, N = lanes_of(sizes, numbers), sizes.width, sizes.steps
     at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
     rows, room = rows_in(sizes, work, wide2(place, w, _THREE)), room_of(sizes, work, at)
-    by, slope = wide2(change, w, sizes.step), wide2(out, w, sizes.rows)
-    for i in range(sizes.steps):
-        turn = put_vectors(sizes, at[i], control[i], room.y, room.e)
-        put_shares(control[i, len(sizes.axes)], turn, room.alpha)
-        put_slopes(sizes, group, rows, i, (room.y, room.alpha, room.e), by[i], room.F, slope[i])
+    gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, bends)
+    if what == LOOK:
+        looking = room.y, room.e, wide2(work.nearest, w, _THREE), wide1(work.top, w)
+        put_rows(sizes, group, bends, at, control, rows, looking, scratch)
+    elif what == GAPS:
+        gaps(sizes, group, at, control, gap)
+    elif what == NEWTON:
+        factor = Factor(
+            wide3(work.K, w, sizes.control, sizes.state),
+            wide3(work.L, w, sizes.control, sizes.control),
+            wide2(work.push, w, sizes.state),
+            wide2(work.dx, w, sizes.state),
+            wide2(work.du, w, sizes.control),
+        )
+        step, (pull, rho, aim) = vector(at, sizes.state), settings
+        bad = factor_steps(sizes, group, bends, at, control, gap, rows, pull, rho, factor, room, scratch)
+        backward(sizes, group, at, control, rows, pull, aim, 0.0, wide1(end, w), factor, room)
+        forward(sizes, group, at, control, gap, rows, aim, 0.0, factor, room, step)
+        for s in range(len(sizes.state)):
+            factor.dx[N, s] = step[s]
+        return bad
+    else:
+        by, slope = wide2(change, w, sizes.step), wide2(out, w, sizes.rows)
+        W = wide3(out, w, sizes.step, sizes.step)
+        for i in range(N):
+            turn = put_vectors(sizes, at[i], control[i], room.y, room.e)
+            put_shares(control[i, len(sizes.axes)], turn, room.alpha)
+            motion = room.y, room.alpha, room.e
+            if what == SLOPES:
+                put_slopes(sizes, group, rows, i, motion, by[i], room.F, slope[i])
+            else:
+                put_model(sizes, group, rows, i, motion, (room.G, room.row), room.W)
+                for s in range(len(sizes.step)):
+                    for t in range(s + 1):
+                        W[i, s, t] = room.W[s, t]
+    return 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def models(sizes, numbers, bends, x, u, place, work, out):
-    """out (N, 4 A + 1, 4 A + 1, 1) = the models of the rows, lower triangles."""
-    group, w = lanes_of(sizes, numbers), sizes.width
-    at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
-    rows, room = rows_in(sizes, work, wide2(place, w, _THREE)), room_of(sizes, work, at)
-    W = wide3(out, w, sizes.step, sizes.step)
-    for i in range(sizes.steps):
-        turn = put_vectors(sizes, at[i], control[i], room.y, room.e)
-        put_shares(control[i, len(sizes.axes)], turn, room.alpha)
-        put_model(sizes, group, rows, i, (room.y, room.alpha, room.e), (room.G, room.row), room.W)
-        for s in range(len(sizes.step)):
-            for t in range(s + 1):
-                W[i, s, t] = room.W[s, t]
+_NOTHING, _NO_END = np.zeros((0, 0, 1)), np.zeros((0, 1))
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def newton(sizes, numbers, bends, x, u, place, work, pull, rho, aim, end):
-    """A Newton step towards s z = aim into `work`, with the gaps that are there; end (S, 1) the multipliers of the last node.
-    Returns whether it broke down."""
-    group, w = lanes_of(sizes, numbers), sizes.width
-    at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
-    rows, room = rows_in(sizes, work, wide2(place, w, _THREE)), room_of(sizes, work, at)
-    factor = Factor(
-        wide3(work.K, w, sizes.control, sizes.state),
-        wide3(work.L, w, sizes.control, sizes.control),
-        wide2(work.push, w, sizes.state),
-        wide2(work.dx, w, sizes.state),
-        wide2(work.du, w, sizes.control),
-    )
-    gap, change = wide2(work.gap, w, sizes.state), vector(at, sizes.state)
-    scratch = scratch_of(sizes, bends)
-    bad = factor_steps(sizes, group, bends, at, control, gap, rows, pull, rho, factor, room, scratch)
-    backward(sizes, group, at, control, rows, pull, aim, 0.0, wide1(end, w), factor, room)
-    forward(sizes, group, at, control, gap, rows, aim, 0.0, factor, room, change)
-    for s in range(len(sizes.state)):
-        factor.dx[sizes.steps, s] = change[s]
-    return bad
+def look(alone: Alone) -> None:
+    """Put the rows into its `work`."""
+    _piece(LOOK, *alone, _NOTHING, _NOTHING.ravel(), (0.0, 0.0, 0.0), _NO_END)
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_gaps(sizes, numbers, x, u, out):
-    """out (N, 3 A, 1) = the gaps of the kinematics."""
-    w = sizes.width
-    at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
-    return gaps(sizes, lanes_of(sizes, numbers), at, control, wide2(out, w, sizes.state))
+def slopes(alone: Alone, change: Any) -> Any:
+    """(N, R, 1) what the rows change by where steps change by `change` (N, 4 A + 1, 1)."""
+    out = np.zeros_like(alone.work.g)
+    _piece(SLOPES, *alone, change, out.ravel(), (0.0, 0.0, 0.0), _NO_END)
+    return out
+
+
+def models(alone: Alone) -> Any:
+    """(N, 4 A + 1, 4 A + 1) the models of the rows, lower triangles."""
+    size = len(alone.sizes.step)
+    out = np.zeros((alone.sizes.steps, size, size))
+    _piece(MODELS, *alone, _NOTHING, out.ravel(), (0.0, 0.0, 0.0), _NO_END)
+    return out
+
+
+def newton(alone: Alone, pull: float, rho: float, aim: float, end: Any) -> float:
+    """A Newton step towards s z = aim into its `work`, with the gaps that are there; end (S, 1) the multipliers of the last
+    node. Returns whether it broke down."""
+    return _piece(NEWTON, *alone, _NOTHING, _NOTHING.ravel(), (pull, rho, aim), end)
+
+
+def gaps_of(alone: Alone, u: Any) -> Any:
+    """(N, 3 A) the gaps of the kinematics with other controls, which are then in its `work`."""
+    _piece(GAPS, *alone._replace(u=u), _NOTHING, _NOTHING.ravel(), (0.0, 0.0, 0.0), _NO_END)
+    return alone.work.gap[..., 0].copy()
 
 
 def sizes_of(axes: int) -> Sizes:
@@ -148,12 +158,12 @@ def normal_curvature(bound: float, pace: float, turns: bool, x: Any, u: Any, z: 
 def rows_at(window: Any, x: Any, u: Any) -> Any:
     """(N, R) the rows of a window of two or three axes at another motion."""
     alone = Alone.of(window._replace(x=x, u=u))
-    look(*alone)
+    look(alone)
     return rows_out(window, alone.work.g)
 
 
 def rows_out(window: Any, numbers: Any) -> Any:
-    """(N, R) of a window's rows, of numbers (N, R', 1) of the kernel's."""
+    """(N, R) of the rows of a window, of numbers (N, .., 1) of the rows of the kernel."""
     of, axes = (
         window.u.shape[1] - 1,
         (numbers.shape[1] - window.limits.on.shape[1]) // 8 + window.u.shape[1] - 1,

@@ -60,8 +60,8 @@ PREDICTED = 0.3
 # The last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
 # Where the last node's gap does not get less by this share in each of so many iterations in a row, once prox grows, its
-# rho (recursion.py) grows by so many times, up to a value at which the recursion still has four digits [-].
-SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e12
+# rho (recursion.py) grows by so many times, up to a value at which the recursion still has five digits [-].
+SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule
 

@@ -57,7 +57,7 @@ class ContourWay:
     def move(
         self, begin: FloatArray, end: FloatArray, arc: Arc | None = None, *, rises: bool = False
     ) -> Move:
-        """A move in the plane, or along the tool axis, at the F of the block."""
+        """A move from `begin` to `end` (3,), in the plane or along the tool axis, at the F of the block."""
         words = [(_F, self.feed, self.at)] if self.feed is not None else []
         axes = [_NORMAL] if rises else IN_PLANE[_NORMAL]
         return Move(TravelRow(words, self.line, self.frame), self.at, 1, begin, end, axes, arc)

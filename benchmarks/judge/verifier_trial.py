@@ -1,6 +1,6 @@
 """The verifier on trial: does it find every fault, and does it pass every correct motion?
 
-    python -m benchmarks.judge.verifier_trial [--plans 20] [--faults 50] [--each 80] [--jittering 42] [--first 0]
+    python -m benchmarks.judge.verifier_trial [--plans 20] [--faults 50] [--each 80] [--jittering 42] [--first 0] [--processes 1]
                                                                        into results/verifier-trial.json and .md
 
 Faults: so many mutations (benchmarks/judge/mutations.py) of each of so many plans, of random polylines in three axes on random
@@ -20,6 +20,8 @@ import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -274,14 +276,17 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=80)
     parser.add_argument("--jittering", type=int, default=42)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args()
     seeds = range(chosen.first, chosen.first + chosen.plans)
-    faults = [row for seed in seeds for row in faults_of(seed, chosen.faults)]
-    faults += [row for k in range(len(WRONG)) for row in wrong_of(k, chosen.each, chosen.first)]
-    correct = [row for seed in seeds for row in correct_of(seed)]
-    correct += [
-        row for seed in range(chosen.first, chosen.first + chosen.jittering) for row in jittering_of(seed)
-    ]
+    jittering = range(chosen.first, chosen.first + chosen.jittering)
+    with ProcessPoolExecutor(chosen.processes) as pool:
+        of_plans = pool.map(faults_of, seeds, repeat(chosen.faults))
+        of_kinds = pool.map(wrong_of, range(len(WRONG)), repeat(chosen.each), repeat(chosen.first))
+        right = pool.map(correct_of, seeds)
+        shaken = pool.map(jittering_of, jittering)
+        faults = [row for rows in (*of_plans, *of_kinds) for row in rows]
+        correct = [row for rows in (*right, *shaken) for row in rows]
     correct += _own(faults)
     for row in [each for each in faults if not each["found"]] + [
         each for each in correct if each["answer"] == "refused"

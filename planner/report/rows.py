@@ -47,7 +47,7 @@ def plan_rows(plan: Plan) -> Rows:
             rows.append(
                 (
                     "fastest possible",
-                    f"{plan.least_time:.4f} s or more; this motion is {above:.2g} % above that",
+                    f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that",
                 )
             )
         rows += beside_rows(plan.beside, time, float(plan.program.dwell.sum()))

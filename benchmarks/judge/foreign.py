@@ -36,6 +36,32 @@ def along(points: FloatArray, feed: float, machine: Machine, line: Line) -> tupl
     return machine.dt * np.arange(len(x)), x
 
 
+def at_times(
+    points: FloatArray, feed: float, machine: Machine, line: Line, clock: Callable[[float], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """The lines as in `along`, each from where the one before ends, at the times that a clock makes of their duration [s]."""
+    moves = [line(start, end, feed, machine) for start, end in pairwise(points)]
+    begins = np.append(0.0, np.cumsum([duration for duration, _ in moves]))
+    t = clock(float(begins[-1]))
+    x = np.empty((len(t), points.shape[1]))
+    on = np.clip(np.searchsorted(begins, t, side="right") - 1, 0, len(moves) - 1)
+    for k, (duration, positions) in enumerate(moves):
+        if (on == k).any():
+            x[on == k] = positions(np.clip(t[on == k] - begins[k], 0.0, duration))
+    x[-1] = points[-1]
+    return t, x
+
+
+def every_period(dt: float) -> Callable[[float], FloatArray]:
+    """The clock of a control: times from 0 at dt [s], the last period shorter, but no shorter than 1 us."""
+
+    def times(end: float) -> FloatArray:
+        t = np.append(np.arange(0.0, end, dt), end)
+        return np.delete(t, -2) if t[-1] - t[-2] < 1e-6 else t
+
+    return times
+
+
 def _of_way(
     start: FloatArray, end: FloatArray, feed: float, machine: Machine
 ) -> tuple[FloatArray, list[float]]:
@@ -75,6 +101,50 @@ def _ruckig(start: list[float], end: list[float], limits: list[list[float]]) -> 
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise RuntimeError(f"ruckig: {result}")
     return move
+
+
+def seven_phase_line(start: FloatArray, end: FloatArray, feed: float, machine: Machine) -> Any:
+    """A line from rest to rest in closed form: in phases of constant jerk."""
+    u, (v, a, j) = _of_way(start, end, feed, machine)
+    length = float(np.linalg.norm(end - start))
+    durations, jerks = _seven_phases(length, v, a, j)
+
+    def positions(t: FloatArray) -> FloatArray:
+        return start + np.minimum(_way(t, durations, jerks), length)[:, None] * u
+
+    return float(durations.sum()), positions
+
+
+def _seven_phases(length: float, v: float, a: float, j: float) -> tuple[FloatArray, FloatArray]:
+    """(7,) durations and jerks of a way from rest to rest: jerk up, constant acceleration, jerk down, constant speed, and back."""
+    low, high = 0.0, v
+    for _ in range(100):  # the peak speed by bisection: the way from rest to rest grows with it
+        peak = 0.5 * (low + high)
+        up = max(peak / a + a / j, 2.0 * np.sqrt(peak / j)) if peak * j > a * a else 2.0 * np.sqrt(peak / j)
+        low, high = (peak, high) if peak * up < length else (low, peak)
+    peak = low
+    ramp = a / j if peak * j > a * a else np.sqrt(peak / j)
+    hold = max(peak / (j * ramp) - ramp, 0.0)
+    cruise = length / peak - 2.0 * ramp - hold
+    return np.array([ramp, hold, ramp, max(cruise, 0.0), ramp, hold, ramp]), j * np.array(
+        [1.0, 0, -1, 0, -1, 0, 1]
+    )
+
+
+def _way(t: FloatArray, durations: FloatArray, jerks: FloatArray) -> FloatArray:
+    s = v = a = 0.0
+    way, begin = np.zeros(len(t)), 0.0
+    for duration, jerk in zip(durations, jerks, strict=True):
+        tau = np.clip(t - begin, 0.0, duration)
+        inside = t >= begin
+        way[inside] = (s + tau * (v + tau * (a / 2 + tau * jerk / 6)))[inside]
+        s, v, a = (
+            s + duration * (v + duration * (a / 2 + duration * jerk / 6)),
+            v + duration * (a + duration * jerk / 2),
+            a + duration * jerk,
+        )
+        begin += duration
+    return way
 
 
 def toppra_line(start: FloatArray, end: FloatArray, feed: float, machine: Machine) -> Any:

@@ -1,15 +1,17 @@
 """The verifier on trial: does it find every fault, and does it pass every correct motion?
 
-    python -m benchmarks.judge.verifier_trial [--plans 20] [--faults 50] [--first 0]     into results/verifier-trial.json and .md
+    python -m benchmarks.judge.verifier_trial [--plans 20] [--faults 50] [--each 80] [--jittering 42] [--first 0] [--processes 1]
+                                                                       into results/verifier-trial.json and .md
 
 Faults: so many mutations (benchmarks/judge/mutations.py) of each of so many plans, of random polylines in three axes on random
-machines, by methods in turn. Each mutation is a fault by a proof of its own. Only the positions are delivered, except where columns
-are in question.
+machines, by methods in turn; and `--each` motions of every kind that are wrong for their program (benchmarks/judge/wrong_motions.py,
+wrong_samples.py). Each is a fault by a proof of its own. Only the positions are delivered, except where columns are in question.
 
 Correct motions: each plan itself, the plans of `kinematic` and `stop`, one in closed form (every line from rest to rest in seven
 phases of constant jerk), and those of other programs: ruckig and TOPP-RA (benchmarks/judge/foreign.py). They are written to files
 as other programs write them (positions only, in CSV with 6 and 9 digits, as 32-bit floats, as 64-bit floats), read from there and
-judged. None may be refused except for too few digits, which the verdict says.
+judged. Those of other programs are delivered with clocks that jitter, too (`CLOCKS`), of the first so many plans. None may be refused
+except for too few digits, which the verdict says.
 """
 
 from __future__ import annotations
@@ -17,31 +19,41 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections import Counter
-from itertools import pairwise
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.judge.foreign import PROGRAMS, along
+from benchmarks.judge.foreign import PROGRAMS, Line, along, at_times, every_period, seven_phase_line
 from benchmarks.judge.mutations import KINDS, Case, program_of
+from benchmarks.judge.wrong_motions import KINDS as MOTIONS
+from benchmarks.judge.wrong_motions import program
+from benchmarks.judge.wrong_samples import KINDS as SAMPLES
 from benchmarks.record import markdown, write_results
 from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine
 from planner.motion.trajectory import Trajectory
+from planner.nc.reader import parse_program
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.second_order import SecondOrderMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.page import Method
-from planner.report.trajectory_reader import read_trajectory
+from planner.report.trajectory_reader import read_trajectory, trajectory_of_columns
 from planner.verifier import Given, Kind, Verdict, verify
 
+WRONG = (*MOTIONS, *SAMPLES)
 DRAWS = 40  # of a mutation until one is proved to be a fault
 POSITIONS = Given(columns=())
 TOO_FEW_DIGITS = "too few digits"
 CLOSED_FORM = "closed form"
+CLOCKS = ("1 us around the period", "up to 2 us early", "0.3 to 1 periods")
+JITTER = 1e-6  # [s]
 
 
 def methods() -> tuple[tuple[Method, bool], ...]:
@@ -114,64 +126,42 @@ def faults_of(seed: int, count: int) -> list[dict[str, Any]]:
     return rows[:count]
 
 
+def wrong_of(which: int, count: int, first: int = 0) -> list[dict[str, Any]]:
+    """So many motions of that kind in `WRONG` that are wrong for their program: whether each is found, and whether it passes by
+    its own program as it was made."""
+    kind = WRONG[which]
+    rows: list[dict[str, Any]] = []
+    random = np.random.default_rng([37, which, first])
+    for _ in range(DRAWS * count):
+        if len(rows) == count:
+            break
+        row: dict[str, Any] = {
+            "plan": first + len(rows),
+            "kind": kind.__name__.replace("_", " "),
+            "own": None,
+        }
+        try:
+            made = kind(random)
+            if made is None:
+                continue
+            said = _said(made.text, made.motion, made.machine)
+            if made.own or made.made is not None:
+                own = made.motion if made.made is None else made.made
+                row["own"] = _said(made.own or made.text, own, made.machine)
+        except (InputError, ValueError) as error:
+            said = str(error)
+        rows.append(row | {"found": bool(said), "said": said})
+    return rows
+
+
+def _said(text: str, motion: Trajectory, machine: Machine) -> str:
+    """The first sentence against a motion; "" where it passes."""
+    toolpath = toolpath_from_program(parse_program(program(text), machine, source="trial"), machine)
+    verdict = verify(motion, toolpath, machine, given=POSITIONS)
+    return "" if verdict.passed else verdict.sentences[0]
+
+
 # ---- correct motions from elsewhere ----------------------------------------------------------------------------------------------
-
-
-def seven_phases(length: float, v: float, a: float, j: float) -> tuple[FloatArray, FloatArray]:
-    """(7,) durations and jerks of a way from rest to rest: jerk up, constant acceleration, jerk down, constant speed, and back."""
-    low, high = 0.0, v
-    for _ in range(100):  # the peak speed by bisection: the way from rest to rest grows with it
-        peak = 0.5 * (low + high)
-        up = max(peak / a + a / j, 2.0 * np.sqrt(peak / j)) if peak * j > a * a else 2.0 * np.sqrt(peak / j)
-        low, high = (peak, high) if peak * up < length else (low, peak)
-    peak = low
-    ramp = a / j if peak * j > a * a else np.sqrt(peak / j)
-    hold = max(peak / (j * ramp) - ramp, 0.0)
-    cruise = length / peak - 2.0 * ramp - hold
-    return np.array([ramp, hold, ramp, max(cruise, 0.0), ramp, hold, ramp]), j * np.array(
-        [1.0, 0, -1, 0, -1, 0, 1]
-    )
-
-
-def from_rest_to_rest(points: FloatArray, feed: float, machine: Machine) -> tuple[FloatArray, FloatArray]:
-    """(T,) times and (T, 3) positions at dt of lines that are each run from rest to rest."""
-    v, a, j = (machine.limits(name, ("x", "y", "z")) for name in ("velocity", "acceleration", "jerk"))
-    begins, parts = 0.0, []
-    for start, end in pairwise(points):
-        length = float(np.linalg.norm(end - start))
-        u = (end - start) / length
-        with np.errstate(divide="ignore"):
-            of_axes = [float((limit / np.abs(u)).min()) for limit in (v, a, j)]
-        top = min(of_axes[0], feed)
-        durations, jerks = seven_phases(length, 0.999999 * top, 0.999999 * of_axes[1], 0.999999 * of_axes[2])
-        parts.append((begins, start, u, length, durations, jerks))
-        begins += float(durations.sum())
-    t = np.append(np.arange(0.0, begins, machine.dt), begins)
-    if t[-1] - t[-2] < 1e-6:
-        t = np.delete(t, -2)
-    x = np.empty((len(t), 3))
-    starts = np.array([part[0] for part in parts])
-    for k, (begin, start, u, length, durations, jerks) in enumerate(parts):
-        mine = np.searchsorted(starts, t, side="right") - 1 == k
-        x[mine] = start + np.minimum(_way(t[mine] - begin, durations, jerks), length)[:, None] * u
-    x[-1] = points[-1]
-    return t, x
-
-
-def _way(t: FloatArray, durations: FloatArray, jerks: FloatArray) -> FloatArray:
-    s = v = a = 0.0
-    way, begin = np.zeros(len(t)), 0.0
-    for duration, jerk in zip(durations, jerks, strict=True):
-        tau = np.clip(t - begin, 0.0, duration)
-        inside = t >= begin
-        way[inside] = (s + tau * (v + tau * (a / 2 + tau * jerk / 6)))[inside]
-        s, v, a = (
-            s + duration * (v + duration * (a / 2 + duration * jerk / 6)),
-            v + duration * (a + duration * jerk / 2),
-            a + duration * jerk,
-        )
-        begin += duration
-    return way
 
 
 def files(folder: Path, t: FloatArray, x: FloatArray) -> dict[str, Path]:
@@ -194,7 +184,10 @@ def correct_of(seed: int) -> list[dict[str, Any]]:
     subject = case(seed)
     rows: list[dict[str, Any]] = []
     program = program_of(subject.points, subject.feed)
-    motions = {CLOSED_FORM: (*from_rest_to_rest(subject.points, subject.feed, subject.machine), True)}
+    even = every_period(subject.machine.dt)
+    motions = {
+        CLOSED_FORM: (*at_times(subject.points, subject.feed, subject.machine, seven_phase_line, even), True)
+    }
     for name, method in (("kinematic", KinematicMethod()), ("stop", StopMethod())):
         made = method.plan(program, subject.machine).require().trajectory
         assert made is not None
@@ -223,6 +216,56 @@ def correct_of(seed: int) -> list[dict[str, Any]]:
     return rows
 
 
+def _own(faults: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of the motions that were right for another program, as that judged them."""
+    return [
+        {
+            "plan": row["plan"],
+            "motion": "every kind, before it was changed",
+            "written": "as it was made",
+            "answer": "refused" if row["own"] else "passed",
+            "said": row["own"],
+        }
+        for row in faults
+        if row.get("own") is not None
+    ]
+
+
+def _clock(random: np.random.Generator, dt: float, how: str) -> Callable[[float], FloatArray]:
+    """Times from 0 to a duration [s] that are not all dt apart."""
+
+    def times(end: float) -> FloatArray:
+        count = int(end / (0.3 * dt)) + 2
+        step = np.full(count, dt) + random.uniform(-JITTER, JITTER, count)
+        if how == CLOCKS[1]:
+            step = dt - random.uniform(0.0, 2.0 * JITTER, count)
+        elif how == CLOCKS[2]:
+            step = dt * random.uniform(0.3, 1.0, count)
+        t = np.append(0.0, np.cumsum(step))
+        return np.append(t[t < end - JITTER], end)
+
+    return times
+
+
+def jittering_of(seed: int) -> list[dict[str, Any]]:
+    """Correct motions of a case by other programs, with clocks that jitter: how each was judged."""
+    subject, random = case(seed), np.random.default_rng([41, seed])
+    rows = []
+    programs: dict[str, tuple[Line, bool]] = {CLOSED_FORM: (seven_phase_line, True)} | PROGRAMS
+    for name, (line, jerk) in programs.items():
+        for how in CLOCKS:
+            clock = _clock(random, subject.machine.dt, how)
+            t, x = at_times(subject.points, subject.feed, subject.machine, line, clock)
+            read = trajectory_of_columns({"t": t} | dict(zip("xyz", x.T, strict=True)), "trial")
+            verdict = judged(read.trajectory, subject.points, subject.feed, subject.machine, read.given, jerk)
+            said = "" if verdict.passed else verdict.sentences[0]
+            answer = "passed" if verdict.passed else "refused"
+            rows.append(
+                {"plan": seed, "motion": name, "written": f"clock: {how}", "answer": answer, "said": said}
+            )
+    return rows
+
+
 def main() -> None:
     """Hold the trial."""
     parser = argparse.ArgumentParser(
@@ -230,11 +273,21 @@ def main() -> None:
     )
     parser.add_argument("--plans", type=int, default=20)
     parser.add_argument("--faults", type=int, default=50)
+    parser.add_argument("--each", type=int, default=80)
+    parser.add_argument("--jittering", type=int, default=42)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args()
     seeds = range(chosen.first, chosen.first + chosen.plans)
-    faults = [row for seed in seeds for row in faults_of(seed, chosen.faults)]
-    correct = [row for seed in seeds for row in correct_of(seed)]
+    jittering = range(chosen.first, chosen.first + chosen.jittering)
+    with ProcessPoolExecutor(chosen.processes) as pool:
+        of_plans = pool.map(faults_of, seeds, repeat(chosen.faults))
+        of_kinds = pool.map(wrong_of, range(len(WRONG)), repeat(chosen.each), repeat(chosen.first))
+        right = pool.map(correct_of, seeds)
+        shaken = pool.map(jittering_of, jittering)
+        faults = [row for rows in (*of_plans, *of_kinds) for row in rows]
+        correct = [row for rows in (*right, *shaken) for row in rows]
+    correct += _own(faults)
     for row in [each for each in faults if not each["found"]] + [
         each for each in correct if each["answer"] == "refused"
     ]:
@@ -243,7 +296,7 @@ def main() -> None:
         Counter(row["kind"] for row in faults),
         Counter(row["kind"] for row in faults if row["found"]),
     )
-    text = f"{len(faults)} faults in {len(seeds)} plans, {sum(found.values())} found.\n\n"
+    text = f"{len(faults)} faults, {sum(found.values())} found.\n\n"
     text += markdown(
         ["fault", "made", "found"], [[kind, str(n), str(found[kind])] for kind, n in made.items()]
     )

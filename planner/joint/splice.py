@@ -38,6 +38,15 @@ class SplicedRun:
         return self.end - self.begin + self.hold
 
 
+def _columns(motion: MotionInTime, times: FloatArray) -> dict[str, Array]:
+    """Those of the motion at ascending times (T,). A trajectory of each of thousands of runs would take longer to be
+    checked than to be evaluated."""
+    if isinstance(motion, AxisMotion):
+        return motion.columns(times)
+    seen = motion.at(times, 1.0)
+    return {name: getattr(seen, name) for name in ("position", "block", "line", "s", *RATES)}
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spliced:
     """n runs of motions, one after the other."""
@@ -72,7 +81,7 @@ class Spliced:
     @cached_property
     def _own_length(self) -> FloatArray:
         """(n, 2) arc length in the motion of each run where that begins and ends [mm]."""
-        return np.array([run.motion.at(np.array([run.begin, run.end]), 1.0).s for run in self.runs])
+        return np.array([_columns(run.motion, np.array([run.begin, run.end]))["s"] for run in self.runs])
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
@@ -81,14 +90,13 @@ class Spliced:
         edges = np.append(np.flatnonzero(np.diff(of, prepend=-1)), len(of))
         # Without times there are the columns of the first run, without rows.
         parts = [(int(of[lo]), lo, hi) for lo, hi in pairwise(edges.tolist())] or [(0, 0, 0)]
-        seen = [self._seen(k, times[lo:hi], dt) for k, lo, hi in parts]
-        columns: dict[str, Any] = {
-            name: np.concatenate([one[name] for _, one in seen]) for name in seen[0][1]
-        }
-        return dataclasses.replace(seen[0][0], t=times, **columns)
+        seen = [self._seen(k, times[lo:hi]) for k, lo, hi in parts]
+        columns: dict[str, Any] = {name: np.concatenate([one[name] for one in seen]) for name in seen[0]}
+        one = self.runs[0].motion.at(np.array([self.runs[0].begin]), dt)
+        return dataclasses.replace(one, t=times, **columns)
 
-    def _seen(self, k: int, times: FloatArray, dt: float) -> tuple[Trajectory, dict[str, Array]]:
-        """The motion of run k at some of these times, and the columns at all of them."""
+    def _seen(self, k: int, times: FloatArray) -> dict[str, Array]:
+        """The columns of the motion of run k at these times."""
         run = self.runs[k]
         local = run.begin + (times - self.begin[k])
         if run.moving:  # rounding of times: its end belongs to the next one
@@ -97,15 +105,14 @@ class Spliced:
         which: Array | slice = slice(None)
         if not (np.diff(single) > 0.0).all():
             single, which = np.unique(single, return_inverse=True)
-        seen = run.motion.at(single, dt)
-        columns = {name: getattr(seen, name)[which] for name in ("position", "block", "line", "s", *RATES)}
+        columns = {name: column[which] for name, column in _columns(run.motion, single).items()}
         columns["s"] = self.length[k] + columns["s"] - self._own_length[k, 0]
         over = local >= run.end  # there another motion may begin
         if over.any():
             for name in RATES:
                 columns[name] = columns[name].copy()
                 columns[name][over] = 0.0
-        return seen, columns
+        return columns
 
     def whole(self) -> AxisMotion:
         """As one motion; every run has to be all of a motion that is given axis by axis."""

@@ -18,12 +18,8 @@ from pydantic import (
 )
 
 M_DIGITS = 5  # of an M code: no control has more
-TIMED_BY_NAME = {
-    3: "spindle_start",
-    4: "spindle_start",
-    5: "spindle_stop",
-    6: "tool_change",
-}  # keys of [times]
+# Keys of [times].
+TIMED_BY_NAME = {3: "spindle_start", 4: "spindle_start", 5: "spindle_stop", 6: "tool_change"}
 
 # Smallest and largest magnitude of a number of a machine file, in the unit of its key. No machine has any
 # beyond them, and their products and quotients are numbers: third powers of a magnitude beyond 1e100 are not.

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -76,20 +77,15 @@ class AxisMotion:
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
         period."""
+        return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **self.columns(times))
+
+    def columns(self, times: FloatArray) -> dict[str, Any]:
+        """Those of a trajectory at ascending times (T,) within [0, end], but for the times."""
         rates = self.velocity, self.acceleration, self.jerk
         pieces = self.t, self.position, *rates, self.s, float(self.end)
-        columns, s, feed, piece = _sample(pieces, times)
-        return Trajectory(
-            axes=self.axes,
-            radius=self.radius,
-            dt=dt,
-            t=times,
-            **dict(zip(LEVELS, columns, strict=True)),
-            s=s,
-            feed=feed,
-            block=self.block[piece],
-            line=self.line[piece],
-        )
+        motion, s, feed, piece = _sample(pieces, times)
+        found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
+        return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
         """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at`

@@ -229,7 +229,7 @@ def _centre(state: State, block: Block, *, absolute: bool) -> FloatArray:
 
 
 def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
-    """True if I J K are meant the other way: many programs have absolute centres and do not say so."""
+    """What to do about an arc that does not close: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
         if arcs.not_closed(state.position, end, other, normal, state.unit):

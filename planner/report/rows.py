@@ -47,7 +47,7 @@ def plan_rows(plan: Plan) -> Rows:
             rows.append(
                 (
                     "fastest possible",
-                    f"{plan.least_time:.4f} s or more; this motion is {above:.2g} % above that",
+                    f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that",
                 )
             )
         rows += beside_rows(plan.beside, time, float(plan.program.dwell.sum()))
@@ -220,15 +220,8 @@ def _seconds(prices: PriceList, name: str) -> str:
     return f"{least:.2g} to {most:.2g} s"
 
 
-def optimum_summary(grid: GridHistory | None, prices: PriceList | None) -> dict[str, Any]:
-    """`held_by` and `prices` of a plan in numbers; None where they are not known."""
-    return {
-        "held_by": dict(grid.ranked()) if grid is not None else None,
-        "prices": _price_summary(prices) if prices is not None else None,
-    }
-
-
-def _price_summary(prices: PriceList) -> dict[str, Any]:
+def price_summary(prices: PriceList) -> dict[str, Any]:
+    """The prices of a plan in numbers."""
     from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
 
     dear = prices.corners

@@ -14,7 +14,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.program import ToolPoint
-from planner.report.rows import beside_summary, optimum_summary, plan_rows
+from planner.report.rows import beside_summary, plan_rows, price_summary
 
 if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo
@@ -45,7 +45,8 @@ def summary(plan: Plan) -> dict[str, Any]:
             "tolerance_mm": uniform(plan.toolpath.tolerance),
             "verdict": verdict.summary() if verdict is not None else None,
             "corners": plan.corners.summary() if plan.corners is not None else NO_CORNERS,
-            **optimum_summary(plan.grid, plan.prices),
+            "held_by": dict(plan.grid.ranked()) if plan.grid is not None else None,
+            "prices": price_summary(plan.prices) if plan.prices is not None else None,
             "reading": plan.program.reading.changed(),
             "blocks": len(plan.program),
             "tool_point": tool_point_summary(plan.program.tool_point),

@@ -16,11 +16,13 @@ farthest that the nearest place of the motion and that of the chords can be apar
 it are exact). A place nearest to a vertex at the distance d has its direction across that to the vertex, so
 that it is at most
 
-    reach  =  min( (d + b) r / (1 - r),  2 h (w + a h) )  +  rounding
+    reach  =  min( (d + b) r / (1 - r),  8 (d + b),  2 h (w + a h) )  +  rounding
 
-away along the motion from where the chords have it; of vertices that are nearest out of order the place
-together is known to two chords. So far from the switch a place belongs to both blocks, and the larger F
-counts. On a straight line d = 0, and at 100 mm/s, 4,000 mm/s2 and 1 ms that is 3e-5 mm.
+away along the motion from where the chords have it. The second term is for slow motions, whose direction may turn by
+any angle in a period (r >= 1): the nearest place of the chords is at most d + b from the vertex at its time, so that of the
+motion is too, and the two are at most 2 (d + b) apart; the way between them is taken as at most four times that. Of vertices
+that are nearest out of order the place together is known to two chords. So far from the switch a place belongs to both
+blocks, and the larger F counts. On a straight line d = 0, and at 100 mm/s, 4,000 mm/s2 and 1 ms that is 3e-5 mm.
 """
 
 import math
@@ -65,6 +67,7 @@ RUN_THROUGH = 1e3
 # How much more firmly the place of a full stop is held than that of other vertices that are passed together
 # with it [-].
 FIRM = 1e9
+AROUND = 8.0  # way between the nearest places of motion and chords, of their distance from the vertex (module text) [-]
 ROOM = 4096  # chords and marks there is room for at first
 
 
@@ -344,7 +347,8 @@ def _reach(apart: float, step: float, h: float, acceleration: float) -> float:
         return 4.0 * step
     pace, push = step / h, acceleration * h
     turn = 1.5 * push / pace
-    reach = 2.0 * h * (pace + push)
+    near = apart + push * h / 8.0
+    reach = min(AROUND * near, 2.0 * h * (pace + push))
     if turn < 1.0:
-        reach = min(reach, (apart + push * h / 8.0) * turn / (1.0 - turn))
+        reach = min(reach, near * turn / (1.0 - turn))
     return reach

@@ -231,6 +231,6 @@ def test_it_is_said() -> None:
     above = 100.0 * (plan.cycle_time / plan.least_time - 1.0)
     assert (
         dict(plan_rows(plan))["fastest possible"]
-        == f"{plan.least_time:.4f} s or more; this motion is {above:.2g} % above that"
+        == f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that"
     )
     assert summary(plan)["least_time_s"] == plan.least_time

@@ -175,16 +175,6 @@ def with_settings(machine: Machine, settings: Iterable[Setting]) -> Machine:
     return machine_from_dict(data, source=machine.name).with_own(machine.own)
 
 
-def job_settings(settings: Iterable[Setting]) -> Mapping[str, float]:
-    """Of some settings those that are of the job: `tolerance` [mm] and `feed` [-]."""
-    return {setting.name: setting.value for setting in settings if setting.name in (TOLERANCE, FEED)}
-
-
-def with_feed(program: Program, factor: float) -> Program:
-    """The program with every programmed feed times a factor [-]."""
-    return program if factor == 1.0 else dataclasses.replace(program, feed=program.feed * factor)
-
-
 LINEAR, LOG = "lin", "log"
 POINTS_MAX = 1_000_000  # of a grid: a slip of the keyboard, not a sweep
 DIGITS = 9  # significant, of a value between the ends: 0.05 rather than 0.05000000000000001
@@ -276,12 +266,14 @@ class StudiedJob:
 
     def changed(self, settings: Sequence[Setting]) -> StudiedJob:
         """The job with other values of some settings. Raises InputError where they do not go together."""
-        of_job = job_settings(settings)
+        values, program = {setting.name: setting.value for setting in settings}, self.program
+        if FEED in values:
+            program = dataclasses.replace(program, feed=program.feed * values[FEED])
         return dataclasses.replace(
             self,
-            program=with_feed(self.program, of_job.get(FEED, 1.0)),
+            program=program,
             machine=with_settings(self.machine, settings),
-            tolerance=of_job.get(TOLERANCE, self.tolerance),
+            tolerance=values.get(TOLERANCE, self.tolerance),
         )
 
     def plan(self, progress: Progress | None = None) -> Plan:

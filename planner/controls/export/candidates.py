@@ -82,17 +82,14 @@ class Candidates:
     @cached_property
     def why_not(self) -> str:
         """Why the control cannot be given the program as it is; "" if it can."""
-        text = text_of(self.plan.program)
-        if text is None:
+        if self.text is None:
             return "it is no NC program"
-        return why_not(self.source, text, self.control, self.plan.machine)
+        return why_not(self.source, self.text, self.control, self.plan.machine)
 
-    @property
-    def text(self) -> bytes:
-        """The program as it is."""
-        found = text_of(self.plan.program)
-        assert found is not None
-        return found
+    @cached_property
+    def text(self) -> bytes | None:
+        """The program as it is; None for points and plotter files."""
+        return text_of(self.plan.program)
 
     @cached_property
     def room(self) -> float | None:
@@ -166,6 +163,7 @@ class Candidates:
         """The file of a candidate, and notes on it. Raises InputError for a line that the control has no
         words for."""
         if chosen.replaced is None:
+            assert self.text is not None
             return with_mode(self.text, chosen.mode), ()
         rapid = _rapid_speed(chosen.line, self.plan.machine, self.plan.toolpath.axes)
         found = Translator(
@@ -231,8 +229,7 @@ def linuxcnc_candidates(job: Candidates) -> list[Candidate]:
     """The candidates for LinuxCNC, the program's own path first."""
     tolerance, room = job.tolerance, job.room or 0.0
     (own,) = job.own(OWN_CHORDS * tolerance)
-    text = text_of(job.plan.program)
-    if text is not None and PATH_MODE.search(text):
+    if job.text is not None and PATH_MODE.search(job.text):
         return [dataclasses.replace(own, name=f"{own.name}, with its own path mode")]
     found = []
     for name, p, q in (

@@ -45,9 +45,8 @@ from planner.machine import Machine
 
 # Turning angles below this pass at any speed [rad]: 1 - s would be lost in rounding.
 STRAIGHT = 1e-6
-STANDING = (
-    1e-12  # a speed of nothing [mm/s], so that pieces without a length where the motion stands take no time
-)
+# A speed of nothing [mm/s], so that pieces without a length where the motion stands take no time.
+STANDING = 1e-12
 SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [mm], and turning by less [rad]
 
 

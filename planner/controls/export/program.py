@@ -33,12 +33,8 @@ from planner.controls.export.models import predicted_time
 from planner.controls.export.output import FIRST_RUN, assumptions
 from planner.planning.job.plan import Plan
 
-SHARES = (
-    1.0,
-    0.5,
-    0.25,
-    0.1,
-)  # of the room for chords: wider ones need fewer lines, narrower ones turn less at each
+# Of the room for chords: wider ones need fewer lines, narrower ones turn less at each.
+SHARES = (1.0, 0.5, 0.25, 0.1)
 NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster than the plan"
 
 

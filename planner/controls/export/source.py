@@ -142,9 +142,8 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
             return why
     fed = False
     for row in source.rows:
-        mode = any(
-            codes.G_GROUP[code] == "feed mode" for code in row.g()
-        )  # which takes F back, also G94 after G94
+        # takes F back, also G94 after G94
+        mode = any(codes.G_GROUP[code] == "feed mode" for code in row.g())
         fed = (fed and not mode) or row.value("F") is not None
         if not fed and any(program.kind[k] in FEED_MOVES for k in range(row.first, row.last)):
             return f"line {row.line}: a feed move without an F word before it, or after G93, G94 or G95"

@@ -14,7 +14,7 @@ at H (approach) or at the end (departure): so manuals up to TNC 640 have it, lat
 
 import cmath
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,10 +54,13 @@ class ContourWay:
         if self.kind == "LCT" and not self.radius > 0.0:
             raise ValueError(f"{name} LCT needs its radius R, above 0")
 
-    def rest(self, *, feed: bool) -> TravelRow:
-        """The row of a move without its motion code and coordinates: with `feed` the F of the block."""
-        words = [(_F, self.feed, self.at)] if feed and self.feed is not None else []
-        return TravelRow(words, self.line, self.frame)
+    def move(
+        self, begin: FloatArray, end: FloatArray, arc: Arc | None = None, *, rises: bool = False
+    ) -> Move:
+        """A move from `begin` to `end` (3,), in the plane or along the tool axis, at the F of the block."""
+        words = [(_F, self.feed, self.at)] if self.feed is not None else []
+        axes = [_NORMAL] if rises else IN_PLANE[_NORMAL]
+        return Move(TravelRow(words, self.line, self.frame), self.at, 1, begin, end, axes, arc)
 
     def turned(
         self, contour: complex, tangent: complex, normal: complex, other: complex
@@ -137,13 +140,12 @@ class Approach(ContourWay):
         there = at_place(before, self._start, _NORMAL)
         deep = at_place(before, self._first, _NORMAL)
         end = at_place(contour, self._first, _NORMAL)
-        touches = self.kind == "LCT"
-        code = 1 if touches and self.feed is not None else self._motion
-        moves = [Move(self.rest(feed=touches), self.at, code, self._start, there, IN_PLANE[_NORMAL])]
+        moves = [self.move(self._start, there)]
+        if self.kind != "LCT" or self.feed is None:
+            moves[0] = replace(moves[0], rest=TravelRow([], self.line, self.frame), code=self._motion)
         if deep[_NORMAL] != there[_NORMAL]:
-            moves.append(Move(self.rest(feed=True), self.at, 1, there, deep, [_NORMAL]))
-        last = 1 if arc is None else 3 if arc.sweep > 0 else 2
-        moves.append(Move(self.rest(feed=True), self.at, last, deep, end, IN_PLANE[_NORMAL], arc))
+            moves.append(self.move(there, deep, rises=True))
+        moves.append(self.move(deep, end, arc))
         return [row for one in moves for row in one.rows(_NORMAL)], offset
 
 
@@ -164,7 +166,7 @@ class Departure(ContourWay):
         if self.kind in ("LT", "LN"):
             way = length * tangent if self.kind == "LT" else length * normal
             there = at_place(contour + way, place, _NORMAL)
-            moves.append(Move(self.rest(feed=True), self.at, 1, place, there, IN_PLANE[_NORMAL]))
+            moves.append(self.move(place, there))
         else:
             # the same arc backwards: the path reversed has the tangent -t
             other = in_plane(end, _NORMAL) if end is not None else contour
@@ -172,13 +174,12 @@ class Departure(ContourWay):
             arc = self._arc(contour, far, centre, -back)
             there = at_place(far, place, _NORMAL)
             if arc is not None:
-                code = 3 if arc.sweep > 0 else 2
-                moves.append(Move(self.rest(feed=True), self.at, code, place, there, IN_PLANE[_NORMAL], arc))
+                moves.append(self.move(place, there, arc))
             if self.kind == "LCT":
                 begin, there = there, at_place(other, place, _NORMAL)
-                moves.append(Move(self.rest(feed=True), self.at, 1, begin, there, IN_PLANE[_NORMAL]))
+                moves.append(self.move(begin, there))
         if end is not None and self.raised:
             up = at_place(in_plane(there, _NORMAL), end, _NORMAL)
-            moves.append(Move(self.rest(feed=True), self.at, 1, there, up, [_NORMAL]))
+            moves.append(self.move(there, up, rises=True))
             there = up
         return [row for one in moves for row in one.rows(_NORMAL)], there

@@ -19,12 +19,11 @@ from dataclasses import dataclass, replace
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
-from planner.nc.cutter import Cutter, CutterFault, OffsetMove, meeting
+from planner.nc.cutter import Cutter, CutterFault, OffsetMove, dot, meeting
 from planner.nc.language.travel_rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words
 from planner.nc.program import Kind
 from planner.nc.state import State
 
-_KINDS = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.ARC)
 KINDS = ("RND", "CHR", "CHF")
 _STRAIGHT_ON = 1e-6  # turn below which there is no corner [rad]
 _TOO_LARGE = "the rounding or chamfer takes more of a move than there is; correct it"
@@ -126,7 +125,7 @@ class OffsetMoves:
         if move.arc is not None:
             self._cutter.arc(move.end, move.arc, line)
         else:
-            self._cutter.line(move.end, _KINDS[move.code], line)
+            self._cutter.line(move.end, Kind.LINE if move.code else Kind.RAPID, line)
         self._items.append((move, before, self._table.blocks))
 
     def _written(self) -> Iterator[TravelRow]:
@@ -200,9 +199,7 @@ class CornerMove:
         one = _cut(first, first.begin, at_place(start, first.end, normal), normal)
         two = _cut(second, at_place(end, second.begin, normal), second.end, normal)
         rest = TravelRow([], first.rest.line, first.rest.frame)
-        code = 1 if arc is None else 3 if arc.sweep > 0 else 2
-        between = Move(rest, first.at, code, one.end, two.begin, plane, arc)
-        return [one, between], two
+        return [one, Move(rest, first.at, 1, one.end, two.begin, plane, arc)], two
 
 
 def _beside(move: Move, distance: float, normal: int) -> OffsetMove:
@@ -221,7 +218,7 @@ def _foot(move: Move, centre: complex, normal: int) -> complex:
     """The point of a move's line or circle next to the centre of a rounding."""
     if move.arc is None:
         tangent, begin = move.tangent(normal), in_plane(move.begin, normal)
-        return begin + ((centre - begin).conjugate() * tangent).real * tangent
+        return begin + dot(centre - begin, tangent) * tangent
     middle = in_plane(move.arc.centre, normal)
     radius = abs(in_plane(move.end, normal) - middle)
     return middle + radius * (centre - middle) / abs(centre - middle)
@@ -232,7 +229,7 @@ def _cut(move: Move, begin: FloatArray, end: FloatArray, normal: int) -> Move:
     axes = sorted({*move.axes, *IN_PLANE[normal]})
     start, stop = in_plane(begin, normal), in_plane(end, normal)
     if move.arc is None:
-        if ((stop - start).conjugate() * move.tangent(normal)).real < -STANDS:
+        if dot(stop - start, move.tangent(normal)) < -STANDS:
             raise ValueError(_TOO_LARGE)
         return replace(move, begin=begin, end=end, axes=axes)
     centre, sweep = in_plane(move.arc.centre, normal), move.arc.sweep

@@ -201,8 +201,7 @@ class RowsThrough(Coordinates):
         # all but the motion code, coordinates and centre
         rest = [word for word in row.words if word[0] not in geometry or (word[0] == G and word[1] > 3.0)]
         at = row.words[0][2]
-        code = self.motion if arc is None else 3 if arc.sweep > 0 else 2
-        move = Move(TravelRow(rest, row.line, row.frame), at, code, self._mapped, mapped, axes, arc)
+        move = Move(TravelRow(rest, row.line, row.frame), at, self.motion, self._mapped, mapped, axes, arc)
         self.place, self._mapped = target, mapped
         self.moves += 1
         if not move.stands(self.normal):

@@ -52,23 +52,24 @@ class Move:
 
     rest: TravelRow  # the row without motion code, coordinates and centre
     at: int  # byte offset of the row
-    code: int  # 0 to 3
+    code: int  # 0 or 1; that of an arc follows from its sweep
     # begin and end: (3,)
     begin: FloatArray
     end: FloatArray
     axes: Sequence[int]  # indices of the coordinates to write
-    arc: Arc | None = None  # of codes 2 and 3
+    arc: Arc | None = None
 
     def rows(self, normal: int) -> list[TravelRow]:
         """The move as a row."""
-        words = [(G, float(self.code), self.at), *self.rest.words]
+        code = self.code if self.arc is None else 3 if self.arc.sweep > 0 else 2
+        words = [(G, float(code), self.at), *self.rest.words]
         words += [(AXES[a], float(self.end[a]), self.at) for a in self.axes]
         if self.arc is not None:
             words += arc_words(self.arc, self.begin, normal, self.at)
         return [TravelRow(words, self.rest.line, self.rest.frame)]
 
     def stands(self, normal: int) -> bool:
-        """True if it leaves its place in the plane."""
+        """True if it stays at its place in the plane."""
         way = [self.end[a] - self.begin[a] for a in IN_PLANE[normal]]
         return self.arc is None and math.hypot(*way) < STANDS
 

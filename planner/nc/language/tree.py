@@ -302,9 +302,8 @@ class Language:
     vacant: float | None = 0.0
     read: str = "{0}"  # the Python text of a parameter's value in an expression, with {0} for what was stored
     raw: frozenset[str] = frozenset()  # operators that tell a parameter without a value from 0
-    meant: Mapping[str, str] = field(
-        default_factory=dict
-    )  # names of operators in the tree, where they are others
+    # names of operators in the tree, where they are others
+    meant: Mapping[str, str] = field(default_factory=dict)
     long_values: bool = False  # an assignment takes an expression without brackets
     keywords: frozenset[str] = frozenset()  # that statements begin with, or have in them
     constants: Mapping[str, float] = field(default_factory=dict)  # names of numbers

@@ -14,10 +14,8 @@ from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
-X_HERE, Z_HERE = (
-    tree.Numbered(tree.Number(5001.0)),
-    tree.Numbered(tree.Number(5002.0)),
-)  # parameters that hold the end of the last block
+# Parameters that hold the end of the last block.
+X_HERE, Z_HERE = tree.Numbered(tree.Number(5001.0)), tree.Numbered(tree.Number(5002.0))
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Codes that are not read, and why.
 _REFUSED = {**dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are")}

@@ -52,13 +52,8 @@ _FEEDS = (206, 207, 208, 385)  # that inch programs give in tenths of an inch pe
 _AWAY = {1: (-1, 0), 2: (0, -1), 3: (1, 0), 4: (0, 1)}  # directions of Q214
 _AWAY_BY = 0.2  # mm
 _OVERLAP = 1.0  # of the tool's radius between two paths, where Q370 is 0
-_CORNERS = {
-    0: 0j,
-    1: -1 - 1j,
-    2: 1 - 1j,
-    3: 1 + 1j,
-    4: -1 + 1j,
-}  # where the tool stands (Q367), in half sides
+# Where the tool stands (Q367), in half sides.
+_CORNERS = {0: 0j, 1: -1 - 1j, 2: 1 - 1j, 3: 1 + 1j, 4: -1 + 1j}
 Given = Mapping[str, float]
 PATTERNS = (220, 221)
 _TURN = 360.0  # [degrees]

@@ -11,7 +11,7 @@ that shall be numbers in machine code, so that loops are unrolled, are lengths o
 # mypy: ignore-errors
 
 import operator
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -24,6 +24,12 @@ from numba.extending import (
     models,
     register_model,
 )
+
+
+def _code(function: Any) -> Any:
+    """numba's `intrinsic`, for type checkers that do not look inside."""
+    return intrinsic(function)
+
 
 WIDTH = 4  # float64 in a register of AVX2
 _BYTES = 8  # to which lanes are aligned in memory: numpy promises no more
@@ -125,14 +131,14 @@ def _of(*given):
     return lanes if lanes in given else types.float64
 
 
-@intrinsic
+@_code
 def where(typingctx, condition, a, b):
     """a where the condition holds, else b."""
     of = lanes if condition == mask else _of(a, b)
     return of(condition, of, of), lambda context, builder, sig, args: builder.select(*args)
 
 
-@intrinsic
+@_code
 def larger(typingctx, a, b):
     """The larger one of a and b; b where one is no number."""
     of = _of(a, b)
@@ -141,7 +147,7 @@ def larger(typingctx, a, b):
     )
 
 
-@intrinsic
+@_code
 def smaller(typingctx, a, b):
     """The smaller one of a and b; b where one is no number."""
     of = _of(a, b)
@@ -164,19 +170,19 @@ def _function(name):
     return lower
 
 
-@intrinsic
+@_code
 def root(typingctx, a):
     """The square root."""
     return _of(a)(_of(a)), _function("sqrt")
 
 
-@intrinsic
+@_code
 def magnitude(typingctx, a):
     """The absolute value."""
     return _of(a)(_of(a)), _function("fabs")
 
 
-@intrinsic
+@_code
 def anywhere(typingctx, condition):
     """Whether it holds in any lane."""
 
@@ -189,7 +195,7 @@ def anywhere(typingctx, condition):
     return types.boolean(condition), lower
 
 
-@intrinsic
+@_code
 def pick(typingctx, value, lane):
     """The number in one lane."""
 
@@ -199,7 +205,7 @@ def pick(typingctx, value, lane):
     return types.float64(value, types.intp), lower
 
 
-@intrinsic
+@_code
 def put(typingctx, value, lane, number):
     """The value with another number in one lane."""
 
@@ -326,7 +332,7 @@ def _viewed(dtype, given):
     return made, lower
 
 
-@intrinsic
+@_code
 def wide1(typingctx, array, width):
     """An array (N, WIDTH) as a view (N,) of lanes, or (N, 1) of numbers: the length of the tuple `width`. The array has to
     live as long."""
@@ -334,14 +340,14 @@ def wide1(typingctx, array, width):
     return made(array, width), lower
 
 
-@intrinsic
+@_code
 def wide2(typingctx, array, width, n):
     """`wide1` of (N, n, WIDTH); n the length of a tuple, or a number."""
     made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n])
     return made(array, width, n), lower
 
 
-@intrinsic
+@_code
 def wide3(typingctx, array, width, n, m):
     """`wide2` of (N, n, m, WIDTH)."""
     made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n, m])
@@ -367,14 +373,14 @@ def _on_stack(dtype, sizes):
     return made, lower
 
 
-@intrinsic
+@_code
 def vector(typingctx, like, n):
     """A view (n,) of memory on the stack for what the view `like` is of, with anything in it; n the length of a tuple."""
     made, lower = _on_stack(like.dtype, [n])
     return made(like, n), lower
 
 
-@intrinsic
+@_code
 def matrix(typingctx, like, n, m):
     """`vector` (n, m)."""
     made, lower = _on_stack(like.dtype, [n, m])

@@ -171,7 +171,7 @@ def group_of(
         at=steps,
     )
     normal, laws = bool(own.any()), any(len(one.limits.laws.kind) > 0 for one in windows)
-    there = (
+    which = (
         targets or any(bool(now.any()) for now in bent),
         normal or laws,
         normal or bool(on[:, 8 * axes + NORMAL_NODE].any()),
@@ -184,7 +184,7 @@ def group_of(
         x[: count + 1, steps[: 3 * of], lane] = one.x
         x[count + 1 :, :axes, lane] = x[count, :axes, lane]
         u[:count, steps[3 * of :] - 3 * axes, lane] = one.u
-    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *there)
+    sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *which)
     return sizes, group, bends, x, u, stack([one.place for one in windows])
 
 

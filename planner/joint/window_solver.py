@@ -44,8 +44,11 @@ def solve_windows(asked: Sequence[Asked], width: int = WIDTH) -> list[Solved]:
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))
     tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T
+    x, u, place = motion
     found = Found(
-        *(np.zeros_like(one) for one in motion),
+        np.zeros_like(x),
+        np.zeros_like(u),
+        np.zeros_like(place),
         np.zeros(group.on.shape),
         np.zeros(width, np.bool_),
         np.zeros(width, np.int64),

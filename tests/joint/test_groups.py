@@ -15,8 +15,11 @@ from starts import MACHINE, PROGRAMS, begun, begun_on
 from planner.base.threads import use_threads
 from planner.joint import groups, own
 from planner.joint.groups import Sort, Sweep, searched
+from planner.joint.interior_point import Tuning
+from planner.joint.nlp import PULL
 from planner.joint.own import TubeOwn
-from planner.joint.window_solver import WIDTH
+from planner.joint.problem import window_of
+from planner.joint.window_solver import WIDTH, Asked, kind_of, solve_windows
 from planner.machine.user_limit import PathLimit
 
 pytestmark = pytest.mark.usefixtures("threads_as_before")
@@ -248,3 +251,43 @@ def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
         assert found.kept.any()
     else:
         assert found.steps is None
+
+
+@pytest.mark.slow
+def test_lanes_find_what_single_numbers_find():
+    """The kernel on lanes against itself on single numbers, in any order and beside any others."""
+    asked = []
+    for name in ("corner", "arcs", "pentagon", "pushed", "turned", "own", "powered"):
+        run, guess = begun(name)
+        missed = own.TRIES[0][1]
+        window = window_of(run, guess, 0, len(guess), missed, which=np.arange(len(run.laws)))
+        asked.append(Asked(window, Tuning(PULL, own.TRIES[0][0], 1e-4, missed, 1.0, *own.START)))
+
+    def solved(order, width):
+        copies = [
+            one._replace(
+                window=one.window._replace(
+                    x=one.window.x.copy(), u=one.window.u.copy(), place=one.window.place.copy()
+                )
+            )
+            for one in (asked[at] for at in order)
+        ]
+        ended = solve_windows(copies, width)
+        return {at: (end, one.window) for at, end, one in zip(order, ended, copies, strict=True)}
+
+    order = list(range(len(asked)))
+    together, reverse = {}, {}
+    for kind in {kind_of(one) for one in asked}:
+        of_kind = [at for at in order if kind_of(asked[at]) == kind][:WIDTH]
+        together |= solved(of_kind, WIDTH)
+        reverse |= solved(of_kind[::-1], WIDTH)
+    assert sum(end.done for end, _ in together.values()) > WIDTH
+    for at in together:
+        end, window = together[at]
+        beside, alone = reverse[at], solved([at], 1)[at]
+        assert end[:2] == beside[0][:2]
+        for mine, other in ((end.z, beside[0].z), (window.x, beside[1].x), (window.u, beside[1].u)):
+            np.testing.assert_array_equal(mine, other)
+        if end.done:  # those that are not wander
+            assert end[:2] == alone[0][:2]
+            np.testing.assert_allclose(window.u, alone[1].u, atol=1e-6 * np.abs(window.u).max())

@@ -261,7 +261,7 @@ class _ViewGet(AbstractTemplate):
 class _ViewSet(AbstractTemplate):
     def generic(self, args, kws):
         view, index, _ = args
-        if isinstance(view, View) and (_is_index(index) or index == types.slice2_type):
+        if isinstance(view, View) and _is_index(index):
             return signature(types.none, view, index, view.dtype)
         return None
 
@@ -304,15 +304,24 @@ def _get(context, builder, sig, args):
 @lower_builtin(operator.setitem, View, types.Any, types.Any)
 def _set(context, builder, sig, args):
     view, index, _ = sig.args
-    if index != types.slice2_type:
-        builder.store(args[2], _place(context, builder, view, args[0], index, args[1])[0], align=_BYTES)
-        return
-    number = view.outer  # all of it, where its size is known
+    builder.store(args[2], _place(context, builder, view, args[0], index, args[1])[0], align=_BYTES)
+
+
+@_code
+def clear(typingctx, view):
+    """Make everything 0 in a view whose sizes are all known."""
+    number = view.outer
     for n in view.inner:
         number *= n
-    data = cgutils.create_struct_proxy(view)(context, builder, args[0]).data
-    with cgutils.for_range(builder, context.get_constant(types.intp, number)) as loop:
-        builder.store(args[2], builder.gep(data, [loop.index]), align=_BYTES)
+
+    def lower(context, builder, sig, args):
+        data = cgutils.create_struct_proxy(view)(context, builder, args[0]).data
+        nothing = context.get_data_type(view.dtype)(None)
+        with cgutils.for_range(builder, context.get_constant(types.intp, number)) as loop:
+            builder.store(nothing, builder.gep(data, [loop.index]), align=_BYTES)
+        return context.get_dummy_value()
+
+    return types.none(view), lower
 
 
 def _viewed(dtype, given):

@@ -5,7 +5,7 @@ grad g' (recursion.py), the sum of q grad g, and what they change by.
 import numpy as np
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import pick, put, where
+from planner.base.lanes import clear, pick, put, where
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import add_normal_curvature, stay_of
 from planner.joint.rows import (
@@ -85,7 +85,7 @@ def _add_to_row(sizes, row, alpha, e, m, k, by):
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_second_row(sizes, group, rows, i, c, y, alpha, e, row):
     """row (4 A + 1,) = the derivative of the row of the inner control point c on an arc, or of SWITCH (c = 0)."""
-    row[:] = 0.0
+    clear(row)
     for k in range(len(sizes.axes)):
         if c > 0:
             _add_to_row(sizes, row, alpha, e, TUBE_VECTOR[c], k, rows.n[i, c, k])
@@ -114,7 +114,7 @@ def put_model(sizes, group, rows, i, motion, room, W):
     axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
     more = 8 * axes
     bent = bent_at(sizes, group, i)
-    W[:] = 0.0
+    clear(W)
     for m in range(4):
         vector = VECTOR_OF_BOX[m]
         if m < 3:  # that of the velocity at the node has rows beside
@@ -175,7 +175,7 @@ def put_model(sizes, group, rows, i, motion, room, W):
                 (LONG, 1, more + ARC),
             )[m]
             per = group.per_step[i] if m == 2 else 1.0 / group.pace[i]
-            row[:] = 0.0
+            clear(row)
             for k in range(axes):
                 _add_to_row(sizes, row, alpha, e, vector, k, per * tangent_of(sizes, group, rows, i, c, k))
             _add_square(sizes, W, row, z[of] * per_s[of])
@@ -240,8 +240,8 @@ def put_force(sizes, group, rows, i, motion, aim, second, F, w):
     axes = len(sizes.axes)
     more = 8 * axes
     bent = bent_at(sizes, group, i)
-    w[:] = 0.0
-    F[:] = 0.0
+    clear(w)
+    clear(F)
     for m in range(4):
         for k in range(axes):
             up = push_of(group, rows, i, 2 * m * axes + k, aim, second)

@@ -3,7 +3,6 @@ numbers of all windows behind each other in the last dimension, filled up to the
 no rows.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,11 +116,11 @@ def group_of(
     start = legs.base + legs.radius[:, None] * legs.e1
     passed = [one.limits.passed for one in windows]
     bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
-    steps, rows = place_of(of, axes), rows_of(of, axes)
+    steps = place_of(of, axes)
     on, own = np.zeros((N, R, width)), np.zeros((N, width))
     for lane, one in enumerate(windows):
         there = one.limits.on
-        on[: len(there), rows(there.shape[1]), lane] = there
+        on[: len(there), rows_of(of, axes, there.shape[1]), lane] = there
         own[: len(there), lane] = there[:, 8 * of + NORMAL_ROWS]
     group = Group(
         real=stack([np.ones(count) for count in counts]),
@@ -210,11 +209,7 @@ def place_of(of: int, axes: int) -> Array:
     return np.array([block * axes + k for block in range(4) for k in range(of)] + [4 * axes])
 
 
-def rows_of(of: int, axes: int) -> Callable[[int], Array]:
-    """Where the first so many rows of a step over `of` axes are in one over `axes`."""
-
-    def rows(count: int) -> Array:
-        row = np.arange(count)
-        return np.where(row < 8 * of, row // of * axes + row % of, row + 8 * (axes - of))
-
-    return rows
+def rows_of(of: int, axes: int, rows: int) -> Array:
+    """(R,) where the `rows` rows of a step over `of` axes are in one over `axes`."""
+    row = np.arange(rows)
+    return np.where(row < 8 * of, row // of * axes + row % of, row + 8 * (axes - of))

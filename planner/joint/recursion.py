@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, where
+from planner.base.lanes import anywhere, clear, larger, magnitude, where
 from planner.joint.curvature import add_laws, add_normal, put_force, put_model, put_slopes
 from planner.joint.rows import SIXTH, put_shares, put_vectors
 
@@ -142,7 +142,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
     returned is not 0."""
     axes, S, N = len(sizes.axes), len(sizes.state), sizes.steps
     P, W = room.P, room.W
-    P[:] = 0.0
+    clear(P)
     bad = 0.0 * pull
     for i in range(N - 1, -1, -1):
         last = group.last[i] > 0.0

@@ -47,7 +47,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
+from planner.base.lanes import anywhere, clear, larger, magnitude, pick, put, smaller, where
 from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
@@ -171,7 +171,7 @@ def put_vectors(sizes, x, u, y, e):
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_shares(h, turn, alpha):
     """alpha (13, 4) of a step of the duration h."""
-    alpha[:] = 0.0
+    clear(alpha)
     alpha[P, 0], alpha[V, 1], alpha[A, 2], alpha[J, 3] = 1.0, 1.0, 1.0, 1.0
     alpha[MID, 1], alpha[MID, 2] = 1.0, 0.5 * h
     for m in range(3):

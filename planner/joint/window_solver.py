@@ -65,5 +65,5 @@ def _solved(window: StepWindow, lane: int, found: Found) -> Solved:
     window.x[:] = found.x[: N + 1, at[: 3 * of], lane]
     window.u[:] = found.u[:N, at[3 * of :] - 3 * axes, lane]
     window.place[:] = found.place[:N, :, lane]
-    z = found.z[:N, rows_of(of, axes)(R), lane]
+    z = found.z[:N, rows_of(of, axes, R), lane]
     return Solved(bool(found.done[lane]), int(found.iterations[lane]), z)

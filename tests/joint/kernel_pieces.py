@@ -168,4 +168,4 @@ def rows_out(window: Any, numbers: Any) -> Any:
         window.u.shape[1] - 1,
         (numbers.shape[1] - window.limits.on.shape[1]) // 8 + window.u.shape[1] - 1,
     )
-    return numbers[:, rows_of(of, axes)(window.limits.on.shape[1]), 0]
+    return numbers[:, rows_of(of, axes, window.limits.on.shape[1]), 0]

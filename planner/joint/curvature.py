@@ -1,67 +1,52 @@
 """What the rows of a step (rows.py) add to a Newton step: their second-order model, the sum of z d2g + (z/s) grad g
 grad g' (recursion.py), the sum of q grad g, and what they change by.
-"""
 
-import numpy as np
+All three go through the vectors y of the rows, which are linear in p, v, a, j for a given h (rows.py). What is f by the
+vectors is, by p, v, a, j and h, for every axis (`_spread`)
+
+    p   f_P + f_C1 + f_C2
+    v   f_V + f_MID + f_1 + f_2 + f_3 + h f_C1/3 + 2 h f_C2/3
+    a   f_A + h f_MID/2 + h f_1/4 + h f_2/2 + 3 h f_3/4 + h2 f_C2/6
+    j   f_J + h2 f_2/12 + h2 f_3/4
+    h   e.f,   e = a/2, a/4, a/2 + h j/6, 3 a/4 + h j/2 of MID, 1, 2, 3;  v/3, (2 v + h a)/3 of C1, C2
+
+and so are the blocks of the model, of what G is between the vectors.
+"""
 
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import clear, pick, put, where
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import add_normal_curvature, stay_of
 from planner.joint.rows import (
-    ACROSS,
     ARC,
-    C1,
-    C2,
-    FEED_1,
     FEED_NODE,
     FEED_ROWS,
     H_MAX,
     H_MIN,
     LAW_ROWS,
-    LONG,
-    MID,
-    NEXT,
     NORMAL_NODE,
     NORMAL_ROWS,
     ORDER_MID,
     ORDER_NODE,
+    SIXTH,
     SWITCH,
+    THIRD,
     TUBE_NODE,
-    VECTOR_OF_BOX,
-    VECTORS,
-    P,
-    V,
+    TWELFTH,
     bent_at,
     copy_lane,
+    of_axis,
     tangent_of,
+    turn_of,
 )
-
-TUBE_VECTOR = (P, C1, C2)
-TUBE_SECOND = (P, P, NEXT)  # second vectors of the rows of the tolerance on arcs
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _add_vector(sizes, W, alpha, e, m, G):
-    """W += J'GJ for the vector m with dy = J d."""
-    axes = len(sizes.axes)
-    h = 4 * axes
-    for k in range(axes):
-        along = 0.0 * G[0, 0]
-        for t in range(axes):
-            along += G[k, t] * e[m, t]
-        W[h, h] += e[m, k] * along
-        for a in range(FIRST_BLOCK[m], LAST_BLOCK[m] + 1):
-            W[h, a * axes + k] += alpha[m, a] * along
-            for b in range(FIRST_BLOCK[m], a + 1):
-                both = alpha[m, a] * alpha[m, b]
-                for t in range(axes):
-                    W[a * axes + k, b * axes + t] += both * G[k, t]
-
-
-# The first and the last of p, v, a, j that a vector depends on.
-FIRST_BLOCK = np.array([0, 1, 2, 3, 1, 1, 1, 1, 0, 0, 1, 1, 0])
-LAST_BLOCK = np.array([0, 1, 2, 3, 2, 2, 3, 3, 1, 2, 2, 2, 3])
+def _spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2):
+    """By p, v, a and j what is f by the vectors that are of several of them (module text)."""
+    by_v = f_mid + f_1 + f_2 + f_3 + THIRD * h * (f_c1 + 2.0 * f_c2)
+    by_a = h * (0.5 * (f_mid + f_2) + 0.25 * f_1 + 0.75 * f_3) + SIXTH * h * h * f_c2
+    return f_c1 + f_c2, by_v, by_a, h * h * (TWELFTH * f_2 + 0.25 * f_3)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -74,118 +59,179 @@ def _add_square(sizes, W, row, by):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _add_to_row(sizes, row, alpha, e, m, k, by):
-    """row (4 A + 1,) += what a derivative `by` by the k-th number of the vector m is by p, v, a, j and h."""
+def _put_bent_row(sizes, group, rows, i, which, x, u, row):
+    """row (4 A + 1,) = the derivative of a row on an arc: of the inner control points (1 and 2), of ORDER_NODE, ORDER_MID and
+    ARC (3 to 5)."""
     axes = len(sizes.axes)
-    for a in range(FIRST_BLOCK[m], LAST_BLOCK[m] + 1):
-        row[a * axes + k] += alpha[m, a] * by
-    row[4 * axes] += e[m, k] * by
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_second_row(sizes, group, rows, i, c, y, alpha, e, row):
-    """row (4 A + 1,) = the derivative of the row of the inner control point c on an arc, or of SWITCH (c = 0)."""
-    clear(row)
-    for k in range(len(sizes.axes)):
-        if c > 0:
-            _add_to_row(sizes, row, alpha, e, TUBE_VECTOR[c], k, rows.n[i, c, k])
-            _add_to_row(sizes, row, alpha, e, TUBE_SECOND[c], k, rows.node[i, c, k])
+    h = u[axes]
+    by_h = 0.0 * h
+    for k in range(axes):
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        by_p, by_v, by_a, by_j = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
+        if which == 1:  # C1 and P
+            n = rows.n[i, 1, k]
+            by_p, by_v, by_h = n + rows.node[i, 1, k], THIRD * h * n, by_h + THIRD * v * n
+        elif which == 2:  # C2 and NEXT
+            n, m = rows.n[i, 2, k], rows.node[i, 2, k]
+            by_p, by_v = n + m, h * (2.0 * THIRD * n + m)
+            by_a, by_j = h * h * (SIXTH * n + 0.5 * m), h * h * h * SIXTH * m
+            by_h += THIRD * (2.0 * v + h * a) * n + (v + h * (a + 0.5 * h * j)) * m
+        elif which == 3:
+            by_v = -tangent_of(sizes, group, rows, i, 0, k) / group.pace[i]
+        elif which == 4:
+            by_v = -tangent_of(sizes, group, rows, i, 1, k) / group.pace[i]
+            by_a, by_h = 0.5 * h * by_v, by_h + 0.5 * a * by_v
         else:
-            _add_to_row(sizes, row, alpha, e, P, k, group.switch[i] * y[V, k])
-            _add_to_row(sizes, row, alpha, e, V, k, group.switch[i] * (y[P, k] - group.switch_at[i, k]))
+            n = tangent_of(sizes, group, rows, i, 1, k) * group.per_step[i]
+            by_v, by_a, by_h = h * n, 0.5 * h * h * n, by_h + (v + h * a) * n
+        row[k], row[axes + k], row[2 * axes + k], row[3 * axes + k] = by_p, by_v, by_a, by_j
+    row[4 * axes] = by_h
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _put_ball(axes, G, y, m, square, flat):
-    """G = square y y' + flat."""
+def _put_switch_row(sizes, group, i, x, row):
+    """row (4 A + 1,) = the derivative of SWITCH."""
+    axes = len(sizes.axes)
+    clear(row)
     for k in range(axes):
-        one = square * y[m, k]
-        for t in range(axes):
-            G[k, t] = one * y[m, t]
-        G[k, k] += flat
+        row[k] = group.switch[i] * x[axes + k]
+        row[axes + k] = group.switch[i] * (x[k] - group.switch_at[i, k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_model(sizes, group, rows, i, motion, room, W):
-    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i. motion: y, alpha and e of it; room: G (A, A) and a
-    row (4 A + 1,)."""
-    y, alpha, e = motion
-    G, row = room
+def _weight(rows, i, r, per):
+    """z/s of a ball's row times what its derivative is of its vector, squared."""
+    return rows.z[i, r] * rows.per_s[i, r] * per * per
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def put_model(sizes, group, rows, i, x, u, W, row):
+    """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with the node x (3 A,) and the controls u (A+1,); row
+    (4 A + 1,) is overwritten."""
     axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
-    more = 8 * axes
+    more, at, h = 8 * axes, 4 * axes, u[axes]
     bent = bent_at(sizes, group, i)
-    clear(W)
-    for m in range(4):
-        vector = VECTOR_OF_BOX[m]
-        if m < 3:  # that of the velocity at the node has rows beside
-            for k in range(axes):
-                up, down = 2 * m * axes + k, (2 * m + 1) * axes + k
-                flat = (z[up] * per_s[up] + z[down] * per_s[down]) * (
-                    group.per_box[m, k] * group.per_box[m, k]
-                )
-                along = flat * e[vector, k]
-                W[4 * axes, 4 * axes] += along * e[vector, k]
-                for a in range(FIRST_BLOCK[vector], LAST_BLOCK[vector] + 1):
-                    W[4 * axes, a * axes + k] += alpha[vector, a] * along
-                    for b in range(FIRST_BLOCK[vector], a + 1):
-                        W[a * axes + k, b * axes + k] += alpha[vector, a] * alpha[vector, b] * flat
-    per = group.feed_node[i]
-    of = more + FEED_NODE
-    _put_ball(axes, G, y, V, z[of] * per_s[of] * per * per, z[of] * per)
+    square, third, sixth = h * h, THIRD * h, SIXTH * h * h
+    s_v = _weight(rows, i, more + FEED_NODE, group.feed_node[i])
+    s_1 = _weight(rows, i, more + FEED_ROWS, rows.per_radius[i, 0])
+    s_2 = _weight(rows, i, more + FEED_ROWS + 1, rows.per_radius[i, 1])
+    s_3 = _weight(rows, i, more + FEED_ROWS + 2, rows.per_radius[i, 2])
+    flat_v = z[more + FEED_NODE] * group.feed_node[i]
+    flat_1 = z[more + FEED_ROWS] * rows.per_radius[i, 0]
+    flat_2 = z[more + FEED_ROWS + 1] * rows.per_radius[i, 1]
+    flat_3 = z[more + FEED_ROWS + 2] * rows.per_radius[i, 2]
+    flat_p = (z[more + TUBE_NODE] + group.centre[i]) * group.room_node[i]
+    flat_c1, flat_c2 = z[more + TUBE_NODE + 1] * group.room[i], z[more + TUBE_NODE + 2] * group.room[i]
+    s_p = z[more + TUBE_NODE] * per_s[more + TUBE_NODE]
+    s_c1 = z[more + TUBE_NODE + 1] * per_s[more + TUBE_NODE + 1]
+    s_c2 = z[more + TUBE_NODE + 2] * per_s[more + TUBE_NODE + 2]
+    if bent:  # rows of two vectors are added below
+        alone = where(group.bent[i] > 0.0, 0.0, 1.0 + 0.0 * h)
+        s_c1, s_c2 = s_c1 * alone, s_c2 * alone
+    long_0, long_1, long_2 = 0.0 * h, 0.0 * h, 0.0 * h  # |tangent|^2
+    y_1, y_2, y_3, n_1, n_2 = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h  # products with e
+    t_1, t_2 = 0.0 * h, 0.0 * h
     for k in range(axes):
-        up, down, by = 6 * axes + k, 7 * axes + k, group.per_box[3, k]
-        G[k, k] += (z[up] * per_s[up] + z[down] * per_s[down]) * by * by
-    _add_vector(sizes, W, alpha, e, V, G)
-    for m in range(3):
-        of, per = more + FEED_ROWS + m, rows.per_radius[i, m]
-        _put_ball(axes, G, y, FEED_1 + m, z[of] * per_s[of] * per * per, z[of] * per)
-        _add_vector(sizes, W, alpha, e, FEED_1 + m, G)
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        at_0, at_1 = tangent_of(sizes, group, rows, i, 0, k), tangent_of(sizes, group, rows, i, 1, k)
+        at_2 = tangent_of(sizes, group, rows, i, 2, k)
+        long_0, long_1, long_2 = long_0 + at_0 * at_0, long_1 + at_1 * at_1, long_2 + at_2 * at_2
+        (v_1, v_2, v_3), (_, e_1, e_2, e_3) = of_axis(h, v, a, j)
+        e_c1, e_c2 = THIRD * v, THIRD * (2.0 * v + h * a)
+        y_1, y_2, y_3 = y_1 + v_1 * e_1, y_2 + v_2 * e_2, y_3 + v_3 * e_3
+        n_1, n_2 = n_1 + rows.n[i, 1, k] * e_c1, n_2 + rows.n[i, 2, k] * e_c2
+        t_1, t_2 = t_1 + at_1 * e_c1, t_2 + at_2 * e_c2
+    one = 1.0 + 0.0 * h
+    slide_0 = flat_p * rows.moves[i, 0] / where(long_0 > 0.0, long_0, one)
+    slide_1 = flat_c1 * rows.moves[i, 1] / where(long_1 > 0.0, long_1, one)
+    slide_2 = flat_c2 * rows.moves[i, 2] / where(long_2 > 0.0, long_2, one)
+    total = (z[more + H_MAX] * per_s[more + H_MAX] + z[more + H_MIN] * per_s[more + H_MIN]) * (
+        group.per_h[i] * group.per_h[i]
+    )
+    for k in range(axes):
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
+        n_0, n_c1, n_c2 = rows.n[i, 0, k], rows.n[i, 1, k], rows.n[i, 2, k]
+        at_0, at_1 = tangent_of(sizes, group, rows, i, 0, k), tangent_of(sizes, group, rows, i, 1, k)
+        at_2 = tangent_of(sizes, group, rows, i, 2, k)
+        box_j, box_a = _box(sizes, group, rows, i, 0, k), _box(sizes, group, rows, i, 1, k)
+        box_mid, box_v = _box(sizes, group, rows, i, 2, k), _box(sizes, group, rows, i, 3, k)
+        for t in range(k + 1):
+            (w_1, w_2, w_3), _ = of_axis(h, x[axes + t], x[2 * axes + t], u[t])
+            g_v = s_v * v * x[axes + t]
+            g_1, g_2, g_3 = s_1 * v_1 * w_1, s_2 * v_2 * w_2, s_3 * v_3 * w_3
+            g_p = s_p * n_0 * rows.n[i, 0, t] - slide_0 * at_0 * tangent_of(sizes, group, rows, i, 0, t)
+            g_c1 = s_c1 * n_c1 * rows.n[i, 1, t] - slide_1 * at_1 * tangent_of(sizes, group, rows, i, 1, t)
+            g_c2 = s_c2 * n_c2 * rows.n[i, 2, t] - slide_2 * at_2 * tangent_of(sizes, group, rows, i, 2, t)
+            if t == k:
+                g_v, g_1, g_2, g_3 = g_v + flat_v + box_v, g_1 + flat_1, g_2 + flat_2, g_3 + flat_3
+                g_p, g_c1, g_c2 = g_p + flat_p, g_c1 + flat_c1, g_c2 + flat_c2
+            pp, vp, ap = g_p + g_c1 + g_c2, third * (g_c1 + 2.0 * g_c2), sixth * g_c2
+            vv = g_v + g_1 + g_2 + g_3 + third * third * (g_c1 + 4.0 * g_c2)
+            av = h * (0.25 * g_1 + 0.5 * g_2 + 0.75 * g_3) + 2.0 * third * sixth * g_c2
+            aa = square * (0.0625 * g_1 + 0.25 * g_2 + 0.5625 * g_3) + sixth * sixth * g_c2
+            jv = square * (TWELFTH * g_2 + 0.25 * g_3)
+            ja = square * h * (0.5 * TWELFTH * g_2 + 0.1875 * g_3)
+            jj = square * square * (TWELFTH * TWELFTH * g_2 + 0.0625 * g_3)
+            if t == k:
+                vv, av = vv + box_mid, av + 0.5 * h * box_mid
+                aa, jj = aa + box_a + 0.25 * square * box_mid, jj + box_j
+            for row_of, column in ((k, t), (t, k)):
+                W[axes + row_of, column], W[2 * axes + row_of, column] = vp, ap
+                W[3 * axes + row_of, column] = 0.0
+                W[2 * axes + row_of, axes + column], W[3 * axes + row_of, axes + column] = av, jv
+                W[3 * axes + row_of, 2 * axes + column] = ja
+            W[k, t], W[axes + k, axes + t] = pp, vv
+            W[2 * axes + k, 2 * axes + t], W[3 * axes + k, 3 * axes + t] = aa, jj
+        e_c1, e_c2 = THIRD * v, THIRD * (2.0 * v + h * a)
+        f_mid, f_1 = box_mid * e_mid, s_1 * y_1 * v_1 + flat_1 * e_1
+        f_2, f_3 = s_2 * y_2 * v_2 + flat_2 * e_2, s_3 * y_3 * v_3 + flat_3 * e_3
+        f_c1 = s_c1 * n_1 * n_c1 - slide_1 * t_1 * at_1 + flat_c1 * e_c1
+        f_c2 = s_c2 * n_2 * n_c2 - slide_2 * t_2 * at_2 + flat_c2 * e_c2
+        total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3 + e_c1 * f_c1 + e_c2 * f_c2
+        W[at, k], W[at, axes + k], W[at, 2 * axes + k], W[at, 3 * axes + k] = _spread(
+            h, f_mid, f_1, f_2, f_3, f_c1, f_c2
+        )
+    W[at, at] = total
     if sizes.any_normal:
-        of, per = more + NORMAL_NODE, group.normal_node[i]
-        _put_ball(axes, G, y, ACROSS, z[of] * per_s[of] * per * per, z[of] * per)
-        _add_vector(sizes, W, alpha, e, ACROSS, G)
-    for c in range(3):
-        of = more + TUBE_NODE + c
-        price = z[of] + group.centre[i] if c == 0 else z[of]
-        flat = price * (group.room_node[i] if c == 0 else group.room[i])
-        square, moving = z[of] * per_s[of], 0.0 * flat
-        for k in range(axes):
-            tangent = tangent_of(sizes, group, rows, i, c, k)
-            moving += tangent * tangent
-        slides = flat * rows.moves[i, c] / where(moving > 0.0, moving, 1.0)
-        one_vector = square
-        if bent and c > 0:
-            one_vector = where(group.bent[i] > 0.0, 0.0, square)
-            put_second_row(sizes, group, rows, i, c, y, alpha, e, row)
-            _add_square(sizes, W, row, square - one_vector)
-        for k in range(axes):
-            along = one_vector * rows.n[i, c, k]
-            slide = slides * tangent_of(sizes, group, rows, i, c, k)
-            for t in range(axes):
-                G[k, t] = along * rows.n[i, c, t] - slide * tangent_of(sizes, group, rows, i, c, t)
-            G[k, k] += flat
-        _add_vector(sizes, W, alpha, e, TUBE_VECTOR[c], G)
-    for r in (more + H_MAX, more + H_MIN):
-        W[4 * axes, 4 * axes] += z[r] * per_s[r] * group.per_h[i] * group.per_h[i]
+        _add_across(sizes, group, rows, i, x, W)
     if bent:
-        for m in range(3):
-            vector, c, of = (
-                (V, 0, more + ORDER_NODE),
-                (MID, 1, more + ORDER_MID),
-                (LONG, 1, more + ARC),
-            )[m]
-            per = group.per_step[i] if m == 2 else 1.0 / group.pace[i]
-            clear(row)
-            for k in range(axes):
-                _add_to_row(sizes, row, alpha, e, vector, k, per * tangent_of(sizes, group, rows, i, c, k))
-            _add_square(sizes, W, row, z[of] * per_s[of])
+        for which in range(1, 6):
+            _put_bent_row(sizes, group, rows, i, which, x, u, row)
+            of = more + (0, TUBE_NODE + 1, TUBE_NODE + 2, ORDER_NODE, ORDER_MID, ARC)[which]
+            _add_square(sizes, W, row, group.bent[i] * z[of] * per_s[of])
     if sizes.any_switch:
-        put_second_row(sizes, group, rows, i, 0, y, alpha, e, row)
+        _put_switch_row(sizes, group, i, x, row)
         _add_square(sizes, W, row, z[more + SWITCH] * per_s[more + SWITCH])
     if sizes.any_own:
-        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
+        for r in range(sizes.rows - more - NORMAL_ROWS):
             of = more + NORMAL_ROWS + r
             _add_square(sizes, W, rows.own[i, r], z[of] * per_s[of])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _box(sizes, group, rows, i, m, k):
+    """What the two rows of an axis add by its number of that vector."""
+    up, down, per = 2 * m * len(sizes.axes) + k, (2 * m + 1) * len(sizes.axes) + k, group.per_box[m, k]
+    z, per_s = rows.z[i], rows.per_s[i]
+    return (z[up] * per_s[up] + z[down] * per_s[down]) * per * per
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _add_across(sizes, group, rows, i, x, W):
+    """W += the model of the row of the normal acceleration at the node: of a - turn v, turn kept."""
+    axes, per, of = len(sizes.axes), group.normal_node[i], 8 * len(sizes.axes) + NORMAL_NODE
+    turn, weight, flat = turn_of(axes, x), _weight(rows, i, of, per), rows.z[i, of] * per
+    for k in range(axes):
+        one = weight * (x[2 * axes + k] - turn * x[axes + k])
+        for t in range(axes):
+            g = one * (x[2 * axes + t] - turn * x[axes + t])
+            if t == k:
+                g += flat
+            W[2 * axes + k, axes + t] -= turn * g
+            if t <= k:
+                W[axes + k, axes + t] += turn * turn * g
+                W[2 * axes + k, 2 * axes + t] += g
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -234,122 +280,135 @@ def push_of(group, rows, i, r, aim, second):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_force(sizes, group, rows, i, motion, aim, second, F, w):
-    """w (4 A + 1,) = the sum of q grad g of step i; motion: y, alpha and e of it, F (13, A) is overwritten."""
-    y, alpha, e = motion
+def put_force(sizes, group, rows, i, x, u, aim, second, w):
+    """w (4 A + 1,) = the sum of q grad g of step i with the node x (3 A,) and the controls u (A+1,); q as in `push_of`."""
     axes = len(sizes.axes)
-    more = 8 * axes
+    more, h = 8 * axes, u[axes]
     bent = bent_at(sizes, group, i)
-    clear(w)
-    clear(F)
-    for m in range(4):
-        for k in range(axes):
-            up = push_of(group, rows, i, 2 * m * axes + k, aim, second)
-            down = push_of(group, rows, i, (2 * m + 1) * axes + k, aim, second)
-            F[VECTOR_OF_BOX[m], k] += (up - down) * group.per_box[m, k]
-    q = push_of(group, rows, i, more + FEED_NODE, aim, second) * group.feed_node[i]
+    q_v = push_of(group, rows, i, more + FEED_NODE, aim, second) * group.feed_node[i]
+    q_1 = push_of(group, rows, i, more + FEED_ROWS, aim, second) * rows.per_radius[i, 0]
+    q_2 = push_of(group, rows, i, more + FEED_ROWS + 1, aim, second) * rows.per_radius[i, 1]
+    q_3 = push_of(group, rows, i, more + FEED_ROWS + 2, aim, second) * rows.per_radius[i, 2]
+    q_p = push_of(group, rows, i, more + TUBE_NODE, aim, second) + group.centre[i]
+    q_c1 = push_of(group, rows, i, more + TUBE_NODE + 1, aim, second)
+    q_c2 = push_of(group, rows, i, more + TUBE_NODE + 2, aim, second)
+    longer = push_of(group, rows, i, more + H_MAX, aim, second)
+    total = (longer - push_of(group, rows, i, more + H_MIN, aim, second)) * group.per_h[i]
     for k in range(axes):
-        F[V, k] += q * y[V, k]
-    for m in range(3):
-        q = push_of(group, rows, i, more + FEED_ROWS + m, aim, second) * rows.per_radius[i, m]
-        for k in range(axes):
-            F[FEED_1 + m, k] += q * y[FEED_1 + m, k]
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        f_j = _pushed(sizes, group, rows, i, 0, k, aim, second)
+        f_a = _pushed(sizes, group, rows, i, 1, k, aim, second)
+        f_mid = _pushed(sizes, group, rows, i, 2, k, aim, second)
+        f_v = _pushed(sizes, group, rows, i, 3, k, aim, second) + q_v * v
+        (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
+        f_1, f_2, f_3 = q_1 * v_1, q_2 * v_2, q_3 * v_3
+        f_c1, f_c2 = q_c1 * rows.n[i, 1, k], q_c2 * rows.n[i, 2, k]
+        by_p, by_v, by_a, by_j = _spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2)
+        w[k], w[axes + k] = by_p + q_p * rows.n[i, 0, k], by_v + f_v
+        w[2 * axes + k], w[3 * axes + k] = by_a + f_a, by_j + f_j
+        total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3
+        total += THIRD * (v * f_c1 + (2.0 * v + h * a) * f_c2)
     if sizes.any_normal:
         q = push_of(group, rows, i, more + NORMAL_NODE, aim, second) * group.normal_node[i]
+        turn = turn_of(axes, x)
         for k in range(axes):
-            F[ACROSS, k] += q * y[ACROSS, k]
-    for c in range(3):
-        q = push_of(group, rows, i, more + TUBE_NODE + c, aim, second)
-        if c == 0:
-            q += group.centre[i]
-        for k in range(axes):
-            F[TUBE_VECTOR[c], k] += q * rows.n[i, c, k]
-            if bent and c > 0:
-                F[TUBE_SECOND[c], k] += q * rows.node[i, c, k]
+            f = q * (x[2 * axes + k] - turn * x[axes + k])
+            w[axes + k] -= turn * f
+            w[2 * axes + k] += f
     if bent:
         node = push_of(group, rows, i, more + ORDER_NODE, aim, second) / group.pace[i]
         mid = push_of(group, rows, i, more + ORDER_MID, aim, second) / group.pace[i]
         arc = push_of(group, rows, i, more + ARC, aim, second) * group.per_step[i]
         for k in range(axes):
-            F[V, k] -= node * tangent_of(sizes, group, rows, i, 0, k)
-            F[MID, k] -= mid * tangent_of(sizes, group, rows, i, 1, k)
-            F[LONG, k] += arc * tangent_of(sizes, group, rows, i, 1, k)
+            v, a, j = x[axes + k], x[2 * axes + k], u[k]
+            at_mid = tangent_of(sizes, group, rows, i, 1, k)
+            f_next = q_c2 * rows.node[i, 2, k]
+            w[k] += q_c1 * rows.node[i, 1, k] + f_next
+            w[axes + k] += h * (f_next + arc * at_mid) - mid * at_mid
+            w[axes + k] -= node * tangent_of(sizes, group, rows, i, 0, k)
+            w[2 * axes + k] += 0.5 * h * (h * (f_next + arc * at_mid) - mid * at_mid)
+            w[3 * axes + k] += h * h * h * SIXTH * f_next
+            total += (v + h * (a + 0.5 * h * j)) * f_next + ((v + h * a) * arc - 0.5 * a * mid) * at_mid
     if sizes.any_switch:
         q = push_of(group, rows, i, more + SWITCH, aim, second) * group.switch[i]
         for k in range(axes):
-            F[P, k] += q * y[V, k]
-            F[V, k] += q * (y[P, k] - group.switch_at[i, k])
-    for m in range(VECTORS):
-        for k in range(axes):
-            _add_to_row(sizes, w, alpha, e, m, k, F[m, k])
-    longer = push_of(group, rows, i, more + H_MAX, aim, second)
-    shorter = push_of(group, rows, i, more + H_MIN, aim, second)
-    w[4 * axes] += (longer - shorter) * group.per_h[i]
+            w[k] += q * x[axes + k]
+            w[axes + k] += q * (x[k] - group.switch_at[i, k])
+    w[4 * axes] = total
     if sizes.any_own:
-        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
+        for r in range(sizes.rows - more - NORMAL_ROWS):
             q = push_of(group, rows, i, more + NORMAL_ROWS + r, aim, second)
             for k in range(len(sizes.step)):
                 w[k] += q * rows.own[i, r, k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_slopes(sizes, group, rows, i, motion, d, dy, out):
-    """out (R,) = the change of every row of step i in a step d (4 A + 1,) of p, v, a, j and h; motion: y, alpha and e of
-    it, dy (13, A) is overwritten."""
-    y, alpha, e = motion
+def _pushed(sizes, group, rows, i, m, k, aim, second):
+    """What the two rows of an axis push its number of that vector by."""
     axes = len(sizes.axes)
-    more, dh = 8 * axes, d[4 * axes]
+    up = push_of(group, rows, i, 2 * m * axes + k, aim, second)
+    return (up - push_of(group, rows, i, (2 * m + 1) * axes + k, aim, second)) * group.per_box[m, k]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def put_slopes(sizes, group, rows, i, x, u, d, out):
+    """out (R,) = the change of every row of step i in a step d (4 A + 1,) of p, v, a, j and h."""
+    axes = len(sizes.axes)
+    more, h, dh = 8 * axes, u[axes], d[4 * axes]
     bent = bent_at(sizes, group, i)
-    for m in range(VECTORS):
-        for k in range(axes):
-            total = e[m, k] * dh
-            for a in range(FIRST_BLOCK[m], LAST_BLOCK[m] + 1):
-                total += alpha[m, a] * d[a * axes + k]
-            dy[m, k] = total
-    for m in range(4):
-        for k in range(axes):
-            share = dy[VECTOR_OF_BOX[m], k] * group.per_box[m, k]
-            out[2 * m * axes + k], out[(2 * m + 1) * axes + k] = share, -share
-    out[more + H_MAX], out[more + H_MIN] = dh * group.per_h[i], -dh * group.per_h[i]
-    total = 0.0 * dh
+    none = 0.0 * dh
+    by_v, by_1, by_2, by_3, by_0, by_c1, by_c2 = none, none, none, none, none, none, none
     for k in range(axes):
-        total += y[V, k] * dy[V, k]
-    out[more + FEED_NODE] = total * group.feed_node[i]
-    for m in range(3):
-        total = 0.0 * dh
-        for k in range(axes):
-            total += y[FEED_1 + m, k] * dy[FEED_1 + m, k]
-        out[more + FEED_ROWS + m] = total * rows.per_radius[i, m]
-    for c in range(3):
-        total = 0.0 * dh
-        for k in range(axes):
-            total += rows.n[i, c, k] * dy[TUBE_VECTOR[c], k]
-            if bent and c > 0:
-                total += rows.node[i, c, k] * dy[TUBE_SECOND[c], k]
-        out[more + TUBE_NODE + c] = total
+        v, a, j = x[axes + k], x[2 * axes + k], u[k]
+        dp, dv, da, dj = d[k], d[axes + k], d[2 * axes + k], d[3 * axes + k]
+        (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
+        changes = dj, da, dv + 0.5 * h * da + e_mid * dh, dv
+        for m in range(4):
+            share = changes[m] * group.per_box[m, k]
+            out[2 * m * axes + k], out[(2 * m + 1) * axes + k] = share, -share
+        by_v += v * dv
+        by_1 += v_1 * (dv + 0.25 * h * da + e_1 * dh)
+        by_2 += v_2 * (dv + h * (0.5 * da + h * TWELFTH * dj) + e_2 * dh)
+        by_3 += v_3 * (dv + h * (0.75 * da + 0.25 * h * dj) + e_3 * dh)
+        by_0 += rows.n[i, 0, k] * dp
+        by_c1 += rows.n[i, 1, k] * (dp + THIRD * (h * dv + v * dh))
+        by_c2 += rows.n[i, 2, k] * (dp + THIRD * (h * (2.0 * dv + 0.5 * h * da) + (2.0 * v + h * a) * dh))
     for r in range(more + ORDER_NODE, sizes.rows):
         out[r] = 0.0
     if bent:
-        node, mid, arc = 0.0 * dh, 0.0 * dh, 0.0 * dh
+        node, mid, arc = none, none, none
         for k in range(axes):
+            v, a, j = x[axes + k], x[2 * axes + k], u[k]
+            dp, dv, da, dj = d[k], d[axes + k], d[2 * axes + k], d[3 * axes + k]
             at_mid = tangent_of(sizes, group, rows, i, 1, k)
-            node += tangent_of(sizes, group, rows, i, 0, k) * dy[V, k]
-            mid, arc = mid + at_mid * dy[MID, k], arc + at_mid * dy[LONG, k]
+            node += tangent_of(sizes, group, rows, i, 0, k) * dv
+            mid += at_mid * (dv + 0.5 * (h * da + a * dh))
+            arc += at_mid * (h * (dv + 0.5 * h * da) + (v + h * a) * dh)
+            by_c1 += rows.node[i, 1, k] * dp
+            following = dp + h * (dv + h * (0.5 * da + h * SIXTH * dj)) + (v + h * (a + 0.5 * h * j)) * dh
+            by_c2 += rows.node[i, 2, k] * following
         out[more + ORDER_NODE], out[more + ORDER_MID] = -node / group.pace[i], -mid / group.pace[i]
         out[more + ARC] = arc * group.per_step[i]
+    out[more + H_MAX], out[more + H_MIN] = dh * group.per_h[i], -dh * group.per_h[i]
+    out[more + FEED_NODE] = by_v * group.feed_node[i]
+    out[more + FEED_ROWS] = by_1 * rows.per_radius[i, 0]
+    out[more + FEED_ROWS + 1] = by_2 * rows.per_radius[i, 1]
+    out[more + FEED_ROWS + 2] = by_3 * rows.per_radius[i, 2]
+    out[more + TUBE_NODE], out[more + TUBE_NODE + 1], out[more + TUBE_NODE + 2] = by_0, by_c1, by_c2
     if sizes.any_normal:
-        total = 0.0 * dh
+        turn, total = turn_of(axes, x), none
         for k in range(axes):
-            total += y[ACROSS, k] * dy[ACROSS, k]
+            y = x[2 * axes + k] - turn * x[axes + k]
+            total += y * (d[2 * axes + k] - turn * d[axes + k])
         out[more + NORMAL_NODE] = total * group.normal_node[i]
     if sizes.any_switch:
-        total = 0.0 * dh
+        total = none
         for k in range(axes):
-            total += y[V, k] * dy[P, k] + (y[P, k] - group.switch_at[i, k]) * dy[V, k]
+            total += x[axes + k] * d[k] + (x[k] - group.switch_at[i, k]) * d[axes + k]
         out[more + SWITCH] = total * group.switch[i]
     if sizes.any_own:
-        for r in range(sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS):
-            total = 0.0 * dh
+        for r in range(sizes.rows - more - NORMAL_ROWS):
+            total = none
             for k in range(len(sizes.step)):
                 total += rows.own[i, r, k] * d[k]
             out[more + NORMAL_ROWS + r] = total

@@ -130,7 +130,7 @@ class Found(NamedTuple):
     iterations: Array  # (W,)
 
 
-_VECTORS, _BLOCKS, _THREE = size(VECTORS), size(4), size(3)
+_VECTORS, _THREE = size(VECTORS), size(3)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -201,10 +201,6 @@ def room_of(sizes, work, x):
     """Memory for one step, of what x is of, on the stack of who calls."""
     return Room(
         matrix(x, _VECTORS, sizes.axes),
-        matrix(x, _VECTORS, sizes.axes),
-        matrix(x, _VECTORS, _BLOCKS),
-        matrix(x, _VECTORS, sizes.axes),
-        matrix(x, sizes.axes, sizes.axes),
         vector(x, sizes.step),
         matrix(x, sizes.step, sizes.step),
         matrix(x, sizes.state, sizes.state),
@@ -341,7 +337,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
-    looking = room.y, room.e, wide2(work.nearest, width, _THREE), wide1(work.top, width)
+    looking = room.y, wide2(work.nearest, width, _THREE), wide1(work.top, width)
     put_rows(sizes, group, bends, x, u, rows, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)

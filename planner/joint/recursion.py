@@ -22,7 +22,7 @@ from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, clear, larger, magnitude, where
 from planner.joint.curvature import add_laws, add_normal, put_force, put_model, put_slopes
-from planner.joint.rows import SIXTH, put_shares, put_vectors
+from planner.joint.rows import SIXTH
 
 END = 1e9  # rho [-], at first; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
@@ -42,10 +42,6 @@ class Room(NamedTuple):
     """Memory for one step; D = S + C."""
 
     y: FloatArray  # (13, A)
-    e: FloatArray  # (13, A)
-    alpha: FloatArray  # (13, 4)
-    F: FloatArray  # (13, A)
-    G: FloatArray  # (A, A)
     row: FloatArray  # (D,)
     W: FloatArray  # (D, D)
     P: FloatArray  # (S, S)
@@ -155,10 +151,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
             for t in range(S):
                 total += P[s, t] * gap[i, t]
             factor.push[i, s] = total
-        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
-        put_shares(u[i, axes], turn, room.alpha)
-        motion = room.y, room.alpha, room.e
-        put_model(sizes, group, rows, i, motion, (room.G, room.row), W)
+        put_model(sizes, group, rows, i, x[i], u[i], W, room.row)
         if sizes.any_normal:
             add_normal(sizes, group, rows, i, x, u, W)
         if sizes.any_laws:
@@ -186,9 +179,7 @@ def backward(sizes, group, x, u, rows, pull, aim, second, end, factor, room):
         if anywhere(last):
             for s in range(S):
                 p[s] = where(last, end[s], p[s])
-        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
-        put_shares(h, turn, room.alpha)
-        put_force(sizes, group, rows, i, (room.y, room.alpha, room.e), aim, second, room.F, w)
+        put_force(sizes, group, rows, i, x[i], u[i], aim, second, w)
         per = group.per_h[i]
         w[S + axes] += group.real[i] + 2.0 * pull * (h - group.h[i]) * per * per
         for k in range(axes):
@@ -261,9 +252,7 @@ def forward(sizes, group, x, u, gap, rows, aim, second, factor, room, end):
             for s in range(S):
                 end[s] = where(last, dx[i + 1, s], end[s])
                 dx[i + 1, s] = where(last, 0.0, dx[i + 1, s])
-        turn = put_vectors(sizes, x[i], u[i], room.y, room.e)
-        put_shares(h, turn, room.alpha)
-        put_slopes(sizes, group, rows, i, (room.y, room.alpha, room.e), d, room.F, slope)
+        put_slopes(sizes, group, rows, i, x[i], u[i], d, slope)
         for r in range(R):
             on, s_r, z_r = group.on[i, r], rows.s[i, r], rows.z[i, r]
             ds = on * (-(rows.g[i, r] + s_r) - slope[r])

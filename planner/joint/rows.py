@@ -47,7 +47,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, clear, larger, magnitude, pick, put, smaller, where
+from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
 from planner.joint.laws import LawRows, put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
 from planner.joint.normal_rows import BETWEEN, put_normal_rows
@@ -141,48 +141,34 @@ def count(axes):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_vectors(sizes, x, u, y, e):
-    """y (13, A) and e (13, A) of a step with the node x (3 A,) and the controls u (A+1,). Returns u of the module
-    text."""
-    axes = len(sizes.axes)
-    h = u[axes]
-    vv, va = 0.0 * h, 0.0 * h
-    for k in range(axes):
-        vv, va = vv + x[axes + k] * x[axes + k], va + x[axes + k] * x[2 * axes + k]
-    turn = va / larger(vv, 1e-30)
-    for k in range(axes):
-        p, v, a, j = x[k], x[axes + k], x[2 * axes + k], u[k]
-        y[P, k], y[V, k], y[A, k], y[J, k] = p, v, a, j
-        y[MID, k], e[MID, k] = v + 0.5 * h * a, 0.5 * a
-        y[FEED_1, k], e[FEED_1, k] = v + 0.25 * h * a, 0.25 * a
-        y[FEED_2, k], e[FEED_2, k] = v + h * (0.5 * a + h * j * TWELFTH), 0.5 * a + h * j * SIXTH
-        y[FEED_3, k], e[FEED_3, k] = v + h * (0.75 * a + 0.25 * h * j), 0.75 * a + 0.5 * h * j
-        y[C1, k], e[C1, k] = p + h * v * THIRD, v * THIRD
-        y[C2, k] = p + h * THIRD * (2.0 * v + 0.5 * h * a)
-        e[C2, k] = THIRD * (2.0 * v + h * a)
-        y[ACROSS, k] = a - turn * v
-        e[P, k], e[V, k], e[A, k], e[J, k], e[ACROSS, k] = 0.0, 0.0, 0.0, 0.0, 0.0
-        y[LONG, k], e[LONG, k] = h * (v + 0.5 * h * a), v + h * a
-        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j * SIXTH))
-        e[NEXT, k] = v + h * (a + 0.5 * h * j)
-    return turn
+def of_axis(h, v, a, j):
+    """Of an axis the numbers of FEED_1 to FEED_3, and the derivatives of those of MID and of these by h."""
+    hj = h * j
+    values = v + 0.25 * h * a, v + h * (0.5 * a + TWELFTH * hj), v + h * (0.75 * a + 0.25 * hj)
+    return values, (0.5 * a, 0.25 * a, 0.5 * a + SIXTH * hj, 0.75 * a + 0.5 * hj)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_shares(h, turn, alpha):
-    """alpha (13, 4) of a step of the duration h."""
-    clear(alpha)
-    alpha[P, 0], alpha[V, 1], alpha[A, 2], alpha[J, 3] = 1.0, 1.0, 1.0, 1.0
-    alpha[MID, 1], alpha[MID, 2] = 1.0, 0.5 * h
-    for m in range(3):
-        alpha[FEED_1 + m, 1], alpha[FEED_1 + m, 2] = 1.0, 0.25 * (m + 1) * h
-    alpha[FEED_2, 3], alpha[FEED_3, 3] = h * h * TWELFTH, 0.25 * h * h
-    alpha[C1, 0], alpha[C1, 1] = 1.0, h * THIRD
-    alpha[C2, 0], alpha[C2, 1], alpha[C2, 2] = 1.0, 2.0 * THIRD * h, h * h * SIXTH
-    alpha[ACROSS, 1], alpha[ACROSS, 2] = -turn, 1.0
-    alpha[LONG, 1], alpha[LONG, 2] = h, 0.5 * h * h
-    alpha[NEXT, 0], alpha[NEXT, 1] = 1.0, h
-    alpha[NEXT, 2], alpha[NEXT, 3] = 0.5 * h * h, h * h * h * SIXTH
+def turn_of(axes, x):
+    """u of the module text, of the node x (3 A,)."""
+    vv, va = 0.0 * x[0], 0.0 * x[0]
+    for k in range(axes):
+        vv, va = vv + x[axes + k] * x[axes + k], va + x[axes + k] * x[2 * axes + k]
+    return va / larger(vv, 1e-30)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _put_vectors(axes, x, u, y):
+    """y (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
+    h, turn = u[axes], turn_of(axes, x)
+    for k in range(axes):
+        p, v, a, j = x[k], x[axes + k], x[2 * axes + k], u[k]
+        y[P, k], y[V, k], y[A, k], y[J, k] = p, v, a, j
+        y[MID, k] = v + 0.5 * h * a
+        (y[FEED_1, k], y[FEED_2, k], y[FEED_3, k]), _ = of_axis(h, v, a, j)
+        y[C1, k], y[C2, k] = p + h * v * THIRD, p + h * THIRD * (2.0 * v + 0.5 * h * a)
+        y[ACROSS, k], y[LONG, k] = a - turn * v, h * (v + 0.5 * h * a)
+        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j * SIXTH))
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -375,15 +361,15 @@ def tangent_of(sizes, group, rows, i, c, k):
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_rows(sizes, group, bends, x, u, rows, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
-    on arcs begins. A row that is not there is -1. room: y and e (13, A), nearest (N, 3) and top (N,)."""
+    on arcs begins. A row that is not there is -1. room: y (13, A), nearest (N, 3) and top (N,)."""
     axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
-    y, e, nearest, top = room
+    y, nearest, top = room
     more = 8 * axes
     put_places(sizes, group, x, u, rows, nearest, top)
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
         bent = bent_at(sizes, group, i)
-        put_vectors(sizes, x[i], u[i], y, e)
+        _put_vectors(axes, x[i], u[i], y)
         for m in range(4):
             for k in range(axes):
                 share = y[VECTOR_OF_BOX[m], k] * group.per_box[m, k]

@@ -13,9 +13,9 @@ from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
 from planner.joint.interior_point import Work, lanes_of, room_of, rows_in, scratch_of, work_of
 from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
 from planner.joint.recursion import Factor, backward, factor_steps, forward, gaps
-from planner.joint.rows import VECTORS, put_rows, put_shares, put_vectors
+from planner.joint.rows import put_rows
 
-_VECTORS, _THREE = size(VECTORS), size(3)
+_THREE = size(3)
 
 
 class Alone(NamedTuple):
@@ -46,7 +46,7 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
     rows, room = rows_in(sizes, work, wide2(place, w, _THREE)), room_of(sizes, work, at)
     gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, bends)
     if what == LOOK:
-        looking = room.y, room.e, wide2(work.nearest, w, _THREE), wide1(work.top, w)
+        looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
         put_rows(sizes, group, bends, at, control, rows, looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)
@@ -69,13 +69,10 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
         by, slope = wide2(change, w, sizes.step), wide2(out, w, sizes.rows)
         W = wide3(out, w, sizes.step, sizes.step)
         for i in range(N):
-            turn = put_vectors(sizes, at[i], control[i], room.y, room.e)
-            put_shares(control[i, len(sizes.axes)], turn, room.alpha)
-            motion = room.y, room.alpha, room.e
             if what == SLOPES:
-                put_slopes(sizes, group, rows, i, motion, by[i], room.F, slope[i])
+                put_slopes(sizes, group, rows, i, at[i], control[i], by[i], slope[i])
             else:
-                put_model(sizes, group, rows, i, motion, (room.G, room.row), room.W)
+                put_model(sizes, group, rows, i, at[i], control[i], room.W, room.row)
                 for s in range(len(sizes.step)):
                     for t in range(s + 1):
                         W[i, s, t] = room.W[s, t]

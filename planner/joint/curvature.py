@@ -272,34 +272,35 @@ def add_laws(sizes, group, bends, rows, i, x, u, W, scratch):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def push_of(group, rows, i, r, aim, second):
-    """What a row's gradient counts with in the step towards s z = aim, less the product of the steps before as far as
-    `second` is 1."""
-    left = aim - second * rows.ds[i, r] * rows.dz[i, r]
-    return group.on[i, r] * (left + rows.z[i, r] * (rows.g[i, r] + rows.s[i, r])) * rows.per_s[i, r]
+def push_of(rows, i, r, first, aim, second):
+    """What a row's gradient counts with in the `first` step, towards s z = 0, and in the one towards s z = aim, less the
+    product of the steps before as far as `second` is 1."""
+    if first:
+        return rows.q[i, r]
+    return rows.q[i, r] + (aim - second * rows.ds[i, r]) * rows.per_s[i, r]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_force(sizes, group, rows, i, x, u, aim, second, w):
+def put_force(sizes, group, rows, i, x, u, first, aim, second, w):
     """w (4 A + 1,) = the sum of q grad g of step i with the node x (3 A,) and the controls u (A+1,); q as in `push_of`."""
     axes = len(sizes.axes)
     more, h = 8 * axes, u[axes]
     bent = bent_at(sizes, group, i)
-    q_v = push_of(group, rows, i, more + FEED_NODE, aim, second) * group.feed_node[i]
-    q_1 = push_of(group, rows, i, more + FEED_ROWS, aim, second) * rows.per_radius[i, 0]
-    q_2 = push_of(group, rows, i, more + FEED_ROWS + 1, aim, second) * rows.per_radius[i, 1]
-    q_3 = push_of(group, rows, i, more + FEED_ROWS + 2, aim, second) * rows.per_radius[i, 2]
-    q_p = push_of(group, rows, i, more + TUBE_NODE, aim, second) + group.centre[i]
-    q_c1 = push_of(group, rows, i, more + TUBE_NODE + 1, aim, second)
-    q_c2 = push_of(group, rows, i, more + TUBE_NODE + 2, aim, second)
-    longer = push_of(group, rows, i, more + H_MAX, aim, second)
-    total = (longer - push_of(group, rows, i, more + H_MIN, aim, second)) * group.per_h[i]
+    q_v = push_of(rows, i, more + FEED_NODE, first, aim, second) * group.feed_node[i]
+    q_1 = push_of(rows, i, more + FEED_ROWS, first, aim, second) * rows.per_radius[i, 0]
+    q_2 = push_of(rows, i, more + FEED_ROWS + 1, first, aim, second) * rows.per_radius[i, 1]
+    q_3 = push_of(rows, i, more + FEED_ROWS + 2, first, aim, second) * rows.per_radius[i, 2]
+    q_p = push_of(rows, i, more + TUBE_NODE, first, aim, second) + group.centre[i]
+    q_c1 = push_of(rows, i, more + TUBE_NODE + 1, first, aim, second)
+    q_c2 = push_of(rows, i, more + TUBE_NODE + 2, first, aim, second)
+    longer = push_of(rows, i, more + H_MAX, first, aim, second)
+    total = (longer - push_of(rows, i, more + H_MIN, first, aim, second)) * group.per_h[i]
     for k in range(axes):
         v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        f_j = _pushed(sizes, group, rows, i, 0, k, aim, second)
-        f_a = _pushed(sizes, group, rows, i, 1, k, aim, second)
-        f_mid = _pushed(sizes, group, rows, i, 2, k, aim, second)
-        f_v = _pushed(sizes, group, rows, i, 3, k, aim, second) + q_v * v
+        f_j = _pushed(sizes, group, rows, i, 0, k, first, aim, second)
+        f_a = _pushed(sizes, group, rows, i, 1, k, first, aim, second)
+        f_mid = _pushed(sizes, group, rows, i, 2, k, first, aim, second)
+        f_v = _pushed(sizes, group, rows, i, 3, k, first, aim, second) + q_v * v
         (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
         f_1, f_2, f_3 = q_1 * v_1, q_2 * v_2, q_3 * v_3
         f_c1, f_c2 = q_c1 * rows.n[i, 1, k], q_c2 * rows.n[i, 2, k]
@@ -309,16 +310,16 @@ def put_force(sizes, group, rows, i, x, u, aim, second, w):
         total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3
         total += THIRD * (v * f_c1 + (2.0 * v + h * a) * f_c2)
     if sizes.any_normal:
-        q = push_of(group, rows, i, more + NORMAL_NODE, aim, second) * group.normal_node[i]
+        q = push_of(rows, i, more + NORMAL_NODE, first, aim, second) * group.normal_node[i]
         turn = turn_of(axes, x)
         for k in range(axes):
             f = q * (x[2 * axes + k] - turn * x[axes + k])
             w[axes + k] -= turn * f
             w[2 * axes + k] += f
     if bent:
-        node = push_of(group, rows, i, more + ORDER_NODE, aim, second) / group.pace[i]
-        mid = push_of(group, rows, i, more + ORDER_MID, aim, second) / group.pace[i]
-        arc = push_of(group, rows, i, more + ARC, aim, second) * group.per_step[i]
+        node = push_of(rows, i, more + ORDER_NODE, first, aim, second) / group.pace[i]
+        mid = push_of(rows, i, more + ORDER_MID, first, aim, second) / group.pace[i]
+        arc = push_of(rows, i, more + ARC, first, aim, second) * group.per_step[i]
         for k in range(axes):
             v, a, j = x[axes + k], x[2 * axes + k], u[k]
             at_mid = tangent_of(sizes, group, rows, i, 1, k)
@@ -330,24 +331,24 @@ def put_force(sizes, group, rows, i, x, u, aim, second, w):
             w[3 * axes + k] += h * h * h * SIXTH * f_next
             total += (v + h * (a + 0.5 * h * j)) * f_next + ((v + h * a) * arc - 0.5 * a * mid) * at_mid
     if sizes.any_switch:
-        q = push_of(group, rows, i, more + SWITCH, aim, second) * group.switch[i]
+        q = push_of(rows, i, more + SWITCH, first, aim, second) * group.switch[i]
         for k in range(axes):
             w[k] += q * x[axes + k]
             w[axes + k] += q * (x[k] - group.switch_at[i, k])
     w[4 * axes] = total
     if sizes.any_own:
         for r in range(sizes.rows - more - NORMAL_ROWS):
-            q = push_of(group, rows, i, more + NORMAL_ROWS + r, aim, second)
+            q = push_of(rows, i, more + NORMAL_ROWS + r, first, aim, second)
             for k in range(len(sizes.step)):
                 w[k] += q * rows.own[i, r, k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _pushed(sizes, group, rows, i, m, k, aim, second):
+def _pushed(sizes, group, rows, i, m, k, first, aim, second):
     """What the two rows of an axis push its number of that vector by."""
     axes = len(sizes.axes)
-    up = push_of(group, rows, i, 2 * m * axes + k, aim, second)
-    return (up - push_of(group, rows, i, (2 * m + 1) * axes + k, aim, second)) * group.per_box[m, k]
+    up = push_of(rows, i, 2 * m * axes + k, first, aim, second)
+    return (up - push_of(rows, i, (2 * m + 1) * axes + k, first, aim, second)) * group.per_box[m, k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)

@@ -88,6 +88,7 @@ class Work(NamedTuple):
     s: FloatArray
     z: FloatArray
     per_s: FloatArray
+    q: FloatArray
     ds: FloatArray
     dz: FloatArray
     moves: FloatArray
@@ -113,7 +114,7 @@ def work_of(sizes: Sizes, bends: Bends) -> Work:
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
     bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
-    shapes = [(N, R)] * 6 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
+    shapes = [(N, R)] * 7 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
     return Work(*(np.zeros((*shape, W)) for shape in shapes))
@@ -183,6 +184,7 @@ def rows_in(sizes, work, place):
         wide2(work.s, w, sizes.rows),
         wide2(work.z, w, sizes.rows),
         wide2(work.per_s, w, sizes.rows),
+        wide2(work.q, w, sizes.rows),
         wide2(work.ds, w, sizes.rows),
         wide2(work.dz, w, sizes.rows),
         place,
@@ -209,6 +211,7 @@ def room_of(sizes, work, x):
         matrix(x, sizes.control, sizes.state),
         vector(x, sizes.state),
         vector(x, sizes.state),
+        vector(x, sizes.state),
         vector(x, sizes.control),
         wide1(work.slope, sizes.width),
     )
@@ -233,45 +236,29 @@ def scratch_of(sizes, bends):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _start(sizes, group, rows, time, tuning):
-    """Slacks and multipliers of a start. Returns how many rows there are."""
-    N, R = sizes.steps, sizes.rows
-    count = 0.0 * time
-    for i in range(N):
-        for r in range(R):
+def put_present(sizes, group, rows):
+    """Set which rows there are, with slacks of 1. Returns how many."""
+    count = 0.0 * group.real[0]
+    for i in range(sizes.steps):
+        for r in range(sizes.rows):
+            rows.s[i, r], rows.per_s[i, r] = 1.0, group.on[i, r]
             count += group.on[i, r]
-    for i in range(N):
-        for r in range(R):
-            there = group.on[i, r] > 0.0
-            s = where(there, larger(-rows.g[i, r], tuning.first_slack), 1.0 + 0.0 * time)
-            rows.s[i, r], rows.per_s[i, r] = s, 1.0 / s
-            rows.z[i, r] = where(there, tuning.first_gap * time / (count * s), 0.0 * time)
     return count
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _step(sizes, rows, along, dual):
-    """Slacks and multipliers after the shares `along` and `dual` of their steps."""
-    N, R = sizes.steps, sizes.rows
-    for i in range(N):
-        for r in range(R):
-            rows.s[i, r] += along * rows.ds[i, r]
-            rows.z[i, r] += dual * rows.dz[i, r]
-            rows.per_s[i, r] = 1.0 / rows.s[i, r]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _look(sizes, rows, zero):
-    """The sum of s z, the largest row, and the most that is missing of g + s = 0 of active ones (z > s)."""
-    N, R = sizes.steps, sizes.rows
-    products, broken, missed = zero, zero, zero
-    for i in range(N):
-        for r in range(R):
-            g, s, z = rows.g[i, r], rows.s[i, r], rows.z[i, r]
-            products += s * z
-            broken = larger(g, broken)
-            missed = larger(where(z > s, g + s, zero), missed)
-    return products, broken, missed
+def _start(sizes, rows, count, time, tuning):
+    """Slacks and multipliers of a start. Returns the sum of s z, and the largest row."""
+    products, broken = 0.0 * time, 0.0 * time
+    for i in range(sizes.steps):
+        for r in range(sizes.rows):
+            there, g = rows.per_s[i, r] > 0.0, rows.g[i, r]
+            s = where(there, larger(-g, tuning.first_slack), 1.0)
+            z = where(there, tuning.first_gap * time / (count * s), 0.0)
+            per = where(there, 1.0 / s, 0.0)
+            rows.s[i, r], rows.z[i, r], rows.per_s[i, r], rows.q[i, r] = s, z, per, z * (g + s) * per
+            products, broken = products + s * z, larger(g, broken)
+    return products, broken
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -338,17 +325,18 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     for k in range(S):
         lambda_end[k] = zero
     looking = room.y, wide2(work.nearest, width, _THREE), wide1(work.top, width)
-    put_rows(sizes, group, bends, x, u, rows, looking, scratch)
+    count = put_present(sizes, group, rows)
+    put_rows(sizes, group, bends, x, u, rows, zero, zero, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)
-    count = _start(sizes, group, rows, time, tune)
+    products, broken = _start(sizes, rows, count, time, tune)
+    missed = zero + np.inf  # nothing has ended before the first step
     prox, before, close, still, settled = tune.prox, time, zero, zero, zero
     rho, off_before, slow = zero + END, zero + np.inf, zero
     active = zero
     for lane in range(len(sizes.width)):
         active = put(active, lane, 1.0 if bends.steps[lane] else 0.0)
     for iteration in range(ITERATIONS + 1):
-        products, broken, missed = _look(sizes, rows, zero)
         now = _durations(sizes, group, u, zero)
         close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)
         rests = where(magnitude(now - before) <= STILL * tune.gap * time, still + 1.0, zero)
@@ -375,23 +363,25 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
                     active = put(active, lane, 0.0)
         if not anywhere(active > 0.0):
             break
-        bad = factor_steps(sizes, group, bends, x, u, gap, rows, tune.pull + prox, rho, factor, room, scratch)
+        bad = factor_steps(
+            sizes, group, bends, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
+        )
         if anywhere(active * bad > 0.0):
             for lane in range(len(sizes.width)):
                 if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
                     _end(sizes, lane, False, iteration, group, rows, x, u, ends)
                     active = put(active, lane, 0.0)
-        aim, along, dual, second = zero, zero, zero, zero
-        for phase in range(2):
-            backward(sizes, group, x, u, rows, tune.pull, aim, second, lambda_end, factor, room)
-            along, dual, s_dz, z_ds, ds_dz = forward(
-                sizes, group, x, u, gap, rows, aim, second, factor, room, change
-            )
-            if phase == 0:
-                left = products + dual * s_dz + along * z_ds + along * dual * ds_dz
-                share = left / products
-                aim = larger(share * share * left, tune.gap * time) / count
-                second = where(along > PREDICTED, 1.0 + zero, zero)
+        along, dual, s_dz, z_ds, ds_dz = forward(
+            sizes, group, x, u, gap, rows, True, zero, zero, factor, room, change
+        )
+        left = products + dual * s_dz + along * z_ds + along * dual * ds_dz
+        share = left / products
+        aim = larger(share * share * left, tune.gap * time) / count
+        second = where(along > PREDICTED, 1.0 + zero, zero)
+        backward(sizes, group, x, u, rows, tune.pull, aim, second, lambda_end, factor, room)
+        along, dual, _, _, _ = forward(
+            sizes, group, x, u, gap, rows, False, aim, second, factor, room, change
+        )
         along, dual = where(active > 0.0, along, zero), where(active > 0.0, dual, zero)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
@@ -400,6 +390,5 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
                 x[i, k] += along * factor.dx[i, k]
             for k in range(C):
                 u[i, k] += along * factor.du[i, k]
-        put_rows(sizes, group, bends, x, u, rows, looking, scratch)
+        products, broken, missed = put_rows(sizes, group, bends, x, u, rows, along, dual, looking, scratch)
         gap_most, off = gaps(sizes, group, x, u, gap)
-        _step(sizes, rows, along, dual)

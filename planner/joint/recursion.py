@@ -49,7 +49,8 @@ class Room(NamedTuple):
     PB: FloatArray  # (S, C)
     Y: FloatArray  # (C, S)
     by_h: FloatArray  # (S,)
-    one: FloatArray  # (S,)
+    rest: FloatArray  # (S,)
+    lambda_of: FloatArray  # (S,) of a node
     force: FloatArray  # (C,)
     slope: FloatArray  # (R,)
 
@@ -132,13 +133,57 @@ def _factor_step(sizes, u, by_h, room, K, L, bad):
     return bad
 
 
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _backward_step(sizes, group, i, x, u, rows, pull, first, aim, second, end, factor, p, room):
+    """The controls of step i where its node stays, into factor.du; p (S,), lambda behind it, becomes that before it."""
+    axes, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
+    w, rest, by_h, force = room.row, room.rest, room.by_h, room.force
+    h, last = u[i, axes], group.last[i] > 0.0
+    if anywhere(last):
+        for s in range(S):
+            p[s] = where(last, end[s], p[s])
+    put_force(sizes, group, rows, i, x[i], u[i], first, aim, second, w)
+    per = group.per_h[i]
+    w[S + axes] += group.real[i] + 2.0 * pull * (h - group.h[i]) * per * per
+    for k in range(axes):
+        w[S + k] += group.smooth[i] * u[i, k] * group.per_box[0, k] * group.per_box[0, k]
+    for s in range(S):
+        rest[s] = p[s] + factor.push[i, s]
+    step_of_h(x[i], u[i], axes, by_h)
+    total = w[S + axes]
+    for s in range(S):
+        total += by_h[s] * rest[s]
+    force[axes] = total
+    for k in range(axes):
+        p0, v0, a0 = rest[k], rest[axes + k], rest[2 * axes + k]
+        force[k] = w[S + k] + h * (a0 + h * (0.5 * v0 + h * p0 * SIXTH))
+        p[k], p[axes + k] = w[k] + p0, w[axes + k] + h * p0 + v0
+        p[2 * axes + k] = w[2 * axes + k] + h * (0.5 * h * p0 + v0) + a0
+    K, L = factor.K[i], factor.L[i]
+    for s in range(S):
+        for c in range(C):
+            p[s] += K[c, s] * force[c]
+    for c in range(C):
+        total = -force[c]
+        for m in range(c):
+            total -= L[c, m] * factor.du[i, m]
+        factor.du[i, c] = total
+    for c in range(C - 1, -1, -1):
+        total = factor.du[i, c] * L[c, c]
+        for m in range(c + 1, C):
+            total -= L[m, c] * factor.du[i, m]
+        factor.du[i, c] = total
+
+
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, scratch):
-    """The recursion into `factor`: pull, the weight of (dh/h)^2, and rho of the last node. Where it breaks down what is
-    returned is not 0."""
+def factor_steps(sizes, group, bends, x, u, gap, rows, pull, prox, rho, end, factor, room, scratch):
+    """The recursion into `factor`, and the controls of the first step, towards s z = 0, as `backward`: pull, the weight of
+    (h - its guess)^2, prox, that of dh^2 beside, and rho of the last node. Where it breaks down what is returned is not
+    0."""
     axes, S, N = len(sizes.axes), len(sizes.state), sizes.steps
     P, W = room.P, room.W
     clear(P)
+    clear(room.lambda_of)
     bad = 0.0 * pull
     for i in range(N - 1, -1, -1):
         last = group.last[i] > 0.0
@@ -156,12 +201,13 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
             add_normal(sizes, group, rows, i, x, u, W)
         if sizes.any_laws:
             add_laws(sizes, group, bends, rows, i, x, u, W, scratch)
-        W[S + axes, S + axes] += 2.0 * pull * group.per_h[i] * group.per_h[i]
+        W[S + axes, S + axes] += 2.0 * (pull + prox) * group.per_h[i] * group.per_h[i]
         for k in range(axes):
             W[S + k, S + k] += group.smooth[i] * group.per_box[0, k] * group.per_box[0, k]
             W[S + k, S + k] += 1.0 - group.real[i]
         step_of_h(x[i], u[i], axes, room.by_h)
         bad = _factor_step(sizes, u[i], room.by_h, room, factor.K[i], factor.L[i], bad)
+        _backward_step(sizes, group, i, x, u, rows, pull, True, pull, pull, end, factor, room.lambda_of, room)
     return bad
 
 
@@ -169,51 +215,15 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, rho, factor, room, 
 def backward(sizes, group, x, u, rows, pull, aim, second, end, factor, room):
     """The controls of the Newton step towards s z = aim (curvature.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
     is lambda of the last node."""
-    axes, S, C, N = len(sizes.axes), len(sizes.state), len(sizes.control), sizes.steps
-    p, rest, force, w = room.one, room.by_h, room.force, room.row
-    by_h = room.PA[0]
-    for s in range(S):
-        p[s] = 0.0
-    for i in range(N - 1, -1, -1):
-        h, last = u[i, axes], group.last[i] > 0.0
-        if anywhere(last):
-            for s in range(S):
-                p[s] = where(last, end[s], p[s])
-        put_force(sizes, group, rows, i, x[i], u[i], aim, second, w)
-        per = group.per_h[i]
-        w[S + axes] += group.real[i] + 2.0 * pull * (h - group.h[i]) * per * per
-        for k in range(axes):
-            w[S + k] += group.smooth[i] * u[i, k] * group.per_box[0, k] * group.per_box[0, k]
-        for s in range(S):
-            rest[s] = p[s] + factor.push[i, s]
-        step_of_h(x[i], u[i], axes, by_h)
-        total = w[S + axes]
-        for s in range(S):
-            total += by_h[s] * rest[s]
-        force[axes] = total
-        for k in range(axes):
-            p0, v0, a0 = rest[k], rest[axes + k], rest[2 * axes + k]
-            force[k] = w[S + k] + h * (a0 + h * (0.5 * v0 + h * p0 * SIXTH))
-            p[k], p[axes + k] = w[k] + p0, w[axes + k] + h * p0 + v0
-            p[2 * axes + k] = w[2 * axes + k] + h * (0.5 * h * p0 + v0) + a0
-        K, L = factor.K[i], factor.L[i]
-        for s in range(S):
-            for c in range(C):
-                p[s] += K[c, s] * force[c]
-        for c in range(C):
-            total = -force[c]
-            for m in range(c):
-                total -= L[c, m] * factor.du[i, m]
-            factor.du[i, c] = total
-        for c in range(C - 1, -1, -1):
-            total = factor.du[i, c] * L[c, c]
-            for m in range(c + 1, C):
-                total -= L[m, c] * factor.du[i, m]
-            factor.du[i, c] = total
+    clear(room.lambda_of)
+    for i in range(sizes.steps - 1, -1, -1):
+        _backward_step(
+            sizes, group, i, x, u, rows, pull, False, aim, second, end, factor, room.lambda_of, room
+        )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def forward(sizes, group, x, u, gap, rows, aim, second, factor, room, end):
+def forward(sizes, group, x, u, gap, rows, first, aim, second, factor, room, end):
     """The step of nodes and controls into `factor`, and of slacks and multipliers into `rows`. Returns the shares of it that
     keep slacks and multipliers positive, and the sums of s dz, z ds and ds dz; end (S,) = the step of the last node."""
     axes, S, C, N, R = (
@@ -254,11 +264,14 @@ def forward(sizes, group, x, u, gap, rows, aim, second, factor, room, end):
                 dx[i + 1, s] = where(last, 0.0, dx[i + 1, s])
         put_slopes(sizes, group, rows, i, x[i], u[i], d, slope)
         for r in range(R):
-            on, s_r, z_r = group.on[i, r], rows.s[i, r], rows.z[i, r]
-            ds = on * (-(rows.g[i, r] + s_r) - slope[r])
-            left = aim - second * rows.ds[i, r] * rows.dz[i, r]
-            dz = on * ((left - z_r * ds) * rows.per_s[i, r] - z_r)
-            rows.ds[i, r], rows.dz[i, r] = ds, dz
+            s_r, z_r, per = rows.s[i, r], rows.z[i, r], rows.per_s[i, r]
+            ds = where(per > 0.0, -(rows.g[i, r] + s_r) - slope[r], 0.0)
+            left = none if first else aim - second * rows.ds[i, r]
+            dz = (left - z_r * ds) * per - z_r
+            if first:
+                rows.ds[i, r] = ds * dz
+            else:
+                rows.ds[i, r], rows.dz[i, r] = ds, dz
             s_dz, z_ds, ds_dz = s_dz + s_r * dz, z_ds + z_r * ds, ds_dz + ds * dz
             farther = -ds * under_s > over_s * s_r
             over_s, under_s = where(farther, -ds, over_s), where(farther, s_r, under_s)

@@ -106,8 +106,9 @@ class Rows(NamedTuple):
     g: FloatArray  # (N, R)
     s: FloatArray  # (N, R)
     z: FloatArray  # (N, R)
-    per_s: FloatArray  # (N, R) 1/s
-    ds: FloatArray  # (N, R)
+    per_s: FloatArray  # (N, R) 1/s; 0 for a row that is not there, whose z stays 0
+    q: FloatArray  # (N, R) z (g + s)/s
+    ds: FloatArray  # (N, R) after the predictor ds dz
     dz: FloatArray  # (N, R)
     place: FloatArray  # (N, 3) of the node and the inner control points along the leg
     moves: FloatArray  # (N, 3) 1 where these move with the point
@@ -359,13 +360,16 @@ def tangent_of(sizes, group, rows, i, c, k):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_rows(sizes, group, bends, x, u, rows, room, scratch):
+def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
-    on arcs begins. A row that is not there is -1. room: y (13, A), nearest (N, 3) and top (N,)."""
+    on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps. Returns the sum of s z,
+    the largest row, and the most that is missing of g + s = 0 of active ones (z > s). A row that is not there is -1.
+    room: y (13, A), nearest (N, 3) and top (N,)."""
     axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
     y, nearest, top = room
     more = 8 * axes
     put_places(sizes, group, x, u, rows, nearest, top)
+    products, broken, missed = 0.0 * along, 0.0 * along, 0.0 * along
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
         bent = bent_at(sizes, group, i)
@@ -425,4 +429,13 @@ def put_rows(sizes, group, bends, x, u, rows, room, scratch):
                 if i < bends.steps[lane]:
                     _put_laws(sizes, bends, i, lane, group, x, u, rows, scratch)
         for r in range(R):
-            g[r] = where(group.on[i, r] > 0.0, g[r], -1.0)
+            there = rows.per_s[i, r] > 0.0
+            g_r = where(there, g[r], -1.0)
+            s_r, z_r = rows.s[i, r] + along * rows.ds[i, r], rows.z[i, r] + dual * rows.dz[i, r]
+            per = where(there, 1.0 / s_r, 0.0)
+            g[r], rows.s[i, r], rows.z[i, r], rows.per_s[i, r] = g_r, s_r, z_r, per
+            rows.q[i, r] = z_r * (g_r + s_r) * per
+            products += s_r * z_r
+            broken = larger(g_r, broken)
+            missed = larger(where(z_r > s_r, g_r + s_r, 0.0), missed)
+    return products, broken, missed

@@ -10,7 +10,7 @@ from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import size, vector, wide1, wide2, wide3
 from planner.joint.curvature import put_model, put_slopes
 from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
-from planner.joint.interior_point import Work, lanes_of, room_of, rows_in, scratch_of, work_of
+from planner.joint.interior_point import Work, lanes_of, put_present, room_of, rows_in, scratch_of, work_of
 from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
 from planner.joint.recursion import Factor, backward, factor_steps, forward, gaps
 from planner.joint.rows import put_rows
@@ -47,7 +47,8 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
     gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, bends)
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
-        put_rows(sizes, group, bends, at, control, rows, looking, scratch)
+        put_present(sizes, group, rows)
+        put_rows(sizes, group, bends, at, control, rows, 0.0, 0.0, looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)
     elif what == NEWTON:
@@ -59,9 +60,12 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
             wide2(work.du, w, sizes.control),
         )
         step, (pull, rho, aim) = vector(at, sizes.state), settings
-        bad = factor_steps(sizes, group, bends, at, control, gap, rows, pull, rho, factor, room, scratch)
-        backward(sizes, group, at, control, rows, pull, aim, 0.0, wide1(end, w), factor, room)
-        forward(sizes, group, at, control, gap, rows, aim, 0.0, factor, room, step)
+        last = wide1(end, w)
+        bad = factor_steps(
+            sizes, group, bends, at, control, gap, rows, pull, 0.0, rho, last, factor, room, scratch
+        )
+        backward(sizes, group, at, control, rows, pull, aim, 0.0, last, factor, room)
+        forward(sizes, group, at, control, gap, rows, False, aim, 0.0, factor, room, step)
         for s in range(len(sizes.state)):
             factor.dx[N, s] = step[s]
         return bad

@@ -101,8 +101,9 @@ def test_the_recursion_solves_the_system_of_all_steps():
     look(alone)
     there = group.on > 0.0
     work.s[:] = np.where(there, rng.uniform(0.5, 1.0, there.shape), 1.0)
-    work.per_s[:] = 1.0 / work.s
+    work.per_s[:] = there / work.s
     work.z[:] = np.where(there, rng.uniform(0.1, 1.0, there.shape), 0.0)
+    work.q[:] = work.z * (work.g + work.s) * work.per_s
     gap = 1e-3 * rng.normal(size=work.gap.shape)
     gap[:, 2::A] = 0.0  # of the axis that the kernel has beside nothing else holds the jerk
     work.gap[:] = gap

@@ -1,0 +1,149 @@
+"""What the search kernel takes per step and iteration: one thread, on the windows that plans of some jobs ask for.
+
+    python -m benchmarks.solvers.search_kernel [--job NAME ...] [--windows N] [--passes N]    into results/search-kernel.json and .md
+
+Every window that a plan asks for is written down, with the groups that they were solved in; `filled` is the share of the
+work of those groups that was of windows that had not ended, by the steps and iterations of the longest. The longest windows
+are then solved again, processor seconds, the least of some passes: four of the same side by side (`lanes`), one alone in a
+group, and one on single numbers, which is the same kernel made for groups of one. Reading windows into lanes and back is in all of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import planner
+from benchmarks.cost.growth import relief
+from benchmarks.jobs import problems
+from benchmarks.record import markdown, write_results
+from planner.base.lanes import WIDTH
+from planner.base.threads import use_threads
+from planner.joint import groups
+from planner.joint.window_solver import Asked, solve_windows
+from planner.machine import Machine, load_machine
+from planner.nc.program import Program
+from planner.nc.reader import parse_program, read_program
+
+EXAMPLE = Path(planner.__file__).parent / "examples" / "bracket.ngc"
+
+
+def jobs() -> dict[str, Callable[[], tuple[Program, Machine]]]:
+    """Program and machine of each job."""
+    mill = load_machine("mill")
+    return {
+        "zig-zag, lines": lambda: (problems.zigzag(200), mill),
+        "relief 2,000": lambda: (parse_program(relief(2_000), mill), mill),
+        "arcs": lambda: (problems.arcs(), problems.machine()),
+        "bracket": lambda: (read_program(str(EXAMPLE), mill), mill),
+        "five axes": lambda: (problems.five_points(), problems.five_points_machine()),
+    }
+
+
+def copy_of(asked: Asked) -> Asked:
+    """The same window to be solved once more."""
+    window = asked.window
+    fresh = {name: getattr(window, name).copy() for name in ("x", "u", "place")}
+    return asked._replace(window=window._replace(**fresh))
+
+
+def windows_of(program: Program, machine: Machine) -> tuple[list[Asked], float]:
+    """The windows that a plan asks for, as they were asked for, and the share of their groups that was filled."""
+    seen, work, room = list[Asked](), 0, 0
+    usual = groups.solve_windows
+
+    def solve(asked: list[Asked]) -> Any:
+        nonlocal work, room
+        seen.extend(copy_of(one) for one in asked)
+        solved = usual(asked)
+        steps = [len(one.window.u) for one in asked]
+        iterations = [one.iterations for one in solved]
+        work += sum(n * many for n, many in zip(steps, iterations, strict=True))
+        room += WIDTH * max(steps) * max(iterations)
+        return solved
+
+    groups.solve_windows = solve
+    try:
+        planner.plan(program, machine)
+    finally:
+        groups.solve_windows = usual
+    return seen, work / room
+
+
+def least(asked: list[Asked], width: int, passes: int) -> float:
+    """Processor seconds per step and iteration of windows that are solved `width` at a time, the least of some passes [s]."""
+    took = []
+    for turn in range(passes + 1):
+        copies = [copy_of(one) for one in asked]
+        began = time.process_time()
+        solved = solve_windows(copies, width)
+        seconds = time.process_time() - began
+        work = sum(len(one.window.u) * each.iterations for one, each in zip(asked, solved, strict=True))
+        if turn:  # the first one may compile
+            took.append(seconds / work)
+    return min(took)
+
+
+def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
+    """One job."""
+    use_threads(1)
+    seen, filled = windows_of(*jobs()[name]())
+    longest = sorted(seen, key=lambda one: -len(one.window.u))[:windows]
+    rows = [
+        (least([one] * WIDTH, WIDTH, passes), least([one], WIDTH, passes), least([one], 1, passes))
+        for one in longest
+    ]
+    lanes, alone, single = (1e6 * sum(row[k] for row in rows) / len(rows) for k in range(3))
+    return {
+        "job": name,
+        "axes": longest[0].window.u.shape[1] - 1,
+        "windows": len(seen),
+        "steps": len(longest[0].window.u),
+        "filled": filled,
+        "us_lanes": lanes,
+        "us_alone": alone,
+        "us_single": single,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--job", nargs="+", default=list(jobs()), choices=list(jobs()))
+    parser.add_argument("--windows", type=int, default=4, help="of the longest, how many are solved again")
+    parser.add_argument("--passes", type=int, default=3)
+    asked = parser.parse_args()
+    rows = []
+    for name in asked.job:
+        rows.append(measured(name, asked.windows, asked.passes))
+        print(rows[-1], flush=True)
+    columns = [
+        "job",
+        "axes",
+        "windows",
+        "steps of the longest",
+        "filled",
+        "us, lanes",
+        "us, alone",
+        "us, single numbers",
+    ]
+    table = [
+        [
+            row["job"],
+            str(row["axes"]),
+            f"{row['windows']:,}",
+            f"{row['steps']:,}",
+            f"{row['filled']:.0%}",
+            *(f"{row[f'us_{kind}']:.2f}" for kind in ("lanes", "alone", "single")),
+        ]
+        for row in rows
+    ]
+    write_results("search-kernel", {"rows": rows}, markdown(columns, table))
+
+
+if __name__ == "__main__":
+    main()

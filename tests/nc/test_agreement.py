@@ -89,8 +89,12 @@ def assert_sweeps_reach_ends(program: Program) -> None:
     assert np.abs(off).max(initial=0.0) < 1.1e-6
 
 
+needs_programs = pytest.mark.skipif(not PROGRAMS, reason=f"no folder of real programs at {SHARED}")
+
+
 @pytest.mark.slow
 @needs_oracle
+@needs_programs
 def test_real_programs_agree(tmp_path: Path) -> None:
     assert len(PROGRAMS) > 40, "the collection of real programs is not complete"
     read: dict[Path, Program] = {}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from oracle import SHARED, ask_oracle, needs_oracle
-from test_agreement import MACHINE, PROGRAMS, assert_same_motion, offsets_in_inches, random_program
+from test_agreement import MACHINE, PROGRAMS, assert_same_motion, needs_programs, offsets_in_inches, random_program
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
@@ -243,6 +243,7 @@ REAL_MAX = 200_000  # bytes: enough of the collection, in seconds
 
 @pytest.mark.slow
 @needs_oracle
+@needs_programs
 def test_the_control_reads_real_programs_as_we_do(tmp_path: Path) -> None:
     """Programs of many post-processors, and those of the comparison with other planners."""
     rng = np.random.default_rng(78)

@@ -10,7 +10,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from oracle import SHARED, ask_oracle, needs_oracle
-from test_agreement import MACHINE, PROGRAMS, assert_same_motion, needs_programs, offsets_in_inches, random_program
+from test_agreement import (
+    MACHINE,
+    PROGRAMS,
+    assert_same_motion,
+    needs_programs,
+    offsets_in_inches,
+    random_program,
+)
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError

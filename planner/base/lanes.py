@@ -1,11 +1,7 @@
 """Numbers side by side for kernels: a value of `WIDTH` float64 that one instruction of the processor works on.
 
-A kernel that is written for numbers works on lanes as well: with `wide1` to `wide3` an array (.., WIDTH) of float64 becomes
-a view (..) of lanes, and with an array (.., 1) the same kernel works on single numbers, which is its reference. What it may not do
-is branch on a comparison of lanes: that gives a mask, by which `where` chooses and which `anywhere` looks into.
-
-`vector` and `matrix` are pieces of memory of the function that asks for them, on its stack. Their sizes, like all sizes
-that shall be numbers in machine code, so that loops are unrolled, are lengths of tuples (`size`).
+A kernel that is written for numbers works on lanes as well, in arrays of them (views.py). What it may not do is branch on a
+comparison of lanes: that gives a mask, by which `where` chooses and which `anywhere` looks into.
 """
 
 # mypy: ignore-errors
@@ -16,7 +12,7 @@ from typing import Any, ClassVar
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import (
     intrinsic,
     lower_builtin,
@@ -26,13 +22,12 @@ from numba.extending import (
 )
 
 
-def _code(function: Any) -> Any:
+def intrinsic_of(function: Any) -> Any:
     """numba's `intrinsic`, for type checkers that do not look inside."""
     return intrinsic(function)
 
 
 WIDTH = 4  # float64 in a register of AVX2
-_BYTES = 8  # to which lanes are aligned in memory: numpy promises no more
 
 
 class _Lanes(types.Type):
@@ -56,13 +51,13 @@ class _Mask(types.Type):
 
 
 lanes, mask = _Lanes(), _Mask()
-_DOUBLES, _BITS = ir.VectorType(ir.DoubleType(), WIDTH), ir.VectorType(ir.IntType(1), WIDTH)
+DOUBLES, _BITS = ir.VectorType(ir.DoubleType(), WIDTH), ir.VectorType(ir.IntType(1), WIDTH)
 
 
 @register_model(_Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, _DOUBLES)
+        super().__init__(dmm, fe_type, DOUBLES)
 
 
 @register_model(_Mask)
@@ -73,9 +68,9 @@ class _MaskModel(models.PrimitiveModel):
 
 def _spread(builder, value):
     """One number in all lanes."""
-    one = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), value, ir.IntType(32)(0))
+    one = builder.insert_element(ir.Constant(DOUBLES, ir.Undefined), value, ir.IntType(32)(0))
     same = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(one, ir.Constant(_DOUBLES, ir.Undefined), same)
+    return builder.shuffle_vector(one, ir.Constant(DOUBLES, ir.Undefined), same)
 
 
 @lower_cast(types.Number, _Lanes)
@@ -131,14 +126,14 @@ def _of(*given):
     return lanes if lanes in given else types.float64
 
 
-@_code
+@intrinsic_of
 def where(typingctx, condition, a, b):
     """a where the condition holds, else b."""
     of = lanes if condition == mask else _of(a, b)
     return of(condition, of, of), lambda context, builder, sig, args: builder.select(*args)
 
 
-@_code
+@intrinsic_of
 def larger(typingctx, a, b):
     """The larger one of a and b; b where one is no number."""
     of = _of(a, b)
@@ -147,7 +142,7 @@ def larger(typingctx, a, b):
     )
 
 
-@_code
+@intrinsic_of
 def smaller(typingctx, a, b):
     """The smaller one of a and b; b where one is no number."""
     of = _of(a, b)
@@ -170,19 +165,19 @@ def _function(name):
     return lower
 
 
-@_code
+@intrinsic_of
 def root(typingctx, a):
     """The square root."""
     return _of(a)(_of(a)), _function("sqrt")
 
 
-@_code
+@intrinsic_of
 def magnitude(typingctx, a):
     """The absolute value."""
     return _of(a)(_of(a)), _function("fabs")
 
 
-@_code
+@intrinsic_of
 def anywhere(typingctx, condition):
     """Whether it holds in any lane."""
 
@@ -195,7 +190,7 @@ def anywhere(typingctx, condition):
     return types.boolean(condition), lower
 
 
-@_code
+@intrinsic_of
 def pick(typingctx, value, lane):
     """The number in one lane."""
 
@@ -205,7 +200,7 @@ def pick(typingctx, value, lane):
     return types.float64(value, types.intp), lower
 
 
-@_code
+@intrinsic_of
 def put(typingctx, value, lane, number):
     """The value with another number in one lane."""
 
@@ -213,189 +208,3 @@ def put(typingctx, value, lane, number):
         return builder.insert_element(args[0], args[2], args[1]) if value == lanes else args[2]
 
     return value(value, types.intp, types.float64), lower
-
-
-class View(types.Type):
-    """An array in memory that lives long enough, which nobody counts the uses of: where it begins, and the sizes of its
-    dimensions behind the first that are no numbers in the machine code.
-
-    inner : of those dimensions the sizes, None where it is not known when it is compiled
-    """
-
-    def __init__(self, dtype, inner, outer=None):
-        self.dtype, self.inner, self.outer = dtype, inner, outer
-        super().__init__(name=f"view({dtype}, {inner}, {outer})")
-
-
-@register_model(View)
-class _ViewModel(models.StructModel):
-    def __init__(self, dmm, fe_type):
-        unknown = [(f"size{d}", types.intp) for d, n in enumerate(fe_type.inner) if n is None]
-        super().__init__(dmm, fe_type, [("data", types.CPointer(fe_type.dtype)), *unknown])
-
-
-def _is_index(index):
-    return isinstance(index, types.Integer) or (
-        isinstance(index, types.BaseTuple) and all(isinstance(one, types.Integer) for one in index)
-    )
-
-
-def _indexed(view, index):
-    """The type of what is at an index."""
-    count = 1 if isinstance(index, types.Integer) else len(index)
-    if count > len(view.inner):
-        return view.dtype
-    return View(view.dtype, view.inner[count:], view.inner[count - 1])
-
-
-@infer_global(operator.getitem)
-class _ViewGet(AbstractTemplate):
-    def generic(self, args, kws):
-        view, index = args
-        if isinstance(view, View) and _is_index(index):
-            return signature(_indexed(view, index), view, index)
-        return None
-
-
-@infer_global(operator.setitem)
-class _ViewSet(AbstractTemplate):
-    def generic(self, args, kws):
-        view, index, _ = args
-        if isinstance(view, View) and _is_index(index):
-            return signature(types.none, view, index, view.dtype)
-        return None
-
-
-def _place(context, builder, view, value, index_type, index):
-    """Where an index is, and the sizes behind the first dimension."""
-    given = cgutils.create_struct_proxy(view)(context, builder, value)
-    sizes = [
-        getattr(given, f"size{d}") if n is None else context.get_constant(types.intp, n)
-        for d, n in enumerate(view.inner)
-    ]
-    one = isinstance(index_type, types.Integer)
-    at = [index] if one else cgutils.unpack_tuple(builder, index, len(index_type))
-    of = [index_type] if one else list(index_type)
-    at = [context.cast(builder, value, kind, types.intp) for value, kind in zip(at, of, strict=True)]
-    offset = at[0]
-    for d, extent in enumerate(sizes):
-        offset = builder.mul(offset, extent)
-        if d + 1 < len(at):
-            offset = builder.add(offset, at[d + 1])
-    return builder.gep(given.data, [offset]), sizes
-
-
-@lower_builtin(operator.getitem, View, types.Any)
-def _get(context, builder, sig, args):
-    view, index = sig.args
-    place, sizes = _place(context, builder, view, args[0], index, args[1])
-    made = sig.return_type
-    if not isinstance(made, View):
-        return builder.load(place, align=_BYTES)
-    out = cgutils.create_struct_proxy(made)(context, builder)
-    out.data = place
-    rest = sizes[len(sizes) - len(made.inner) :]
-    for d, n in enumerate(made.inner):
-        if n is None:
-            setattr(out, f"size{d}", rest[d])
-    return out._getvalue()
-
-
-@lower_builtin(operator.setitem, View, types.Any, types.Any)
-def _set(context, builder, sig, args):
-    view, index, _ = sig.args
-    builder.store(args[2], _place(context, builder, view, args[0], index, args[1])[0], align=_BYTES)
-
-
-@_code
-def clear(typingctx, view):
-    """Make everything 0 in a view whose sizes are all known."""
-    number = view.outer
-    for n in view.inner:
-        number *= n
-
-    def lower(context, builder, sig, args):
-        data = cgutils.create_struct_proxy(view)(context, builder, args[0]).data
-        nothing = context.get_data_type(view.dtype)(None)
-        with cgutils.for_range(builder, context.get_constant(types.intp, number)) as loop:
-            builder.store(nothing, builder.gep(data, [loop.index]), align=_BYTES)
-        return context.get_dummy_value()
-
-    return types.none(view), lower
-
-
-def _viewed(dtype, given):
-    """Type and code of a view of an array, whose sizes behind the first are lengths of tuples, or numbers."""
-    counts = tuple(one.count if isinstance(one, types.UniTuple) else None for one in given)
-    made = View(dtype, counts)
-
-    def lower(context, builder, sig, args):
-        array = context.make_array(sig.args[0])(context, builder, args[0])
-        out = cgutils.create_struct_proxy(made)(context, builder)
-        out.data = builder.bitcast(array.data, out.data.type)
-        for d, n in enumerate(counts):
-            if n is None:
-                setattr(out, f"size{d}", context.cast(builder, args[2 + d], given[d], types.intp))
-        return out._getvalue()
-
-    return made, lower
-
-
-@_code
-def wide1(typingctx, array, width):
-    """An array (N, WIDTH) as a view (N,) of lanes, or (N, 1) of numbers: the length of the tuple `width`. The array has to
-    live as long."""
-    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [])
-    return made(array, width), lower
-
-
-@_code
-def wide2(typingctx, array, width, n):
-    """`wide1` of (N, n, WIDTH); n the length of a tuple, or a number."""
-    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n])
-    return made(array, width, n), lower
-
-
-@_code
-def wide3(typingctx, array, width, n, m):
-    """`wide2` of (N, n, m, WIDTH)."""
-    made, lower = _viewed(types.float64 if width.count == 1 else lanes, [n, m])
-    return made(array, width, n, m), lower
-
-
-def _on_stack(dtype, sizes):
-    """Type and code of a view of memory on the stack, as large as the lengths of the tuples are."""
-    counts = [one.count for one in sizes]
-    made = View(dtype, tuple(counts[1:]), counts[0])
-
-    def lower(context, builder, sig, args):
-        number = 1
-        for count in counts:
-            number *= count
-        with builder.goto_entry_block():
-            data = builder.alloca(ir.ArrayType(context.get_data_type(dtype), number))
-            data.align = 32
-        out = cgutils.create_struct_proxy(made)(context, builder)
-        out.data = builder.bitcast(data, out.data.type)
-        return out._getvalue()
-
-    return made, lower
-
-
-@_code
-def vector(typingctx, like, n):
-    """A view (n,) of memory on the stack for what the view `like` is of, with anything in it; n the length of a tuple."""
-    made, lower = _on_stack(like.dtype, [n])
-    return made(like, n), lower
-
-
-@_code
-def matrix(typingctx, like, n, m):
-    """`vector` (n, m)."""
-    made, lower = _on_stack(like.dtype, [n, m])
-    return made(like, n, m), lower
-
-
-def size(n):
-    """A number that kernels know as they are compiled."""
-    return (0,) * n

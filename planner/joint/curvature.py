@@ -1,8 +1,8 @@
 """What the rows of a step (rows.py) add to a Newton step: their second-order model, the sum of z d2g + (z/s) grad g
-grad g' (recursion.py), the sum of q grad g, and what they change by.
+grad g' (recursion.py); forces.py has the sum of q grad g, and what they change by.
 
 All three go through the vectors y of the rows, which are linear in p, v, a, j for a given h (rows.py). What is f by the
-vectors is, by p, v, a, j and h, for every axis (`_spread`)
+vectors is, by p, v, a, j and h, for every axis (`spread`)
 
     p   f_P + f_C1 + f_C2
     v   f_V + f_MID + f_1 + f_2 + f_3 + h f_C1/3 + 2 h f_C2/3
@@ -14,10 +14,12 @@ and so are the blocks of the model, of what G is between the vectors.
 """
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import clear, pick, put, where
+from planner.base.lanes import pick, put, where
+from planner.base.views import clear
+from planner.joint.lane_rows import copy_lane
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import add_normal_curvature, stay_of
-from planner.joint.rows import (
+from planner.joint.row_kinds import (
     ARC,
     FEED_NODE,
     FEED_ROWS,
@@ -33,16 +35,12 @@ from planner.joint.rows import (
     THIRD,
     TUBE_NODE,
     TWELFTH,
-    bent_at,
-    copy_lane,
-    of_axis,
-    tangent_of,
-    turn_of,
 )
+from planner.joint.rows import bent_at, of_axis, tangent_of, turn_of
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2):
+def spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2):
     """By p, v, a and j what is f by the vectors that are of several of them (module text)."""
     by_v = f_mid + f_1 + f_2 + f_3 + THIRD * h * (f_c1 + 2.0 * f_c2)
     by_a = h * (0.5 * (f_mid + f_2) + 0.25 * f_1 + 0.75 * f_3) + SIXTH * h * h * f_c2
@@ -189,7 +187,7 @@ def put_model(sizes, group, rows, i, x, u, W, row):
         f_c1 = s_c1 * n_1 * n_c1 - slide_1 * t_1 * at_1 + flat_c1 * e_c1
         f_c2 = s_c2 * n_2 * n_c2 - slide_2 * t_2 * at_2 + flat_c2 * e_c2
         total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3 + e_c1 * f_c1 + e_c2 * f_c2
-        W[at, k], W[at, axes + k], W[at, 2 * axes + k], W[at, 3 * axes + k] = _spread(
+        W[at, k], W[at, axes + k], W[at, 2 * axes + k], W[at, 3 * axes + k] = spread(
             h, f_mid, f_1, f_2, f_3, f_c1, f_c2
         )
     W[at, at] = total
@@ -269,147 +267,3 @@ def add_laws(sizes, group, bends, rows, i, x, u, W, scratch):
             for t in range(s + 1):
                 row, column = bends.at[s], bends.at[t]
                 W[row, column] = put(W[row, column], lane, pick(W[row, column], lane) + scratch.W[s, t])
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def push_of(rows, i, r, first, aim, second):
-    """What a row's gradient counts with in the `first` step, towards s z = 0, and in the one towards s z = aim, less the
-    product of the steps before as far as `second` is 1."""
-    if first:
-        return rows.q[i, r]
-    return rows.q[i, r] + (aim - second * rows.ds[i, r]) * rows.per_s[i, r]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_force(sizes, group, rows, i, x, u, first, aim, second, w):
-    """w (4 A + 1,) = the sum of q grad g of step i with the node x (3 A,) and the controls u (A+1,); q as in `push_of`."""
-    axes = len(sizes.axes)
-    more, h = 8 * axes, u[axes]
-    bent = bent_at(sizes, group, i)
-    q_v = push_of(rows, i, more + FEED_NODE, first, aim, second) * group.feed_node[i]
-    q_1 = push_of(rows, i, more + FEED_ROWS, first, aim, second) * rows.per_radius[i, 0]
-    q_2 = push_of(rows, i, more + FEED_ROWS + 1, first, aim, second) * rows.per_radius[i, 1]
-    q_3 = push_of(rows, i, more + FEED_ROWS + 2, first, aim, second) * rows.per_radius[i, 2]
-    q_p = push_of(rows, i, more + TUBE_NODE, first, aim, second) + group.centre[i]
-    q_c1 = push_of(rows, i, more + TUBE_NODE + 1, first, aim, second)
-    q_c2 = push_of(rows, i, more + TUBE_NODE + 2, first, aim, second)
-    longer = push_of(rows, i, more + H_MAX, first, aim, second)
-    total = (longer - push_of(rows, i, more + H_MIN, first, aim, second)) * group.per_h[i]
-    for k in range(axes):
-        v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        f_j = _pushed(sizes, group, rows, i, 0, k, first, aim, second)
-        f_a = _pushed(sizes, group, rows, i, 1, k, first, aim, second)
-        f_mid = _pushed(sizes, group, rows, i, 2, k, first, aim, second)
-        f_v = _pushed(sizes, group, rows, i, 3, k, first, aim, second) + q_v * v
-        (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
-        f_1, f_2, f_3 = q_1 * v_1, q_2 * v_2, q_3 * v_3
-        f_c1, f_c2 = q_c1 * rows.n[i, 1, k], q_c2 * rows.n[i, 2, k]
-        by_p, by_v, by_a, by_j = _spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2)
-        w[k], w[axes + k] = by_p + q_p * rows.n[i, 0, k], by_v + f_v
-        w[2 * axes + k], w[3 * axes + k] = by_a + f_a, by_j + f_j
-        total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3
-        total += THIRD * (v * f_c1 + (2.0 * v + h * a) * f_c2)
-    if sizes.any_normal:
-        q = push_of(rows, i, more + NORMAL_NODE, first, aim, second) * group.normal_node[i]
-        turn = turn_of(axes, x)
-        for k in range(axes):
-            f = q * (x[2 * axes + k] - turn * x[axes + k])
-            w[axes + k] -= turn * f
-            w[2 * axes + k] += f
-    if bent:
-        node = push_of(rows, i, more + ORDER_NODE, first, aim, second) / group.pace[i]
-        mid = push_of(rows, i, more + ORDER_MID, first, aim, second) / group.pace[i]
-        arc = push_of(rows, i, more + ARC, first, aim, second) * group.per_step[i]
-        for k in range(axes):
-            v, a, j = x[axes + k], x[2 * axes + k], u[k]
-            at_mid = tangent_of(sizes, group, rows, i, 1, k)
-            f_next = q_c2 * rows.node[i, 2, k]
-            w[k] += q_c1 * rows.node[i, 1, k] + f_next
-            w[axes + k] += h * (f_next + arc * at_mid) - mid * at_mid
-            w[axes + k] -= node * tangent_of(sizes, group, rows, i, 0, k)
-            w[2 * axes + k] += 0.5 * h * (h * (f_next + arc * at_mid) - mid * at_mid)
-            w[3 * axes + k] += h * h * h * SIXTH * f_next
-            total += (v + h * (a + 0.5 * h * j)) * f_next + ((v + h * a) * arc - 0.5 * a * mid) * at_mid
-    if sizes.any_switch:
-        q = push_of(rows, i, more + SWITCH, first, aim, second) * group.switch[i]
-        for k in range(axes):
-            w[k] += q * x[axes + k]
-            w[axes + k] += q * (x[k] - group.switch_at[i, k])
-    w[4 * axes] = total
-    if sizes.any_own:
-        for r in range(sizes.rows - more - NORMAL_ROWS):
-            q = push_of(rows, i, more + NORMAL_ROWS + r, first, aim, second)
-            for k in range(len(sizes.step)):
-                w[k] += q * rows.own[i, r, k]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _pushed(sizes, group, rows, i, m, k, first, aim, second):
-    """What the two rows of an axis push its number of that vector by."""
-    axes = len(sizes.axes)
-    up = push_of(rows, i, 2 * m * axes + k, first, aim, second)
-    return (up - push_of(rows, i, (2 * m + 1) * axes + k, first, aim, second)) * group.per_box[m, k]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def put_slopes(sizes, group, rows, i, x, u, d, out):
-    """out (R,) = the change of every row of step i in a step d (4 A + 1,) of p, v, a, j and h."""
-    axes = len(sizes.axes)
-    more, h, dh = 8 * axes, u[axes], d[4 * axes]
-    bent = bent_at(sizes, group, i)
-    none = 0.0 * dh
-    by_v, by_1, by_2, by_3, by_0, by_c1, by_c2 = none, none, none, none, none, none, none
-    for k in range(axes):
-        v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        dp, dv, da, dj = d[k], d[axes + k], d[2 * axes + k], d[3 * axes + k]
-        (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
-        changes = dj, da, dv + 0.5 * h * da + e_mid * dh, dv
-        for m in range(4):
-            share = changes[m] * group.per_box[m, k]
-            out[2 * m * axes + k], out[(2 * m + 1) * axes + k] = share, -share
-        by_v += v * dv
-        by_1 += v_1 * (dv + 0.25 * h * da + e_1 * dh)
-        by_2 += v_2 * (dv + h * (0.5 * da + h * TWELFTH * dj) + e_2 * dh)
-        by_3 += v_3 * (dv + h * (0.75 * da + 0.25 * h * dj) + e_3 * dh)
-        by_0 += rows.n[i, 0, k] * dp
-        by_c1 += rows.n[i, 1, k] * (dp + THIRD * (h * dv + v * dh))
-        by_c2 += rows.n[i, 2, k] * (dp + THIRD * (h * (2.0 * dv + 0.5 * h * da) + (2.0 * v + h * a) * dh))
-    for r in range(more + ORDER_NODE, sizes.rows):
-        out[r] = 0.0
-    if bent:
-        node, mid, arc = none, none, none
-        for k in range(axes):
-            v, a, j = x[axes + k], x[2 * axes + k], u[k]
-            dp, dv, da, dj = d[k], d[axes + k], d[2 * axes + k], d[3 * axes + k]
-            at_mid = tangent_of(sizes, group, rows, i, 1, k)
-            node += tangent_of(sizes, group, rows, i, 0, k) * dv
-            mid += at_mid * (dv + 0.5 * (h * da + a * dh))
-            arc += at_mid * (h * (dv + 0.5 * h * da) + (v + h * a) * dh)
-            by_c1 += rows.node[i, 1, k] * dp
-            following = dp + h * (dv + h * (0.5 * da + h * SIXTH * dj)) + (v + h * (a + 0.5 * h * j)) * dh
-            by_c2 += rows.node[i, 2, k] * following
-        out[more + ORDER_NODE], out[more + ORDER_MID] = -node / group.pace[i], -mid / group.pace[i]
-        out[more + ARC] = arc * group.per_step[i]
-    out[more + H_MAX], out[more + H_MIN] = dh * group.per_h[i], -dh * group.per_h[i]
-    out[more + FEED_NODE] = by_v * group.feed_node[i]
-    out[more + FEED_ROWS] = by_1 * rows.per_radius[i, 0]
-    out[more + FEED_ROWS + 1] = by_2 * rows.per_radius[i, 1]
-    out[more + FEED_ROWS + 2] = by_3 * rows.per_radius[i, 2]
-    out[more + TUBE_NODE], out[more + TUBE_NODE + 1], out[more + TUBE_NODE + 2] = by_0, by_c1, by_c2
-    if sizes.any_normal:
-        turn, total = turn_of(axes, x), none
-        for k in range(axes):
-            y = x[2 * axes + k] - turn * x[axes + k]
-            total += y * (d[2 * axes + k] - turn * d[axes + k])
-        out[more + NORMAL_NODE] = total * group.normal_node[i]
-    if sizes.any_switch:
-        total = none
-        for k in range(axes):
-            total += x[axes + k] * d[k] + (x[k] - group.switch_at[i, k]) * d[axes + k]
-        out[more + SWITCH] = total * group.switch[i]
-    if sizes.any_own:
-        for r in range(sizes.rows - more - NORMAL_ROWS):
-            total = none
-            for k in range(len(sizes.step)):
-                total += rows.own[i, r, k] * d[k]
-            out[more + NORMAL_ROWS + r] = total

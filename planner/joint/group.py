@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.lanes import size
+from planner.base.views import size
 from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.problem import StepWindow
-from planner.joint.rows import NORMAL_NODE, NORMAL_ROWS, SWITCH, TUBE_NODE
+from planner.joint.row_kinds import NORMAL_NODE, NORMAL_ROWS, SWITCH, TUBE_NODE
 
 # Numbers of axes that there are kernels for; windows of other numbers have axes beside that do not move, and those of more
 # a kernel of their own: it takes a minute to compile one.

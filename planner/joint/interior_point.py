@@ -25,24 +25,12 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import (
-    anywhere,
-    larger,
-    magnitude,
-    matrix,
-    pick,
-    put,
-    size,
-    smaller,
-    vector,
-    where,
-    wide1,
-    wide2,
-    wide3,
-)
-from planner.joint.group import Bends, Group, Sizes
-from planner.joint.recursion import END, Factor, Room, backward, factor_steps, forward, gaps
-from planner.joint.rows import NORMAL_ROWS, TUBE_NODE, VECTORS, Rows, Scratch, put_rows
+from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
+from planner.base.views import vector, wide1, wide2, wide3
+from planner.joint.memory import THREE, lanes_of, room_of, rows_in, scratch_of
+from planner.joint.recursion import END, Factor, backward, factor_steps, forward, gaps
+from planner.joint.row_kinds import TUBE_NODE
+from planner.joint.rows import put_rows
 
 # Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations. At
 # the largest the durations stay, so that the kinematics are linear and a step closes them: at 1e4 they creep on,
@@ -81,45 +69,6 @@ class Tuning(NamedTuple):
     first_slack: float  # of the start, at least
 
 
-class Work(NamedTuple):
-    """Memory of a group: of its rows, of the recursion (recursion.py) and for places."""
-
-    g: FloatArray
-    s: FloatArray
-    z: FloatArray
-    per_s: FloatArray
-    q: FloatArray
-    ds: FloatArray
-    dz: FloatArray
-    moves: FloatArray
-    per_radius: FloatArray
-    n: FloatArray
-    node: FloatArray
-    tangent: FloatArray
-    own: FloatArray
-    between: FloatArray
-    K: FloatArray
-    L: FloatArray
-    push: FloatArray
-    dx: FloatArray
-    du: FloatArray
-    gap: FloatArray
-    slope: FloatArray
-    nearest: FloatArray
-    top: FloatArray
-
-
-def work_of(sizes: Sizes, bends: Bends) -> Work:
-    """Memory of a group, all 0."""
-    N, R, W = sizes.steps, sizes.rows, len(sizes.width)
-    A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
-    bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
-    shapes = [(N, R)] * 7 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
-    shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
-    shapes += [(N, S), (R,), (N, 3), (N,)]
-    return Work(*(np.zeros((*shape, W)) for shape in shapes))
-
-
 class Found(NamedTuple):
     """Of all lanes, set as each of them ends."""
 
@@ -129,110 +78,6 @@ class Found(NamedTuple):
     z: FloatArray
     done: Array  # (W,)
     iterations: Array  # (W,)
-
-
-_VECTORS, _THREE = size(VECTORS), size(3)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def lanes_of(sizes, group):
-    """The numbers of a group as lanes."""
-    width = sizes.width
-    return Group(
-        wide1(group.real, width),
-        wide1(group.last, width),
-        wide2(group.on, width, sizes.rows),
-        wide2(group.base, width, sizes.axes),
-        wide2(group.drift, width, sizes.axes),
-        wide2(group.start, width, sizes.axes),
-        wide1(group.per_drift, width),
-        wide1(group.length, width),
-        wide1(group.line, width),
-        wide1(group.bent, width),
-        wide1(group.begins, width),
-        wide1(group.ends, width),
-        wide1(group.at_vertex, width),
-        wide2(group.per_box, width, sizes.axes),
-        wide1(group.room, width),
-        wide1(group.room_node, width),
-        wide1(group.feed, width),
-        wide1(group.feed_node, width),
-        wide1(group.normal, width),
-        wide1(group.normal_node, width),
-        wide1(group.bound, width),
-        wide1(group.turns, width),
-        wide1(group.pace, width),
-        wide1(group.per_h, width),
-        wide1(group.h, width),
-        wide1(group.h_max, width),
-        wide1(group.h_min, width),
-        wide1(group.switch, width),
-        wide2(group.switch_at, width, sizes.axes),
-        wide1(group.smooth, width),
-        wide1(group.centre, width),
-        wide1(group.per_step, width),
-        wide1(group.aside, width),
-    )
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def rows_in(sizes, work, place):
-    """The rows in their memory."""
-    w, axes, own = sizes.width, sizes.axes, sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS
-    return Rows(
-        wide2(work.g, w, sizes.rows),
-        wide2(work.s, w, sizes.rows),
-        wide2(work.z, w, sizes.rows),
-        wide2(work.per_s, w, sizes.rows),
-        wide2(work.q, w, sizes.rows),
-        wide2(work.ds, w, sizes.rows),
-        wide2(work.dz, w, sizes.rows),
-        place,
-        wide2(work.moves, w, _THREE),
-        wide2(work.per_radius, w, _THREE),
-        wide3(work.n, w, _THREE, axes),
-        wide3(work.node, w, _THREE, axes),
-        wide3(work.tangent, w, _THREE, axes),
-        wide3(work.own, w, own, sizes.step),
-        wide1(work.between, w),
-    )
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def room_of(sizes, work, x):
-    """Memory for one step, of what x is of, on the stack of who calls."""
-    return Room(
-        matrix(x, _VECTORS, sizes.axes),
-        vector(x, sizes.step),
-        matrix(x, sizes.step, sizes.step),
-        matrix(x, sizes.state, sizes.state),
-        matrix(x, sizes.state, sizes.state),
-        matrix(x, sizes.state, sizes.control),
-        matrix(x, sizes.control, sizes.state),
-        vector(x, sizes.state),
-        vector(x, sizes.state),
-        vector(x, sizes.state),
-        vector(x, sizes.control),
-        wide1(work.slope, sizes.width),
-    )
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def scratch_of(sizes, bends):
-    """Memory for one lane."""
-    L, of = sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS, len(bends.at) // 4
-    return Scratch(
-        np.zeros(3 * of),
-        np.zeros(of + 1),
-        np.zeros((3, of)),
-        np.zeros(of),
-        np.zeros(of),
-        np.zeros(of),
-        np.zeros(of),
-        np.zeros(L),
-        np.zeros((L, 4 * of + 1)),
-        np.zeros((4 * of + 1, 4 * of + 1)),
-    )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -300,13 +145,13 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     width, group = sizes.width, lanes_of(sizes, numbers)
     N, R, S, C = sizes.steps, sizes.rows, len(sizes.state), len(sizes.control)
     x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
-    rows = rows_in(sizes, work, wide2(motion[2], width, _THREE))
+    rows = rows_in(sizes, work, wide2(motion[2], width, THREE))
     tuned = wide1(tuning, width)
     tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
     ends = Found(
         wide2(found.x, width, sizes.state),
         wide2(found.u, width, sizes.control),
-        wide2(found.place, width, _THREE),
+        wide2(found.place, width, THREE),
         wide2(found.z, width, R),
         found.done,
         found.iterations,
@@ -324,7 +169,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
-    looking = room.y, wide2(work.nearest, width, _THREE), wide1(work.top, width)
+    looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
     count = put_present(sizes, group, rows)
     put_rows(sizes, group, bends, x, u, rows, zero, zero, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)

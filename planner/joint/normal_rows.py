@@ -25,7 +25,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, matrix, root, size, where
+from planner.base.lanes import anywhere, larger, magnitude, root, where
+from planner.base.views import matrix, size
 from planner.joint.laws import REST
 
 BETWEEN = 2  # ordinates between the nodes

@@ -34,7 +34,7 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.own_laws import watched
 from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, window_of
-from planner.joint.rows import H_MIN
+from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
 from planner.joint.window_solver import Asked
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.limits import FEED as FEED_LIMIT
-from planner.joint import rows
+from planner.joint import row_kinds as rows
 from planner.joint.problem import StepWindow
 from planner.joint.run import TubeRun
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.joint import rows
+from planner.joint import row_kinds as rows
 from planner.joint.guess import CutMotion
 from planner.joint.law_window import Units, Window, law_rows, near
 from planner.joint.laws import LawRows
@@ -14,7 +14,7 @@ from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER
 from planner.joint.normal_rows import turns_far
 from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
-from planner.joint.rows import StepLimits
+from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks

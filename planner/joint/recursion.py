@@ -20,9 +20,11 @@ from typing import NamedTuple
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, clear, larger, magnitude, where
-from planner.joint.curvature import add_laws, add_normal, put_force, put_model, put_slopes
-from planner.joint.rows import SIXTH
+from planner.base.lanes import anywhere, larger, magnitude, where
+from planner.base.views import clear
+from planner.joint.curvature import add_laws, add_normal, put_model
+from planner.joint.forces import put_force, put_slopes
+from planner.joint.row_kinds import SIXTH
 
 END = 1e9  # rho [-], at first; with 1e6 the last node's gap stays at 1e-5 where prox has grown
 TO_BOUNDARY = 0.995  # of the way to the nearest bound that a step may go [-]
@@ -213,7 +215,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, prox, rho, end, fac
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def backward(sizes, group, x, u, rows, pull, aim, second, end, factor, room):
-    """The controls of the Newton step towards s z = aim (curvature.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
+    """The controls of the Newton step towards s z = aim (forces.py, `push_of`) where nodes stay, into factor.du; end (3 A,)
     is lambda of the last node."""
     clear(room.lambda_of)
     for i in range(sizes.steps - 1, -1, -1):

@@ -41,104 +41,41 @@ on p and, through `lin.node`, on v; its own curvature is left out, as that of th
 comes nearer to V once more on the other side, nodes there have the row too (checks.py).
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
-from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
-from planner.joint.laws import LawRows, put_law_rows
-from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
-from planner.joint.normal_rows import BETWEEN, put_normal_rows
-
-# Vectors y, in this order.
-P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, LONG, NEXT = range(13)
-VECTORS = 13
-VECTOR_OF_NODE = (
-    P,
+from planner.base.lanes import anywhere, larger, where
+from planner.joint.lane_rows import put_bent, put_laws, put_passed
+from planner.joint.normal_rows import put_normal_rows
+from planner.joint.places import put_places
+from planner.joint.row_kinds import (
+    ACROSS,
+    ARC,
+    C1,
+    C2,
+    FEED_1,
+    FEED_2,
+    FEED_3,
+    FEED_NODE,
+    FEED_ROWS,
+    H_MAX,
+    H_MIN,
+    LONG,
+    MID,
     NEXT,
+    NORMAL_NODE,
+    NORMAL_ROWS,
+    ORDER_MID,
+    ORDER_NODE,
+    SIXTH,
+    SWITCH,
+    THIRD,
+    TUBE_NODE,
+    TWELFTH,
+    VECTOR_OF_BOX,
+    A,
+    J,
+    P,
     V,
-)  # second vectors: of the first and of the second inner control point on arcs, and of `SWITCH`
-# Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
-# lower), in this order.
-H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
-ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH = range(9, 14)
-# Rows with derivatives of their own: of the normal acceleration between nodes, and the laws.
-NORMAL_ROWS, LAW_ROWS = 14, 14 + BETWEEN
-MORE_ROWS = LAW_ROWS
-VECTOR_OF_BOX = (J, A, MID, V)
-THIRD, SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
-
-
-class StepLimits(NamedTuple):
-    """The limits of N steps, in the units of the problem."""
-
-    leg: Array  # (N,) of the window's legs (problem.py)
-    passed: Array  # (N,) whether the step's leg is passed
-    target: FloatArray  # (N, 3, A) where the node and the inner control points belong to there
-    at_vertex: Array  # (N,) whether the step's node is where its leg begins
-    on: Array  # (N, R) rows that there are
-    box: FloatArray  # (4, A) jerk, acceleration, velocity, velocity
-    room: FloatArray  # (N,) of inner control points
-    room_node: FloatArray  # (N,) of the node
-    feed: FloatArray  # (N,)
-    feed_node: FloatArray  # (N,)
-    normal: FloatArray  # (N,)
-    normal_node: FloatArray  # (N,)
-    turns: Array  # (N,) whether the step turns far (normal_rows.py)
-    laws: LawRows
-    step_max: FloatArray  # (N,)
-    pace: FloatArray  # (N,) a speed like that of the step
-    h: FloatArray  # (N,) duration that it is pulled to
-    h_max: FloatArray  # (N,)
-    h_min: FloatArray  # (N,)
-    switch: FloatArray  # (N,) 1 at the vertex where the feed falls and before it, -1 where it rises and behind it; else 0
-    switch_leg: Array  # (N,) the leg that begins at that vertex
-    smooth: FloatArray  # (N,) weight of (jerk/limit)^2 of every axis, against the step's time
-    centre: FloatArray  # (N,) weight of the row of the node's tolerance, against the step's time
-    aside: float  # how far inside its bound the row of that has to be [-]
-
-
-class Rows(NamedTuple):
-    """The rows g + s = 0 of N steps at a motion, with slacks s and multipliers z, and their steps."""
-
-    g: FloatArray  # (N, R)
-    s: FloatArray  # (N, R)
-    z: FloatArray  # (N, R)
-    per_s: FloatArray  # (N, R) 1/s; 0 for a row that is not there, whose z stays 0
-    q: FloatArray  # (N, R) z (g + s)/s
-    ds: FloatArray  # (N, R) after the predictor ds dz
-    dz: FloatArray  # (N, R)
-    place: FloatArray  # (N, 3) of the node and the inner control points along the leg
-    moves: FloatArray  # (N, 3) 1 where these move with the point
-    per_radius: FloatArray  # (N, 3) 1/r^2 of the rows of the feed
-    n: FloatArray  # (N, 3, A) derivatives of the rows of the tolerance by y
-    node: FloatArray  # (N or 0, 3, A) on arcs by the second vectors
-    tangent: FloatArray  # (N or 0, 3, A) of the leg, on arcs
-    own: FloatArray  # (N or 0, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
-    between: FloatArray  # (2,) for the rows of the normal acceleration of a step
-
-
-class Scratch(NamedTuple):
-    """Of one lane, for what is worked out for one after the other."""
-
-    x: FloatArray  # (S,)
-    u: FloatArray  # (C,)
-    y: FloatArray  # (3, A)
-    point: FloatArray  # (A,)
-    n: FloatArray  # (A,)
-    node: FloatArray  # (A,)
-    tangent: FloatArray  # (A,)
-    g: FloatArray  # (L,)
-    slope: FloatArray  # (L, 4 A + 1)
-    W: FloatArray  # (4 A + 1, 4 A + 1)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def count(axes):
-    """How many rows a step of so many axes has, without those of the laws."""
-    return 8 * axes + MORE_ROWS
+)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -193,156 +130,6 @@ def _put_radii(axes, x, u, square, per_radius):
         jerk, change = jerk + hj * hj, change + (ha + 0.5 * hj) * (ha + 0.5 * hj)
     per_radius[0], per_radius[2] = 1.0 / first, 1.0 / last
     per_radius[1] = 1.0 / larger(square + 16.0 / 12.0 * change - 16.0 / 72.0 * jerk, 0.01 * square)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _place_on_line(axes, group, i, x, h, part):
-    """The place on the leg of step i that is nearest to its node, first or second inner control point (0 to 2), or its
-    end, the node x (3)."""
-    along = 0.0 * h
-    for k in range(axes):
-        c = x[k]
-        if part == 1:
-            c = c + THIRD * h * x[axes + k]
-        elif part == 2:
-            c = c + h * THIRD * (2.0 * x[axes + k] + 0.5 * h * x[2 * axes + k])
-        along += (c - group.base[i, k]) * group.drift[i, k]
-    return smaller(larger(along * group.per_drift[i], 0.0), group.length[i])
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_places(sizes, group, x, u, rows, nearest, top):
-    """The places of the nodes and the inner control points that are on lines, in order along each leg: a motion may go
-    back as far as one place is near enough to what it passes twice. They are halfway between the largest nearest place
-    before and the smallest one behind, so that the farthest is moved by as little as can be; nearest (N, 3) and
-    top (N,) are overwritten."""
-    axes, N = len(sizes.axes), sizes.steps
-    low, end = 0.0 * u[0, axes], 0.0 * u[0, axes]
-    for i in range(N):
-        h = u[i, axes]
-        for m in range(3):
-            nearest[i, m] = _place_on_line(axes, group, i, x[i], h, m)
-        begins = group.begins[i] > 0.0
-        nearest[i, 0] = where(begins, where(group.at_vertex[i] > 0.0, 0.0 * h, nearest[i, 0]), nearest[i, 0])
-        low = where(begins, nearest[i, 0], low)
-        last = group.last[i] > 0.0
-        if anywhere(last):
-            end = where(last, larger(_place_on_line(axes, group, i, x[i + 1], h, 3), low), end)
-    behind = end
-    for i in range(N - 1, -1, -1):
-        ends = group.ends[i] > 0.0
-        high = where(group.last[i] > 0.0, end, group.length[i])
-        top[i] = where(ends, high, top[i + 1 if i + 1 < N else i])
-        behind = where(ends, high, behind)
-        for m in range(2, -1, -1):
-            behind = smaller(behind, nearest[i, m])
-            rows.moves[i, m] = behind
-    before = low
-    for i in range(N):
-        begins, length = group.begins[i] > 0.0, group.length[i]
-        low = where(begins, nearest[i, 0], low)
-        before = where(begins, low, before)
-        for m in range(3):
-            before = larger(before, nearest[i, m])
-            place = smaller(larger(0.5 * (before + rows.moves[i, m]), low), top[i])
-            there = where(magnitude(place - nearest[i, m]) > 0.0, 0.0, 1.0 + 0.0 * place)
-            there = where(place <= 0.0, 0.0, where(place >= length, 0.0, there))
-            rows.moves[i, m] = there
-            rows.place[i, m] = where(group.line[i] > 0.0, place, rows.place[i, m])
-        rows.moves[i, 0] *= 1.0 - group.at_vertex[i]
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_passed(axes, bends, i, lane, group, y, rows):
-    """The rows of the tolerance of a step on a leg that is passed: its places are fixed."""
-    for c in range(3):
-        per = pick(group.room_node[i] if c == 0 else group.room[i], lane)
-        square = 0.0
-        for k in range(bends.target.shape[2]):
-            target = bends.target[i, c, k, lane]
-            if c == 0 and pick(group.at_vertex[i], lane) > 0.0:
-                target = pick(group.start[i, k], lane)
-            off = pick(y[(P, C1, C2)[c], k], lane) - target
-            square += off * off
-            rows.n[i, c, k] = put(rows.n[i, c, k], lane, off * per)
-        row = 8 * axes + TUBE_NODE + c
-        rows.g[i, row] = put(rows.g[i, row], lane, 0.5 * (square * per - 1.0))
-        rows.moves[i, c] = put(rows.moves[i, c], lane, 0.0)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_bent(axes, bends, i, lane, group, y, rows, scratch):
-    """The rows of the tolerance of a step on an arc or a curve."""
-    legs, r, length = bends.legs, bends.leg[i, lane], bends.legs.length[bends.leg[i, lane]]
-    at_vertex = pick(group.at_vertex[i], lane) > 0.0
-    ends = pick(group.ends[i], lane) > 0.0 and pick(group.last[i], lane) == 0.0
-    point, c_of, of = scratch.point, scratch.y, len(scratch.point)
-    slopes = Slopes(scratch.n, scratch.node, scratch.tangent)
-    for k in range(of):
-        c_of[0, k], c_of[1, k], c_of[2, k] = (
-            pick(y[P, k], lane),
-            pick(y[C1, k], lane),
-            pick(y[C2, k], lane),
-        )
-        scratch.x[k] = pick(y[NEXT, k], lane)
-    for c in range(3):
-        room = 1.0 / np.sqrt(pick(group.room_node[i] if c == 0 else group.room[i], lane))
-        place = pick(rows.place[i, c], lane)
-        scratch.node[:] = 0.0
-        if c == 0:
-            place, value = nearest_point(legs, r, c_of[0], place, point, scratch.tangent), 0.0
-            for k in range(of):
-                if at_vertex:
-                    point[k] = pick(group.start[i, k], lane)
-                off = c_of[0, k] - point[k]
-                value += off * off
-                scratch.n[k] = off / (room * room)
-            value = 0.5 * (value / (room * room) - 1.0)
-        else:
-            if c == 1:
-                place = 0.0 if at_vertex else pick(rows.place[i, 0], lane)
-            elif ends:
-                place = length
-            else:
-                place = nearest_point(legs, r, scratch.x[:of], place, point, scratch.tangent)
-            fixed = (ends if c == 2 else at_vertex) or place <= 0.0 or place >= length
-            other = c_of[0] if c == 1 else scratch.x[:of]
-            value, place = off_tangent(legs, r, c_of[c], other, Foot(place, fixed, c == 1), room, slopes)
-        for k in range(of):
-            rows.n[i, c, k] = put(rows.n[i, c, k], lane, scratch.n[k])
-            rows.node[i, c, k] = put(rows.node[i, c, k], lane, scratch.node[k])
-            rows.tangent[i, c, k] = put(rows.tangent[i, c, k], lane, scratch.tangent[k])
-        rows.place[i, c] = put(rows.place[i, c], lane, place)
-        row = 8 * axes + TUBE_NODE + c
-        rows.g[i, row] = put(rows.g[i, row], lane, value)
-        stays = (c == 0 and at_vertex) or place <= 0.0 or place >= length
-        rows.moves[i, c] = put(rows.moves[i, c], lane, 0.0 if stays else 1.0)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def copy_lane(sizes, at, lane, x, u, scratch):
-    """The node x (S,) and the controls u (C,) of one lane into the scratch, which has only the axes of the window; at as of
-    `Bends`."""
-    states = len(scratch.x)
-    for k in range(states):
-        scratch.x[k] = pick(x[at[k]], lane)
-    for k in range(len(scratch.u)):
-        scratch.u[k] = pick(u[at[states + k] - len(sizes.state)], lane)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _put_laws(sizes, bends, i, lane, group, x, u, rows, scratch):
-    """The rows of the laws of one lane."""
-    laws, more = bends.laws[lane], 8 * len(sizes.axes) + LAW_ROWS
-    copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
-    pace, room = pick(group.pace[i], lane), 1.0 / np.sqrt(pick(group.room_node[i], lane))
-    aside = pick(group.aside[0], lane)
-    put_law_rows(laws, i, pace, room, aside, scratch.x, scratch.u, scratch.g, scratch.slope)
-    for r in range(laws.first[-1]):
-        rows.g[i, more + r] = put(rows.g[i, more + r], lane, scratch.g[r])
-        for k in range(len(bends.at)):
-            to = bends.at[k]
-            rows.own[i, BETWEEN + r, to] = put(rows.own[i, BETWEEN + r, to], lane, scratch.slope[r, k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -401,9 +188,9 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
         if bent:
             for lane in range(len(sizes.width)):
                 if bends.passed[i, lane]:
-                    _put_passed(axes, bends, i, lane, group, y, rows)
+                    put_passed(axes, bends, i, lane, group, y, rows)
                 elif bends.bent[i, lane]:
-                    _put_bent(axes, bends, i, lane, group, y, rows, scratch)
+                    put_bent(axes, bends, i, lane, group, y, rows, scratch)
             order_node, order_mid, arc = 0.0 * h, 0.0 * h, 0.0 * h
             for k in range(axes):
                 at_node = tangent_of(sizes, group, rows, i, 0, k)
@@ -427,7 +214,7 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
         if sizes.any_laws:
             for lane in range(len(sizes.width)):
                 if i < bends.steps[lane]:
-                    _put_laws(sizes, bends, i, lane, group, x, u, rows, scratch)
+                    put_laws(sizes, bends, i, lane, group, x, u, rows, scratch)
         for r in range(R):
             there = rows.per_s[i, r] > 0.0
             g_r = where(there, g[r], -1.0)

@@ -8,7 +8,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.lanes import WIDTH
 from planner.joint.group import group_of, place_of, rows_of
-from planner.joint.interior_point import Found, Tuning, solve_group, work_of
+from planner.joint.interior_point import Found, Tuning, solve_group
+from planner.joint.memory import work_of
 from planner.joint.problem import StepWindow
 
 

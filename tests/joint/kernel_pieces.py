@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import size, vector, wide1, wide2, wide3
-from planner.joint.curvature import put_model, put_slopes
+from planner.base.views import size, vector, wide1, wide2, wide3
+from planner.joint.curvature import put_model
+from planner.joint.forces import put_slopes
 from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
-from planner.joint.interior_point import Work, lanes_of, put_present, room_of, rows_in, scratch_of, work_of
+from planner.joint.interior_point import put_present
+from planner.joint.memory import Work, lanes_of, room_of, rows_in, scratch_of, work_of
 from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
 from planner.joint.recursion import Factor, backward, factor_steps, forward, gaps
 from planner.joint.rows import put_rows

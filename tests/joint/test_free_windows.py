@@ -11,7 +11,8 @@ from benchmarks.jobs import problems, random_lines
 from benchmarks.solvers import tube_solvers
 from planner.base.arrays import read_only
 from planner.geometry.build import toolpath_from_program
-from planner.joint import groups, laws, own, rows
+from planner.joint import groups, laws, own
+from planner.joint import row_kinds as rows
 from planner.joint.checks import normal_shares, worst_shares
 from planner.joint.group import place_of
 from planner.joint.guess import guess_from

@@ -1,0 +1,62 @@
+"""Where the nodes and the inner control points of steps on lines belong to (rows.py)."""
+
+from planner.base.kernels import CONTRACT, njit
+from planner.base.lanes import anywhere, larger, magnitude, smaller, where
+from planner.joint.row_kinds import THIRD
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _place_on_line(axes, group, i, x, h, part):
+    """The place on the leg of step i that is nearest to its node, first or second inner control point (0 to 2), or its
+    end, the node x (3)."""
+    along = 0.0 * h
+    for k in range(axes):
+        c = x[k]
+        if part == 1:
+            c = c + THIRD * h * x[axes + k]
+        elif part == 2:
+            c = c + h * THIRD * (2.0 * x[axes + k] + 0.5 * h * x[2 * axes + k])
+        along += (c - group.base[i, k]) * group.drift[i, k]
+    return smaller(larger(along * group.per_drift[i], 0.0), group.length[i])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def put_places(sizes, group, x, u, rows, nearest, top):
+    """The places of the nodes and the inner control points that are on lines, in order along each leg: a motion may go
+    back as far as one place is near enough to what it passes twice. They are halfway between the largest nearest place
+    before and the smallest one behind, so that the farthest is moved by as little as can be; nearest (N, 3) and
+    top (N,) are overwritten."""
+    axes, N = len(sizes.axes), sizes.steps
+    low, end = 0.0 * u[0, axes], 0.0 * u[0, axes]
+    for i in range(N):
+        h = u[i, axes]
+        for m in range(3):
+            nearest[i, m] = _place_on_line(axes, group, i, x[i], h, m)
+        begins = group.begins[i] > 0.0
+        nearest[i, 0] = where(begins, where(group.at_vertex[i] > 0.0, 0.0 * h, nearest[i, 0]), nearest[i, 0])
+        low = where(begins, nearest[i, 0], low)
+        last = group.last[i] > 0.0
+        if anywhere(last):
+            end = where(last, larger(_place_on_line(axes, group, i, x[i + 1], h, 3), low), end)
+    behind = end
+    for i in range(N - 1, -1, -1):
+        ends = group.ends[i] > 0.0
+        high = where(group.last[i] > 0.0, end, group.length[i])
+        top[i] = where(ends, high, top[i + 1 if i + 1 < N else i])
+        behind = where(ends, high, behind)
+        for m in range(2, -1, -1):
+            behind = smaller(behind, nearest[i, m])
+            rows.moves[i, m] = behind
+    before = low
+    for i in range(N):
+        begins, length = group.begins[i] > 0.0, group.length[i]
+        low = where(begins, nearest[i, 0], low)
+        before = where(begins, low, before)
+        for m in range(3):
+            before = larger(before, nearest[i, m])
+            place = smaller(larger(0.5 * (before + rows.moves[i, m]), low), top[i])
+            there = where(magnitude(place - nearest[i, m]) > 0.0, 0.0, 1.0 + 0.0 * place)
+            there = where(place <= 0.0, 0.0, where(place >= length, 0.0, there))
+            rows.moves[i, m] = there
+            rows.place[i, m] = where(group.line[i] > 0.0, place, rows.place[i, m])
+        rows.moves[i, 0] *= 1.0 - group.at_vertex[i]

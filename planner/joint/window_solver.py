@@ -6,11 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.lanes import WIDTH
+from planner.base.lanes import WIDTH as LANES
 from planner.joint.group import group_of, place_of, rows_of
 from planner.joint.interior_point import Found, Tuning, solve_group
 from planner.joint.memory import work_of
 from planner.joint.problem import StepWindow
+
+# Windows that are solved together. In `LANES` those that fill the caches take no less time than one after the other, and the
+# others of a group wait for its longest (`python -m benchmarks.solvers.search_kernel`).
+WIDTH = 1
 
 
 class Asked(NamedTuple):
@@ -40,8 +44,11 @@ def alike(asked: Asked) -> Hashable:
     return kind_of(asked), asked.tuning.gap, bent, len(window.which)
 
 
-def solve_windows(asked: Sequence[Asked], width: int = WIDTH) -> list[Solved]:
-    """Solve `width` windows of one kind at most side by side; what is found in one of them does not depend on the others."""
+def solve_windows(asked: Sequence[Asked], width: int | None = None) -> list[Solved]:
+    """Solve `width` windows of one kind at most side by side, None for one on single numbers and more in `LANES`; what is found
+    in one of them does not depend on the others."""
+    if width is None:
+        width = 1 if len(asked) == 1 else LANES
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))
     tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T

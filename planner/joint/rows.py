@@ -30,14 +30,14 @@ vertex), along which n = (y - nearest)/room2 holds whether or not the nearest po
 convex, and a motion may go back along it: its points belong to places in order (`put_places`), which are not
 the nearest ones where it does, and are taken as fixed. On an arc the inner control points belong to the
 tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second
-vector, p or the next node's, through `lin.node`. On an arc that is passed (run.py) places are fixed.
+vector, p or the next node's, through `Rows.node`. On an arc that is passed (run.py) places are fixed.
 
 Other limits (laws.py) have rows of another kind, with their derivatives by p, v, a, j and h, behind all
 others where a window needs them.
 
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
-on p and, through `lin.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
+on p and, through `Rows.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
 comes nearer to V once more on the other side, nodes there have the row too (checks.py).
 """
 

@@ -66,6 +66,46 @@ def test_slopes_are_the_differences_of_the_rows(name):
     np.testing.assert_allclose(slope[exact], ((after - before) / 2)[exact], rtol=2e-3, atol=2e-9)
 
 
+@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned"])
+def test_the_model_is_that_of_all_slopes_and_of_what_is_flat(name):
+    """Of rows that all but touch, z/s grad g grad g', by the slopes in a random step; of rows far from that, z d2g of the rows at
+    nodes, by the change of their slopes along a step of the node alone."""
+    run, guess = begun(name)
+    window = window_of(run, guess, 0, min(len(guess), 40), MISSED, which=np.arange(len(run.laws)))
+    alone, rng = Alone.of(window), np.random.default_rng(8)
+    look(alone)
+    work, there = alone.work, alone.group.on > 0.0
+    change = rng.normal(size=(alone.sizes.steps, len(alone.sizes.step), 1))
+
+    def bent(s, z):
+        """d'W d of every step."""
+        work.s[:], work.z[:] = np.where(there, s, 1.0), np.where(there, z, 0.0)
+        work.per_s[:] = there / work.s
+        W = models(alone)
+        W += np.swapaxes(np.tril(W, -1), 1, 2)
+        return np.einsum("ns,nst,nt->n", change[..., 0], W, change[..., 0])
+
+    weight, centre = rng.uniform(0.5, 1.0, there.shape), alone.group.centre.copy()
+    alone.group.centre[:] = 0.0
+    slope = slopes(alone, change)
+    wanted = (np.where(there, weight, 0.0) * slope**2)[..., 0].sum(axis=1)
+    np.testing.assert_allclose(bent(1e-9, 1e-9 * weight), wanted, rtol=1e-6)
+    rows_of_node = 8 * len(alone.sizes.axes) + np.array([rows.FEED_NODE, rows.TUBE_NODE])
+    change[:, 3 * len(alone.sizes.axes) :] = 0.0
+    z = np.zeros(there.shape)
+    z[:, rows_of_node] = 1.0
+    found = bent(1e12, z)
+    axes, group = len(alone.sizes.axes), alone.group
+    dp, dv = change[:, :axes, 0], change[:, axes : 2 * axes, 0]
+    on, moves = there[:, rows_of_node, 0], work.moves[:, 0, 0]
+    line = group.line[:, 0] > 0.0
+    along = (group.drift[..., 0] * dp).sum(axis=1) ** 2 * group.per_drift[:, 0] * moves
+    wanted = on[:, 0] * group.feed_node[:, 0] * (dv**2).sum(axis=1)
+    wanted = wanted + on[:, 1] * group.room_node[:, 0] * ((dp**2).sum(axis=1) - along)
+    np.testing.assert_allclose(found[line], wanted[line], rtol=1e-6, atol=1e-9)
+    alone.group.centre[:] = centre
+
+
 def test_rows_of_the_feed_are_its_bernstein_coefficients():
     """|y| <= r where the coefficient of the squared feed is no more than F^2: their differences agree."""
     run, guess = begun("corner")

@@ -20,7 +20,7 @@ AXES = 3, 5
 
 
 class Sizes(NamedTuple):
-    """Tuples of the lengths that are numbers in the machine code (lanes.py); A axes."""
+    """Tuples of the lengths that are numbers in the machine code (views.py); A axes."""
 
     axes: tuple[int, ...]
     state: tuple[int, ...]  # S = 3 A
@@ -37,7 +37,7 @@ class Sizes(NamedTuple):
 
 
 class Group(NamedTuple):
-    """The steps of up to W windows, in the units of each; limits of vectors are 1/limit^2."""
+    """The steps of up to W windows, in the units of each; room, room_node, feed_node and normal_node are 1/limit^2."""
 
     real: FloatArray  # (N, W) 1 for a step that the window has, else 0
     last: FloatArray  # (N, W) 1 for its last one

@@ -11,8 +11,8 @@ not: h times velocity, acceleration and jerk is indefinite, and with it a step w
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds. So does a change
 of the velocity where the normal acceleration is limited (normal_rows.py).
 
-Up to `WIDTH` windows are searched side by side, one in each lane (base/lanes.py); what is found in one does not depend on
-the others. A window that has ended waits for the last one.
+A window is searched on single numbers, or several side by side, one in each lane (base/lanes.py): what is found in one does
+not depend on the others, and a window that has ended waits for the last one.
 
 Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
 optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox

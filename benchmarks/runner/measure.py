@@ -34,12 +34,14 @@ from benchmarks.runner.rows import (
     SOLVED,
     Row,
 )
-from benchmarks.runner.suites import Job
+from benchmarks.runner.suites import SUITES, Job
 from benchmarks.runner.ways import Made, Way
 from planner.base.errors import InputError, NotSolvedError
 from planner.nc.reader import parse_program
 from planner.planning.job.plan import Plan
 from planner.report.compare import row_of_plan
+from planner.sensitivity.activity import NONE, REST
+from planner.sensitivity.records import GridHistory
 from planner.verifier import Verdict
 
 REPEATS, ENOUGH = 3, 2.0  # calls, and the processor seconds after which none follows [s]
@@ -194,7 +196,17 @@ def _of_plan(plan: Plan, blank: Row) -> Row:
     row = dataclasses.replace(
         row, status=SOLVED, cycle_s=plan.trajectory.cycle_time, free=row_of_plan(plan.method, plan).free
     )
+    if SUITES[row.suite].merits:
+        row = dataclasses.replace(row, bound_s=plan.least_time, active=_active(plan.grid))
     return _judged(plan.verdict, row)
+
+
+def _active(history: GridHistory | None) -> float | None:
+    """Share of the time in which something is active (Liang et al. 2022's saturation of constraints) [-]."""
+    if history is None:
+        return None
+    share = dict(zip(history.active_names, history.share, strict=True))
+    return round(1.0 - float(share[NONE] + share[REST]), 6)
 
 
 def _judged(verdict: Verdict, row: Row) -> Row:

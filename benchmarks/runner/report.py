@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.record import markdown
-from benchmarks.runner import figures, grid_report
+from benchmarks.runner import figures, grid_report, published_report
 from benchmarks.runner.ages import write_stale
 from benchmarks.runner.figures_of_merit import (
     ALLOWED,
@@ -65,7 +65,7 @@ def report_of(name: str, results: Results, pictures: Iterable[Path] = ()) -> str
     jobs = by_job(rows)
     ways = list(dict.fromkeys(row.way for row in rows if row.status != SKIPPED))
     parts = [_head(results), f"# Suite {name}: {SUITES[name].says}", _outcomes(rows)]
-    parts += grid_report.tables(jobs)
+    parts += grid_report.tables(jobs) + published_report.tables(name, jobs)
     parts += ["## Cycle time [s]", CYCLE_NOTE, _cycle_times(jobs, ways)]
     if shares := ratios(jobs):
         parts += ["## Share of the jobs within a factor of the best motion", PROFILE_NOTE, _profiles(shares)]

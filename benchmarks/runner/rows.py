@@ -43,6 +43,8 @@ class Row:
     points    : grid points of the problem that was solved
     excess    : largest ratio to a limit that is judged [-]
     error     : larger one of contour and vertex error over the tolerance [-]
+    bound_s   : what no motion within tolerance, feed and limits falls short of [s], where the suite asks for it (`Suite.merits`)
+    active    : share of the cycle time in which at least one limit, or the tolerance, is active [-], likewise
     free      : quantities that this way does not limit
     commit    : the last one that changed the planner, with "+" where the working tree has further changes
     """
@@ -64,6 +66,8 @@ class Row:
     points: int | None = None
     excess: float | None = None
     error: float | None = None
+    bound_s: float | None = None
+    active: float | None = None
     free: tuple[str, ...] = ()
     commit: str = ""
 

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.campaign import axes as axes_campaign
 from benchmarks.controls import planned_ngc
 from benchmarks.cost import growth, long_jobs
-from benchmarks.jobs import five_axis, problems, random_lines
+from benchmarks.jobs import five_axis, problems, published, random_lines
 from benchmarks.runner import grids, nasty
 from benchmarks.solvers.random_paths import COPP_LIMITS, CURVES, copp_spline
 from planner.base.names import METHODS
@@ -42,9 +42,8 @@ S_POINTS = (161, 321)  # tips of the five-axis piece
 GRID_JOBS = (
     "pentagon", "lines and arcs", "circle", "relief", "stops", "seed 3", "90 degrees", "trident 20 um",
 )  # fmt: skip
-PAPER_JERK = (
-    2000 / 0.03
-)  # papers 000, 001 and 003: filters of 50 and 30 ms at 100 mm/s and 2000 mm/s2 [mm/s3]
+# papers 000, 001 and 003: filters of 50 and 30 ms at 100 mm/s and 2000 mm/s2 [mm/s3]
+PAPER_JERK = 2000 / 0.03
 PAPER_TOLERANCE = 0.1  # [mm]
 RADIAN = 57.3  # radius at which a degree is a millimetre [mm]
 
@@ -70,6 +69,7 @@ class Suite:
 
     absent : why there are no jobs here; None where there are
     scales : whether its jobs differ in their number of blocks, so that planning time over it says something
+    merits : whether its rows have a bound and the saturation of limits (their processor time has both in it)
     """
 
     says: str
@@ -77,6 +77,7 @@ class Suite:
     ways: tuple[str, ...]
     absent: Callable[[], str | None] = lambda: None
     scales: bool = False
+    merits: bool = False
 
 
 MODELS = ("linuxcnc (model)", "grbl (model)", "klipper (model)")
@@ -97,6 +98,7 @@ SMALL = (
 )
 USUAL = (*QUICK_WAYS, "toppra", "copp", "copp:quick", "ruckig", "linuxcnc", *MODELS)
 RANDOM_RIVALS = ("stop", "kinematic", "optimal/bezier", "optimal/fir", "optimal/kinematic")
+PUBLISHED_WAYS = ("optimal", "second-order", "bezier", "fir", "fir-plain", "kinematic", "stop")
 LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 
@@ -135,6 +137,11 @@ def papers() -> list[Job]:
         Job(name="002 five points", program=made(problems.five_points), machine=problems.five_points_machine),
         Job(name="003 corner", program=made(lambda: problems.polyline(right_angle)), machine=kinematic),
     ]
+
+
+def from_literature() -> list[Job]:
+    """The cases of jobs/published.py."""
+    return [Job(name=one.name, program=made(one.program), machine=one.machine) for one in published.CASES]
 
 
 def corners() -> list[Job]:
@@ -311,6 +318,9 @@ def on_grids() -> list[Job]:
 SUITES: dict[str, Suite] = {
     "quick": Suite(says="small jobs of every kind; the guard of the test suite", jobs=quick, ways=QUICK_WAYS),
     "papers": Suite(says="the jobs of the four papers", jobs=papers, ways=SMALL),
+    "published": Suite(
+        says="cases with published times", merits=True, jobs=from_literature, ways=PUBLISHED_WAYS
+    ),
     "corners": Suite(says="single corners of 1 to 179 degrees", jobs=corners, ways=(*USUAL, "tube")),
     "curves": Suite(says="butterfly and trident as chords, three tolerances", jobs=curves, ways=USUAL),
     "dense": Suite(says="chords of 1 um to 0.2 mm, carving and micro blocks", jobs=dense, ways=LARGE),
@@ -318,20 +328,14 @@ SUITES: dict[str, Suite] = {
         says="a relief of 1,000 to 100,000 blocks: how planning grows", scales=True, jobs=relief, ways=LARGE
     ),
     "axes7": Suite(
-        says="random jobs in seven axes",
-        jobs=axes7,
-        ways=(*QUICK_WAYS, "toppra", *COPP_WAYS[1:]),
+        says="random jobs in seven axes", jobs=axes7, ways=(*QUICK_WAYS, "toppra", *COPP_WAYS[1:])
     ),
     "five-axis": Suite(
         says="an S-shaped piece on a tilting rotary table",
         jobs=five_axes,
         ways=("optimal", "optimal:quick", "second-order", "toppra", "copp:quick"),
     ),
-    "grids": Suite(
-        says="the same motions on coarser and finer grids",
-        jobs=on_grids,
-        ways=tuple(grids.WAYS),
-    ),
+    "grids": Suite(says="the same motions on coarser and finer grids", jobs=on_grids, ways=tuple(grids.WAYS)),
     "nasty": Suite(says="what has broken planners before", jobs=difficult, ways=USUAL),
     "random": Suite(
         says="random lines and arcs on random machines", jobs=random, ways=(*USUAL, *RANDOM_RIVALS[2:])

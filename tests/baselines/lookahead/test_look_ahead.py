@@ -103,7 +103,7 @@ def shortest_need(legs: np.recarray, passage: np.recarray, i: int) -> float:
 
 @given(V=st.floats(-3, 3), gain=st.floats(-8, 3), a=st.floats(2, 4), j=st.floats(3, 6))
 def test_reach_is_the_inverse_of_the_ramp(V, gain, a, j):
-    """Over the length of the fastest ramp by `gain` exactly this gain is reached, from a micro-speed to m/s."""
+    """docs/papers.md F8: over the length of the fastest ramp by `gain` exactly this gain is reached, from a micro-speed to m/s."""
     V, gain, a, j = 10.0**V, 10.0**gain, 10.0**a, 10.0**j
     time = 2 * np.sqrt(gain / j) if gain <= a**2 / j else gain / a + a / j
     assert gain_max(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-12)
@@ -153,7 +153,7 @@ def test_no_leg_is_too_short_on_thousands(family):
 @given(seed=seeds)
 @settings(max_examples=15)
 def test_speeds_are_within_reach_in_both_directions(seed):
-    """V_target <= V + reach, towards either end, where both ends run through."""
+    """docs/papers.md F8: V_target <= V + reach, towards either end, where both ends run through."""
     legs, candidates = random_case(seed, 200)
     way = candidates[0]
     slower = swept(legs, way)

@@ -234,8 +234,8 @@ CASES = (
     ),
     Case(
         name="003 label", source="paper 003", published="error within 0.025 mm; 13 % less time", way="kinematic", length=601.000,
-        differs="another drawing: its own is a picture; jerk from paper 000; the error is that at the vertices, that of the contour is within "
-        "0.025 mm (tests/planning/methods/test_kinematic.py)",
+        differs="another drawing: its own is a picture; jerk from paper 000; the error here is that at the vertices, that of the "
+        "contour is within 0.025 mm (tests/planning/methods/test_kinematic.py)",
         program=lambda: parse_program(LABEL, source="label.plt"), machine=paper_003,
     ),
 )  # fmt: skip

@@ -2,9 +2,9 @@
 
     python -m planner.commands.ahead [corners]
 
-plans two programs with the usual method, which compiles what is not kept yet, and prints the files of all
-kernels that the plans have used. What another method, a curve of another kind or a longer job needs is
-compiled when it is first used.
+plans two programs with the usual method and bounds their times, which compiles what is not kept yet, and
+prints the files of all kernels that this has used. What another method, a curve of another kind or a longer
+job needs is compiled when it is first used.
 
 Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by
 side, the second time with `corners`: three moves that need not be read, on corners that need no splines. That
@@ -52,7 +52,7 @@ def compile_ahead() -> list[str]:
 
     machine = load_machine(MACHINE)
     for program in PROGRAMS:
-        plan(parse_program(program, machine), machine)
+        _ = plan(parse_program(program, machine), machine).least_time
     return kernel_files.used()
 
 

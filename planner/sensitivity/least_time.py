@@ -2,7 +2,7 @@
 tolerance, however it was found.
 
 A motion passes the waypoints P_k of the path (vertices, and points on arcs and curves) in order, each within its
-tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Four facts:
+tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Five facts:
 
 **Feed.** For any vectors y_k whose product with a velocity that leg k allows is at most 1,
 
@@ -18,6 +18,9 @@ the turn: from there to the next corner leg k takes what a straight way takes be
 (straight_time.py), which is longer than at its feed. Where the path turns back by more than 90 degrees the component
 along is confined on one side: at most sqrt(4 A e).
 
+**Lines.** Of lines one after the other that take long enough, whatever is between two corners depends on both. Samples of the
+motion around their corners are points of a linear programme, whose least time is below every motion's (sampled_lines.py).
+
 **Ends.** From rest, the first legs are taken as one straight way in whatever direction counts most; the last ones too.
 
 **Turning back.** Between a maximum of n.q and the next minimum, for any direction n, n.v is 0 at both and the way is
@@ -25,7 +28,8 @@ n.(P_a - P_b) - 2 e at least. Such parts, from one extreme to a later one, stand
 them where that is more.
 
 What is added belongs to parts of the motion that have no time in common; the best division is found from the start to
-the end. All limits but those of axes, feed and tolerance are left out, so the bound holds with them too.
+the end. A part that turns back may begin within lines or an end, and then only what is known up to there counts: the legs at
+their feed, or a shorter end. All limits but those of axes, feed and tolerance are left out, so the bound holds with them too.
 """
 
 import numpy as np
@@ -33,8 +37,10 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.sensitivity.straight_time import TINY, UNLIMITED, Bounds, End, straight_time
-from planner.sensitivity.turning_back import turns_of
+from planner.sensitivity.corner_speeds import legs_between
+from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
+from planner.sensitivity.straight_time import TINY, Bounds, End, straight_time
+from planner.sensitivity.turning_back import Turns, turns_of
 from planner.sensitivity.waypoints import Way, way_of
 
 ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
@@ -59,11 +65,17 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
     more = _beside_feed(way, bounds, (direction * np.diff(way.point, axis=0)).sum(axis=1), by_axis)
     stops = np.flatnonzero(way.stop)
     of_run, y, leg = _best_of_runs(way, y, more, stops[:-1])
+    chains, gain = _chains(way, y, leg)
     longest = np.argsort(-of_run)[:RUNS]
     for k in longest[np.diff(stops)[longest] > 1]:
         begin, end = stops[k], stops[k + 1]
         run = way.part(begin, end)
-        of_run[k] = max(of_run[k], _with_turns(run, *_with_ends(run, y[begin:end], leg[begin:end])))
+        turns = turns_of(run)
+        mine = (chains[:, 0] >= begin) & (chains[:, 1] <= end)
+        for whole in ((chains[:0], gain[:0]), (chains[mine] - begin, gain[mine])):
+            of_run[k] = max(
+                of_run[k], _with_turns(run, turns, *_with_ends(run, y[begin:end], leg[begin:end], *whole))
+            )
     return float(of_run.sum() * (1.0 - ROUNDING) + toolpath.dwell.sum())
 
 
@@ -113,56 +125,53 @@ def _jumps(way: Way, y: FloatArray) -> FloatArray:
 def _beside_feed(way: Way, bounds: Bounds, length: FloatArray, by_axis: Array) -> FloatArray:
     """(N,) what each line takes longer than at its feed, because of the corners and stops at its ends [s]; `length` (N,)
     in the coordinate that bounds it, of which the speed at corners is not known where that is an axis."""
-    u, corner = way.tangent, way.vertex[1:-1] & way.line[:-1] & way.line[1:]
-    least = np.maximum(length - way.tolerance[:-1] - way.tolerance[1:], 0.0)
-    within = np.maximum(way.tolerance[:-1], way.tolerance[1:])
-    lasting = least / bounds.speed
-    cosine = np.clip((u[:-1] * u[1:]).sum(axis=1), -1.0, 1.0)
-    sine = np.sqrt(np.maximum(1.0 - cosine**2, TINY))
-    of_before = confined(way, u[1:] - cosine[:, None] * u[:-1], within[:-1], lasting[:-1])
-    of_after = confined(way, u[:-1] - cosine[:, None] * u[1:], within[1:], lasting[1:])
-    before = (np.abs(cosine) * of_before + of_after) / sine
-    after = (np.abs(cosine) * of_after + of_before) / sine
-    back = np.where(cosine < 0.0, 4.0 * np.maximum(within[:-1], within[1:]), np.inf)
-    before = np.minimum(before, np.sqrt(bounds.acceleration[:-1] * back))
-    after = np.minimum(after, np.sqrt(bounds.acceleration[1:] * back))
-    begin = np.append(np.inf, np.where(corner & ~by_axis[1:], after, np.inf))
-    end = np.append(np.where(corner & ~by_axis[:-1], before, np.inf), np.inf)
-    at_begin = End(np.where(way.stop[:-1], 0.0, np.minimum(begin, bounds.speed)), way.stop[:-1])
-    at_end = End(np.where(way.stop[1:], 0.0, np.minimum(end, bounds.speed)), way.stop[1:])
-    return np.where(way.line, straight_time(least, at_begin, at_end, bounds) - lasting, 0.0)
+    legs = legs_between(way, bounds, length, ~by_axis)
+    return np.where(way.line, legs.time - legs.way / bounds.speed, 0.0)
 
 
-def confined(way: Way, across: FloatArray, within: FloatArray, lasting: FloatArray) -> FloatArray:
-    """(n,) the largest speed across a leg at its end [mm/s], UNLIMITED where the time is too short to tell.
-
-    across  : (n, A) the direction, of any length
-    within  : (n,) how far from the leg motions are at most [mm]
-    lasting : (n,) for how long before at least [s]
-    """
-    size = np.maximum(np.linalg.norm(across, axis=1), TINY)
-    direction = np.abs(across) / size[:, None]
-    push, jerk = (np.maximum(direction @ limit, TINY) for limit in way.limit[1:])
-    by_push, by_jerk = np.sqrt(4.0 * push * within), np.cbrt(243.0 / 8.0 * within**2 * jerk)
-    by_push = np.where(lasting * push >= by_push, by_push, UNLIMITED)
-    return np.minimum(by_push, np.where(lasting >= 2.0 * np.cbrt(24.0 * within / jerk), by_jerk, UNLIMITED))
-
-
-def _with_ends(run: Way, y: FloatArray, leg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """y and what each leg adds, where the first legs of a run and the last ones are taken as one straight way if that
-    is more."""
-    y, leg = y.copy(), leg.copy()
-    first = _from_rest(run, y, leg, len(leg))
-    if first < len(leg):
-        y, leg = -y[::-1], leg[::-1].copy()
-        _from_rest(run.backwards(), y, leg, len(leg) - first)
-        y, leg = -y[::-1], leg[::-1].copy()
-    return y, leg
+def _chains(way: Way, y: FloatArray, leg: FloatArray) -> tuple[Array, FloatArray]:
+    """(P, 2) first line of lines one after the other and the leg behind the last one, and what they take longer than with y
+    and what legs add [s], where they do."""
+    sampled = sampled_legs(way)
+    found = chains_of(way, sampled)
+    if not len(found):
+        return found, np.zeros(0)
+    begin, end = found.T
+    jumps = np.concatenate([[0.0], _jumps(way, y), [0.0]])
+    sums, jumped = np.append(0.0, np.cumsum(leg)), np.append(0.0, np.cumsum(jumps))
+    before = sums[end] - sums[begin] - (jumped[end + 1] - jumped[begin])
+    gain = chain_times(way, sampled, found, y) - before
+    return found[gain > 0.0], gain[gain > 0.0]
 
 
-def _from_rest(run: Way, y: FloatArray, leg: FloatArray, most: int) -> int:
-    """Put the first legs of a run, at most so many, as one straight way into y and `leg`; returns how many."""
+def _with_ends(
+    run: Way, y: FloatArray, leg: FloatArray, chains: Array, gain: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """y and what each leg adds, where chains gain so much, and the first legs of a run and the last ones before or behind
+    them are taken as one straight way if that is more; and (2, N+1) how much less is known up to a waypoint within what is
+    one, and behind it."""
+    y, leg, less = y.copy(), leg.copy(), np.zeros((2, len(leg) + 1))
+    for (begin, end), more in zip(chains, gain, strict=True):
+        leg[begin] += more
+        less[0, begin + 1 : end] = more
     count = len(leg)
+    # y of the legs beside a chain stay
+    head = max(chains[0, 0] - 1, 0) if len(chains) else count
+    first, spare = _from_rest(run, y, leg, head)
+    less[0, 1:first] = spare
+    tail = max(count - chains[-1, 1] - 1, 0) if len(chains) else count - first
+    y, leg = -y[::-1], leg[::-1].copy()
+    last, spare = _from_rest(run.backwards(), y, leg, tail)
+    less[1, count - last + 1 : count] = spare[::-1]
+    return -y[::-1], leg[::-1], less
+
+
+def _from_rest(run: Way, y: FloatArray, leg: FloatArray, most: int) -> tuple[int, FloatArray]:
+    """Put the first legs of a run, at most so many, as one straight way into y and `leg`; returns how many, and how much
+    less of it is known up to each waypoint within them, by the best shorter way [s]."""
+    count = len(leg)
+    if most < 1:
+        return 0, np.zeros(0)
     m = np.unique(np.geomspace(1, most, HEADS).astype(int))
     way = run.point[m] - run.point[0]
     size = np.linalg.norm(way, axis=1)
@@ -178,26 +187,31 @@ def _from_rest(run: Way, y: FloatArray, leg: FloatArray, most: int) -> int:
     gain -= np.cumsum(leg - jumps)[m - 1]
     best = int(gain.argmax())
     if gain[best] <= 0.0:
-        return 0
+        return 0, np.zeros(0)
     first = int(m[best])
+    within = run.tolerance[1:first]
+    shorter = np.zeros(first)  # at each waypoint, what ends before it are worth
+    shorter[m[:best]] = np.maximum(gain[:best], 0.0)
+    known = np.maximum.accumulate(shorter)[:-1] + np.cumsum(leg - jumps)[: first - 1] + jumps[: first - 1]
+    known -= within * np.linalg.norm(y[: first - 1], axis=1)
     y[:first] = heads[best]
     leg[:first] = (heads[best] * np.diff(run.point[: first + 1], axis=0)).sum(axis=1)
     leg[0] += longer[best]
-    return first
+    return first, np.cumsum(leg)[: first - 1] - within * np.linalg.norm(heads[best]) - known
 
 
-def _with_turns(run: Way, y: FloatArray, leg: FloatArray) -> float:
+def _with_turns(run: Way, turns: list[Turns], y: FloatArray, leg: FloatArray, less: FloatArray) -> float:
     """The bound of a run: its legs, or parts that turn back where these take longer.
 
     Up to waypoint k the legs take total[k], with what y jumps by there. They may end there and a part begin, or begin
-    there behind a part; then y ends or begins at 0. `gain` is what parts up to where the scan is have been worth.
+    there behind a part; then y ends or begins at 0, and so much less (2, N+1) is known of what is before or behind.
+    `gain` is what parts up to where the scan is have been worth.
     """
     size, within = np.linalg.norm(y, axis=1), run.tolerance
     jump = np.concatenate([[0.0], _jumps(run, y), [0.0]])
     total = np.append(0.0, np.cumsum(leg)) - np.cumsum(jump)
-    ended = total + jump - within * np.append(0.0, size)
-    begun = total + within * np.append(size, 0.0)
-    turns = turns_of(run)
+    ended = total + jump - within * np.append(0.0, size) - less[0]
+    begun = total + within * np.append(size, 0.0) + less[1]
     reached = [np.zeros(len(one.begin)) for one in turns]  # the best up to each extreme
     events = [(int(k), 1, d, n) for d, one in enumerate(turns) for n, k in enumerate(one.begin) if n]
     events += [

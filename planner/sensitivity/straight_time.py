@@ -75,3 +75,19 @@ def _to_speed(top: FloatArray, at: End, most: Bounds) -> tuple[FloatArray, Float
     middle = speed + A * pushed
     way = speed * pushed + A * pushed**2 / 2.0 + middle * falling + J * falling**3 / 3.0
     return np.where(at.rests, resting, pushed + falling), np.where(at.rests, resting * top / 2.0, way)
+
+
+def largest_speed(way: FloatArray, begin: FloatArray, end: FloatArray, most: Bounds) -> FloatArray:
+    """(n,) the largest speed on ways, or a little more [mm/s].
+
+    way        : (n,) [mm]
+    begin, end : (n,) speeds that are not exceeded at their ends [mm/s]
+    most       : limits of each
+    """
+    low, high = np.minimum(np.maximum(begin, end), most.speed), most.speed.copy()
+    free = np.zeros(len(way), dtype=bool)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2.0
+        short = _up_and_down(middle, End(begin, free), End(end, free), most)[1] <= way
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return high

@@ -19,7 +19,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Fir, Machine, load_machine
 from planner.nc.program import Program
 from planner.planning.job.plan import Plan
-from planner.sensitivity.least_time import confined, least_time
+from planner.sensitivity.corner_speeds import confined
+from planner.sensitivity.least_time import least_time
 from planner.sensitivity.straight_time import Bounds, End, straight_time
 from planner.sensitivity.turning_back import extremes
 from planner.sensitivity.waypoints import way_of
@@ -65,15 +66,16 @@ def test_no_motion_of_more_jobs_is_faster(first: int) -> None:
     assert not [found for seed in range(first, first + 10) for found in broken(seed)]
 
 
-# Bounds and motions of jobs: how far apart they are at most [-]. The circle and the zig-zag on `peers` are those that lose
-# nothing at corners; on the pentagon the corners' bound leaves out that both legs of a corner need the same acceleration.
+# Bounds and motions of jobs: how far apart they are at most [-]. On the zig-zag of the mill lines are short: samples leave
+# a tenth of their time out.
 @pytest.mark.parametrize(
     ("make", "machine", "apart"),
     [
         (problems.chord_circle, problems.machine(), 0.010),
         (problems.zigzag, problems.machine(), 0.006),
-        (problems.pentagon, problems.machine(), 0.05),
-        (problems.pentagon, MILL, 0.08),
+        (problems.pentagon, problems.machine(), 0.004),
+        (problems.pentagon, MILL, 0.006),
+        (problems.zigzag, MILL, 0.06),
     ],
 )
 def test_motions_are_near_to_it(make, machine: Machine, apart: float) -> None:
@@ -193,7 +195,8 @@ def test_the_same_job_written_otherwise_has_the_same_bound(seed: int) -> None:
 def test_more_of_a_limit_never_raises_it(seed: int, what: str) -> None:
     program, machine = planned(seed)
     more = laws.looser(program, machine, None, what, 1.3)
-    assert bound(more.program, more.machine) <= bound(program, machine) * (1.0 + 1e-6)
+    # the times of samples depend on limits, so that the bound of looser ones may lose less
+    assert bound(more.program, more.machine) <= bound(program, machine) * (1.0 + 1e-3)
 
 
 def test_without_jerk_limits_it_is_lower() -> None:

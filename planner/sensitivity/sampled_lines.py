@@ -1,0 +1,241 @@
+"""Lines one after the other, as a linear programme over samples of a motion (least_time.py).
+
+Around each waypoint P_k a motion q is sampled at fixed times s_n from when it passes, up to half of the time
+that each line beside it takes at least. What is left of a line, from the last sample behind its begin to the
+first one before its end, has an unknown duration tau. A divided difference of order m, times m!, is a mean of
+the m-th derivative, weighted by a B-spline (Peano). With [..] for it, per axis, and for knots on both sides of
+t_k too,
+
+    |6 q[s_n .. s_n+3]| <= J,    |2 q[s_n .. s_n+2]| <= A,    |q[s_n, s_n+1]| <= V,    u.q[s_n, s_n+1] <= speed
+
+with the line's direction u and speed: its feed, or the largest one between corners with known speeds, before
+and behind which the motion slows down no faster than the limits allow and covers no more than the line and
+twice its tolerance. Samples are within the tolerance of their line, or a square around it; q(t_k) of P_k. From
+the last sample a to the next one b, |q_b - q_a| <= V tau and u.(q_b - q_a) <= speed tau. Differences of first
+and second order at a and b, means of velocity and acceleration, differ by at most A and J times the time
+between the middles of their knots, which is tau and what they are off a and b. At rest all samples before or
+behind are the waypoint.
+
+All this is linear in samples and tau: every motion is a point of the programme, so that what any multipliers
+bound its least time by (linear_program.py) is below all motions'. Where lines end at other legs whose time is
+bounded by vectors y, these make y_before.(q - P) - y_behind.(q - P) of where the lines begin and end.
+
+The samples around a corner alone bound the speeds there, by the parabola through three of them; with these
+each line takes longer, and its largest speed is lower.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.sensitivity.corner_speeds import Legs, legs_between
+from planner.sensitivity.linear_program import Programme, bounds_by_part, multipliers
+from planner.sensitivity.sampled_rows import (
+    Layout,
+    Lines,
+    Rows,
+    add_derivatives,
+    add_gaps,
+    add_places,
+    differences,
+)
+from planner.sensitivity.straight_time import TINY, Bounds, End, largest_speed, straight_time
+from planner.sensitivity.waypoints import Way
+
+SAMPLES = 20  # of a line on each side
+FIRST = 0.15  # the time of the first sample, of that in which the tolerance is crossed [-]
+DENSER = 2.5  # power by which samples are closer to corners
+SETTLING = 1.5  # up to where samples go, of the time in which a line gets to its largest speed [-]
+LASTING = 0.8  # lines that are sampled take so long from an end to the middle, of that time [-]
+ROOM = 0.1  # by which the start of the programme takes longer [-]
+ENOUGH, ITERATIONS = 2e-5, 40  # gap at which a programme ends [-], and after how many iterations at last
+NEAR = 1e-3  # the same of speeds at corners [-]
+MOST = 5000  # lines that are sampled, those that take longest for their tolerance
+AT_A_TIME = 1000  # lines of a programme, about
+
+
+class Sampled(NamedTuple):
+    """(n,) of lines: their limits, their ends, the largest speed along them, up to when they are sampled from each end, and the
+    time in which the tolerance is crossed."""
+
+    bounds: Bounds
+    legs: Legs
+    speed: FloatArray
+    half: FloatArray
+    crossed: FloatArray
+
+    def only(self, leg: Array) -> "Sampled":
+        """Some of them, `leg` (m,)."""
+        bounds = Bounds(*(one[leg] for one in self.bounds))
+        begin, end = (End(one.speed[leg], one.rests[leg]) for one in (self.legs.begin, self.legs.end))
+        legs = Legs(self.legs.way[leg], self.legs.time[leg], begin, end)
+        return Sampled(bounds, legs, self.speed[leg], self.half[leg], self.crossed[leg])
+
+
+def sampled_legs(run: Way) -> Sampled:
+    """Of all legs."""
+    bounds, _ = run.along(run.tangent, run.feed)
+    legs = legs_between(run, bounds, run.length, np.ones(len(run.length), dtype=bool))
+    return _sampled(bounds, legs, run.length, np.maximum(run.tolerance[:-1], run.tolerance[1:]))
+
+
+def _sampled(bounds: Bounds, legs: Legs, length: FloatArray, within: FloatArray) -> Sampled:
+    """Of lines of a length, from which motions are so far at most."""
+    speed = largest_speed(length + 2.0 * within, legs.begin.speed, legs.end.speed, bounds)
+    crossed = np.maximum(np.cbrt(within / bounds.jerk), np.sqrt(within / bounds.acceleration))
+    settles = SETTLING * (speed / bounds.acceleration + bounds.acceleration / bounds.jerk) + crossed
+    return Sampled(bounds, legs, speed, np.minimum(legs.time / 2.0, settles), crossed)
+
+
+def chains_of(run: Way, sampled: Sampled) -> Array:
+    """(P, 2) first line of lines one after the other that take long enough for samples to tell more than their ends do, and the
+    leg behind the last one."""
+    held = (run.tolerance > 0.0) | run.stop
+    longer = np.where(
+        run.line & held[:-1] & held[1:], sampled.half / np.maximum(LASTING * sampled.crossed, TINY), 0.0
+    )
+    fits = longer > max(1.0, float(np.sort(longer)[-MOST - 1]) if len(longer) > MOST else 0.0)
+    joined = fits[1:] & fits[:-1] & ~run.stop[1:-1]
+    begin = np.flatnonzero(np.append(joined, False) & ~np.append(False, joined))
+    end = np.flatnonzero(np.append(False, joined) & ~np.append(joined, False)) + 1
+    # long ones leave a line out, whose y is that of both sides
+    cuts = [np.arange(*ends, AT_A_TIME + 1) for ends in zip(begin, end, strict=True)]
+    last = [np.minimum(cut + AT_A_TIME, behind) for cut, behind in zip(cuts, end, strict=True)]
+    return np.column_stack([np.concatenate([begin[:0], *cuts]), np.concatenate([end[:0], *last])])
+
+
+def chain_times(run: Way, sampled: Sampled, chains: Array, y: FloatArray) -> FloatArray:
+    """(P,) what chains of lines take at least, with what y (N, A) of the legs beside them makes of where they begin and end
+    [s]; so many at a time as fit one programme."""
+    lines = np.cumsum(chains[:, 1] - chains[:, 0])
+    which = (lines - 1) // AT_A_TIME
+    return np.concatenate(
+        [np.zeros(0), *(_least_times(run, sampled, chains[which == n], y) for n in np.unique(which))]
+    )
+
+
+def _least_times(run: Way, sampled: Sampled, chains: Array, y: FloatArray) -> FloatArray:
+    """The same by one programme."""
+    lines, at, outer, programme = programme_of(run, sampled, chains, y)
+    part = at.part[at.gap]
+    fixed = np.bincount(part, lines.front[:, -1] + lines.back[:, -1])
+    total = fixed + np.bincount(part, programme.start[at.gap])
+    z = multipliers(programme, float(total.sum()), ENOUGH * float(total.sum()), ITERATIONS)
+    # samples are beside their line; no bound is above what motions with a longer tau than this take
+    within = np.abs(outer).sum(axis=(0, 2)) * lines.way.tolerance.max()
+    reach = np.full(len(at.part), lines.way.length.max() + 2.0 * lines.way.tolerance.max())
+    reach[at.gap] = 2.0 * (total + within)[part]
+    return np.minimum(fixed + bounds_by_part(programme, z, at.part, reach), total - within)
+
+
+def programme_of(
+    run: Way, sampled: Sampled, chains: Array, y: FloatArray
+) -> tuple[Lines, Layout, FloatArray, Programme]:
+    """The programme of chains, and y of the legs before them and behind them (2, P, A), 0 at stops."""
+    moved = np.abs(run.tangent[run.line]).max(axis=0) > 0.0  # others have nothing to tell
+    leg = np.concatenate([np.arange(*ends) for ends in chains])
+    lines = _lines_of(run, sampled.only(leg), chains, moved)
+    at = _layout(lines)
+    padded = np.pad(y, ((1, 1), (0, 0)))
+    beside = np.stack([padded[chains[:, 0]], padded[chains[:, 1] + 1]])
+    outer = np.where(run.stop[chains.T][..., None], 0.0, beside)[..., moved]
+    lines = _timed(lines, _with_corners(lines, at, sampled.only(leg), outer))
+    rows = Rows()
+    add_derivatives(rows, lines, at)
+    add_places(rows, lines, at, outer)
+    add_gaps(rows, lines, at)
+    way, cost, start = lines.way, np.zeros(len(at.part)), np.zeros(len(at.part))
+    step = np.abs(np.diff(way.point, axis=0))[lines.window]
+    needs = np.maximum((step / way.limit[0]).max(axis=1), way.length / way.feed)
+    cost[at.gap], start[at.gap] = 1.0, (1.0 + ROOM) * needs
+    axis = np.arange(way.point.shape[1])
+    cost[at.waypoint[lines.begins][:, None] + axis] += outer[0]
+    cost[at.waypoint[lines.ends][:, None] + axis] -= outer[1]
+    return lines, at, outer, rows.programme(cost, start)
+
+
+def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray) -> Sampled:
+    """Lines whose speeds at corners are bounded by programmes of the samples around each corner alone."""
+    rows, way = Rows(), lines.way
+    add_derivatives(rows, lines, at)
+    add_places(rows, lines, at, outer)
+    n, axes = len(at.part), way.point.shape[1]
+    window = np.isin(np.arange(n), np.append(at.gap, at.waypoint[lines.begins])).cumsum() - 1
+    inner = np.flatnonzero(~lines.begins & ~lines.ends)
+    behind = np.searchsorted(lines.window, inner)
+    before = behind - 1
+    h, h_behind = lines.back[before, 0], lines.front[behind, 0]
+    # the derivative of the parabola through three samples, which a third derivative up to J is off by h h' J / 6
+    middle = differences(np.stack([-h, 0.0 * h, h_behind], axis=1), 2)[:, 0] * (h / 2.0)[:, None]
+    middle += np.stack([-1.0 / h, 1.0 / h, 0.0 * h], axis=1)
+    variables = np.stack([at.back[before, 0], at.waypoint[inner], at.front[behind, 0]], axis=1)
+    variables = variables[..., None] + np.arange(axes)
+    reach = np.full(n, way.length.max() + 2.0 * way.tolerance.max())
+    ends = (sampled.legs.end.speed.copy(), sampled.legs.begin.speed.copy())
+    for line, speed in ((before, ends[0]), (behind, ends[1])):
+        scale, along = speed[line], way.tangent[line]
+        cost = np.zeros(n)
+        cost[variables] = -middle[..., None] * (along / scale[:, None])[:, None]
+        programme = rows.programme(cost, np.zeros(n))
+        z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
+        found = -bounds_by_part(programme, z, window, reach)[window[at.waypoint[inner]]] * scale
+        found += np.abs(along) @ way.limit[2] * h * h_behind / 6.0
+        speed[line] = np.minimum(scale, found)
+    legs, rests = sampled.legs, (sampled.legs.begin.rests, sampled.legs.end.rests)
+    begin, end = End(ends[1], rests[0]), End(ends[0], rests[1])
+    time = straight_time(legs.way, begin, end, sampled.bounds)
+    within = np.maximum(way.tolerance[lines.window], way.tolerance[lines.window + 1])
+    return _sampled(sampled.bounds, Legs(legs.way, time, begin, end), way.length, within)
+
+
+def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
+    """The lines of chains, and when they are sampled, in the axes that move."""
+    first, behind = chains.T
+    count = behind - first
+    chain = np.repeat(np.arange(len(first)), count)
+    leg = np.concatenate([np.arange(*ends) for ends in chains])
+    node = np.concatenate([np.arange(begin, end + 1) for begin, end in chains])
+    window = np.arange(len(leg)) + chain
+    way = Way(
+        point=run.point[node][:, moved],
+        tolerance=run.tolerance[node],
+        stop=run.stop[node],
+        vertex=run.vertex[node],
+        tangent=run.tangent[leg][:, moved],
+        length=run.length[leg],
+        feed=sampled.speed,
+        line=run.line[leg],
+        limit=run.limit[:, moved],
+    )
+    begins, ends = np.zeros(len(node), dtype=bool), np.zeros(len(node), dtype=bool)
+    begins[np.append(0, np.cumsum(count + 1)[:-1])] = ends[np.cumsum(count + 1) - 1] = True
+    return _timed(Lines(window, way, sampled.half, sampled.half, begins, ends), sampled)
+
+
+def _timed(lines: Lines, sampled: Sampled) -> Lines:
+    """Lines with their samples and speeds."""
+    n = np.arange(1, SAMPLES + 1)
+    even = np.minimum(FIRST * sampled.crossed, sampled.half / SAMPLES)[:, None]
+    time = even * n + (sampled.half[:, None] - even * SAMPLES) * (n / SAMPLES) ** DENSER
+    return lines._replace(way=lines.way._replace(feed=sampled.speed), front=time, back=time)
+
+
+def _layout(lines: Lines) -> Layout:
+    """Variables in order: of each chain its first waypoint, then of each line the samples behind its begin, tau, those before
+    its end, and the waypoint there."""
+    (count, samples), axes = lines.front.shape, lines.way.point.shape[1]
+    n = np.arange(samples)
+    chain = np.cumsum(lines.begins) - 1
+    of_line = chain[lines.window]
+    block = (2 * samples + 1) * axes + 1
+    begin = (of_line + 1) * axes + np.arange(count) * block
+    waypoint = np.empty(len(chain), dtype=int)
+    waypoint[lines.window + 1] = begin + block - axes
+    waypoint[lines.begins] = begin[lines.begins[lines.window]] - axes
+    part = np.empty(int(waypoint[-1]) + axes, dtype=int)
+    first = np.append(waypoint[lines.begins], len(part))
+    part[:] = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    gap = begin + samples * axes
+    front, back = begin[:, None] + n * axes, gap[:, None] + 1 + (samples - 1 - n) * axes
+    return Layout(waypoint, front, back, gap, part)

@@ -23,7 +23,7 @@ constraint, no solver. What it checks, and how sharp each check is:
     filtered.py   the motion behind the machine's filters, judged by the same matching
     pieces.py     the programmed path, laid out for the matching
     error_allocation.py
-                  eq. 18 and 19 at every programmed corner, and the comparison with eq. 20, on the motion's
+                  eq. 18 at every programmed corner, and the comparison with eq. 19 and 20, on the motion's
                   own curvature
     corners.py    the record of that
     excess.py     the kinds of faults, and the spans of time in which limits are exceeded

@@ -29,9 +29,10 @@ def test_plan() -> None:
     assert "x 0.5, y 1.000001" in said
     assert "x 3.5  (not limited by this method)" in said
     assert "12.300 µm" in said
-    assert "eq. 18 and 19 hold at 3 of 3 corners, at most 1.0000; 1.35 times the speed of eq. 20" in said
-    of = "(median of 2 corners where eq. 20 is below the feed); full stops at 1"
-    assert of in " ".join(said.split())
+    checked = "eq. 18 holds at 3 of 3 corners, at most {:.4f} of the budget; compared: speed at most"
+    checked = checked.format(make_plan().corners.worst_budget_ratio)
+    assert checked in " ".join(said.split())
+    assert "of eq. 19, 1.35 of eq. 20 (median of the 2 where it is below the feed)" in " ".join(said.split())
     assert "passed" in said
 
 

@@ -29,6 +29,7 @@ class Programme(NamedTuple):
     first     : (m+1,) of each row in `column` and `value`
     low, high : (m,) bounds; `low` is -inf where there is none
     start     : (n,) strictly within all of them
+    reach     : (n,)
     """
 
     cost: FloatArray
@@ -38,6 +39,7 @@ class Programme(NamedTuple):
     low: FloatArray
     high: FloatArray
     start: FloatArray
+    reach: FloatArray
     width: int
 
 
@@ -96,8 +98,17 @@ def _step(program, work, band, mu, corrected, step):
     step[:] = program.cost
     _add_rows(program, weight, step)
     step *= -1.0
+    left = step.copy()
     solve(band, step)
     _rows_of(program, step, weight)
+    if corrected > 0.0:  # once more for what rounding left of it, as the bound loses that times `reach`
+        for r in range(len(move)):
+            total = z[0, r] / slack[0, r] + z[1, r] / slack[1, r]
+            weight[r] *= -total
+        _add_rows(program, weight, left)
+        solve(band, left)
+        step += left
+        _rows_of(program, step, weight)
     primal, dual = 1.0 / TO_BOUNDARY, 1.0 / TO_BOUNDARY
     for r in range(len(move)):
         for side in range(2 if two[r] else 1):
@@ -126,8 +137,8 @@ def _after(work, two, primal, dual):
 
 @njit(cache=True, error_model="numpy")
 def multipliers(program, value, enough, iterations):
-    """(2, m) multipliers z and z' of upper and lower bounds whose products with the slacks, and residuals with the distance from
-    the start, sum up to `enough`, or as little as so many iterations make them; `value` is about the optimum's size."""
+    """(2, m) the multipliers z and z' of upper and lower bounds that bound the optimum best, among so many iterations, or up to
+    where they do to `enough`; `value` is about the optimum's size."""
     n, m = len(program.cost), len(program.high)
     x, two = program.start.copy(), program.low > -np.inf
     at, step, residual = np.empty(m), np.empty(n), np.empty(n)
@@ -136,20 +147,26 @@ def multipliers(program, value, enough, iterations):
         np.ones((2, m)), np.zeros((2, m)), np.zeros((2, m)), np.zeros((2, m)), np.zeros(m), np.zeros(m)
     )
     slack, z = work.slack, work.z
+    best, least = z.copy(), np.inf
     bounded = m + np.sum(two)
     _rows_of(program, x, at)
-    first = value / bounded
     for iteration in range(iterations):
         gap = 0.0
         for r in range(m):
             for side in range(2 if two[r] else 1):
                 slack[side, r] = program.high[r] - at[r] if side == 0 else at[r] - program.low[r]
                 if iteration == 0:
-                    z[side, r] = first / slack[side, r]
+                    z[side, r] = value / bounded / slack[side, r]
                 gap += z[side, r] * slack[side, r]
         residual[:] = program.cost
         _add_rows(program, z[0] - z[1], residual)
-        if gap + np.sum(np.abs(residual * (x - program.start))) <= enough:
+        # c.x less the bound, but for what c.x is above the optimum
+        loss = gap + np.sum(residual * x) + np.sum(np.abs(residual) * program.reach)
+        by_cost = loss - np.sum(program.cost * x)
+        if by_cost < least:
+            least = by_cost
+            best[:] = z
+        if loss <= enough:
             break
         for r in range(m):
             work.weight[r] = z[0, r] / slack[0, r] + z[1, r] / slack[1, r]
@@ -165,14 +182,13 @@ def multipliers(program, value, enough, iterations):
         for side in range(2):
             z[side] += min(1.0, TO_BOUNDARY * dual) * work.dz[side]
         _rows_of(program, x, at)
-    return z
+    return best
 
 
-def bounds_by_part(program: Programme, z: FloatArray, part: Array, reach: FloatArray) -> FloatArray:
+def bounds_by_part(program: Programme, z: FloatArray, part: Array) -> FloatArray:
     """(P,) what the optimum of each part is at least, by multipliers z (2, m).
 
-    part  : (n,) of each variable
-    reach : (n,) of each variable
+    part : (n,) of each variable
     """
     count = int(part[-1]) + 1
     row = np.repeat(np.arange(len(program.high)), np.diff(program.first))
@@ -180,4 +196,4 @@ def bounds_by_part(program: Programme, z: FloatArray, part: Array, reach: FloatA
     low = np.where(np.isfinite(program.low), program.low, 0.0)
     terms = z[1] * low - z[0] * program.high
     of_rows = np.bincount(part[program.column[program.first[:-1]]], terms, count)
-    return np.asarray(of_rows - np.bincount(part, np.abs(residual) * reach, count), dtype=np.float64)
+    return np.asarray(of_rows - np.bincount(part, np.abs(residual) * program.reach, count), dtype=np.float64)

@@ -56,12 +56,13 @@ AT_A_TIME = 1000  # lines of a programme, about
 
 
 class Sampled(NamedTuple):
-    """(n,) of lines: their limits, their ends, the largest speed along them, up to when they are sampled from each end, and the
-    time in which the tolerance is crossed."""
+    """(n,) of lines: their limits, their ends, the largest speed along them, the time in which they get to it, up to when they
+    are sampled from each end, and the time in which the tolerance is crossed."""
 
     bounds: Bounds
     legs: Legs
     speed: FloatArray
+    settles: FloatArray
     half: FloatArray
     crossed: FloatArray
 
@@ -70,35 +71,30 @@ class Sampled(NamedTuple):
         bounds = Bounds(*(one[leg] for one in self.bounds))
         begin, end = (End(one.speed[leg], one.rests[leg]) for one in (self.legs.begin, self.legs.end))
         legs = Legs(self.legs.way[leg], self.legs.time[leg], begin, end)
-        return Sampled(bounds, legs, self.speed[leg], self.half[leg], self.crossed[leg])
+        return Sampled(bounds, legs, *(one[leg] for one in self[2:]))
 
 
 def sampled_legs(run: Way) -> Sampled:
     """Of all legs."""
     bounds, _ = run.along(run.tangent, run.feed)
     legs = legs_between(run, bounds, run.length, np.ones(len(run.length), dtype=bool))
-    return _sampled(bounds, legs, run.length, np.maximum(run.tolerance[:-1], run.tolerance[1:]))
-
-
-def _sampled(bounds: Bounds, legs: Legs, length: FloatArray, within: FloatArray) -> Sampled:
-    """Of lines of a length, from which motions are so far at most."""
-    speed = largest_speed(length + 2.0 * within, legs.begin.speed, legs.end.speed, bounds)
+    within = np.maximum(run.tolerance[:-1], run.tolerance[1:])
+    speed = largest_speed(run.length + 2.0 * within, legs.begin.speed, legs.end.speed, bounds)
     crossed = np.maximum(np.cbrt(within / bounds.jerk), np.sqrt(within / bounds.acceleration))
     settles = SETTLING * (speed / bounds.acceleration + bounds.acceleration / bounds.jerk) + crossed
-    return Sampled(bounds, legs, speed, np.minimum(legs.time / 2.0, settles), crossed)
+    return Sampled(bounds, legs, speed, settles, np.minimum(legs.time / 2.0, settles), crossed)
 
 
 def chains_of(run: Way, sampled: Sampled) -> Array:
     """(P, 2) first line of lines one after the other that take long enough for samples to tell more than their ends do, and the
     leg behind the last one."""
     held = (run.tolerance > 0.0) | run.stop
-    longer = np.where(
-        run.line & held[:-1] & held[1:], sampled.half / np.maximum(LASTING * sampled.crossed, TINY), 0.0
-    )
+    some = run.line & held[:-1] & held[1:] & ~(run.stop[:-1] & run.stop[1:])
+    longer = np.where(some, sampled.half / np.maximum(LASTING * sampled.crossed, TINY), 0.0)
     fits = longer > max(1.0, float(np.sort(longer)[-MOST - 1]) if len(longer) > MOST else 0.0)
     joined = fits[1:] & fits[:-1] & ~run.stop[1:-1]
-    begin = np.flatnonzero(np.append(joined, False) & ~np.append(False, joined))
-    end = np.flatnonzero(np.append(False, joined) & ~np.append(joined, False)) + 1
+    begin = np.flatnonzero(fits & ~np.append(False, joined))
+    end = np.flatnonzero(fits & ~np.append(joined, False)) + 1
     # long ones leave a line out, whose y is that of both sides
     cuts = [np.arange(*ends, AT_A_TIME + 1) for ends in zip(begin, end, strict=True)]
     last = [np.minimum(cut + AT_A_TIME, behind) for cut, behind in zip(cuts, end, strict=True)]
@@ -122,11 +118,9 @@ def _least_times(run: Way, sampled: Sampled, chains: Array, y: FloatArray) -> Fl
     fixed = np.bincount(part, lines.front[:, -1] + lines.back[:, -1])
     total = fixed + np.bincount(part, programme.start[at.gap])
     z = multipliers(programme, float(total.sum()), ENOUGH * float(total.sum()), ITERATIONS)
-    # samples are beside their line; no bound is above what motions with a longer tau than this take
+    # what motions with a longer tau than the programme's reach take is not below this
     within = np.abs(outer).sum(axis=(0, 2)) * lines.way.tolerance.max()
-    reach = np.full(len(at.part), lines.way.length.max() + 2.0 * lines.way.tolerance.max())
-    reach[at.gap] = 2.0 * (total + within)[part]
-    return np.minimum(fixed + bounds_by_part(programme, z, at.part, reach), total - within)
+    return np.minimum(fixed + bounds_by_part(programme, z, at.part), total - within)
 
 
 def programme_of(
@@ -140,23 +134,48 @@ def programme_of(
     padded = np.pad(y, ((1, 1), (0, 0)))
     beside = np.stack([padded[chains[:, 0]], padded[chains[:, 1] + 1]])
     outer = np.where(run.stop[chains.T][..., None], 0.0, beside)[..., moved]
-    lines = _timed(lines, _with_corners(lines, at, sampled.only(leg), outer))
+    lines = _with_corners(lines, at, sampled.only(leg), outer)
     rows = Rows()
     add_derivatives(rows, lines, at)
     add_places(rows, lines, at, outer)
     add_gaps(rows, lines, at)
     way, cost, start = lines.way, np.zeros(len(at.part)), np.zeros(len(at.part))
     step = np.abs(np.diff(way.point, axis=0))[lines.window]
-    needs = np.maximum((step / way.limit[0]).max(axis=1), way.length / way.feed)
+    needs = (step / way.limit[0]).max(axis=1)
+    for along, speed in lines.speeds:
+        needs = np.maximum(needs, (np.abs(along) * step).sum(axis=1) / speed)
     cost[at.gap], start[at.gap] = 1.0, (1.0 + ROOM) * needs
     axis = np.arange(way.point.shape[1])
     cost[at.waypoint[lines.begins][:, None] + axis] += outer[0]
     cost[at.waypoint[lines.ends][:, None] + axis] -= outer[1]
-    return lines, at, outer, rows.programme(cost, start)
+    reach = _reach(lines, at)
+    total = start[at.gap].sum() + (lines.front[:, -1] + lines.back[:, -1]).sum()
+    reach[at.gap] = 2.0 * (total + np.abs(outer).sum() * way.tolerance.max())
+    return lines, at, outer, rows.programme(cost, start, reach)
 
 
-def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray) -> Sampled:
-    """Lines whose speeds at corners are bounded by programmes of the samples around each corner alone."""
+def _reach(lines: Lines, at: Layout) -> FloatArray:
+    """(n,) how far samples are from their waypoints at most: they are beside their line."""
+    return np.full(len(at.part), lines.way.length.max() + 2.0 * lines.way.tolerance.max())
+
+
+def _coordinates(way: Way, bounds: Bounds) -> tuple[FloatArray, FloatArray, Bounds]:
+    """(L, A) direction in which each line is looked at, its length there (L,), and the limits: along it, or the axis that its
+    jerk is least for, as no line can use all axes' limits, unless along it they are less."""
+    size = np.maximum(np.abs(way.tangent), TINY)
+    axis, rows = (way.limit[2] / size).argmin(axis=1), np.arange(len(size))
+    velocity, push, jerk = way.limit[:, axis]
+    slower = jerk / size[rows, axis] < bounds.jerk
+    unit = np.zeros(size.shape)
+    unit[rows, axis] = np.sign(way.tangent[rows, axis])
+    along = np.where(slower[:, None], unit, way.tangent)
+    limits = (np.minimum(velocity, way.feed), push, jerk)
+    of_axis = Bounds(*(np.where(slower, one, other) for one, other in zip(limits, bounds, strict=True)))
+    return along, np.where(slower, way.length * size[rows, axis], way.length), of_axis
+
+
+def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray) -> Lines:
+    """Lines that take longer, by speeds at corners that programmes of the samples around each corner alone bound."""
     rows, way = Rows(), lines.way
     add_derivatives(rows, lines, at)
     add_places(rows, lines, at, outer)
@@ -164,29 +183,30 @@ def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray)
     window = np.isin(np.arange(n), np.append(at.gap, at.waypoint[lines.begins])).cumsum() - 1
     inner = np.flatnonzero(~lines.begins & ~lines.ends)
     behind = np.searchsorted(lines.window, inner)
-    before = behind - 1
-    h, h_behind = lines.back[before, 0], lines.front[behind, 0]
+    h, h_behind = lines.back[behind - 1, 0], lines.front[behind, 0]
     # the derivative of the parabola through three samples, which a third derivative up to J is off by h h' J / 6
     middle = differences(np.stack([-h, 0.0 * h, h_behind], axis=1), 2)[:, 0] * (h / 2.0)[:, None]
     middle += np.stack([-1.0 / h, 1.0 / h, 0.0 * h], axis=1)
-    variables = np.stack([at.back[before, 0], at.waypoint[inner], at.front[behind, 0]], axis=1)
+    variables = np.stack([at.back[behind - 1, 0], at.waypoint[inner], at.front[behind, 0]], axis=1)
     variables = variables[..., None] + np.arange(axes)
-    reach = np.full(n, way.length.max() + 2.0 * way.tolerance.max())
-    ends = (sampled.legs.end.speed.copy(), sampled.legs.begin.speed.copy())
-    for line, speed in ((before, ends[0]), (behind, ends[1])):
-        scale, along = speed[line], way.tangent[line]
+    reach = _reach(lines, at)
+    along, length, bounds = _coordinates(way, sampled.bounds)
+    legs, ends = sampled.legs, []
+    for line, end in ((behind - 1, legs.end), (behind, legs.begin)):
+        speed = np.where(end.rests, 0.0, bounds.speed)
+        scale, direction = speed[line], along[line]
         cost = np.zeros(n)
-        cost[variables] = -middle[..., None] * (along / scale[:, None])[:, None]
-        programme = rows.programme(cost, np.zeros(n))
+        cost[variables] = -middle[..., None] * (direction / scale[:, None])[:, None]
+        programme = rows.programme(cost, np.zeros(n), reach)
         z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
-        found = -bounds_by_part(programme, z, window, reach)[window[at.waypoint[inner]]] * scale
-        found += np.abs(along) @ way.limit[2] * h * h_behind / 6.0
-        speed[line] = np.minimum(scale, found)
-    legs, rests = sampled.legs, (sampled.legs.begin.rests, sampled.legs.end.rests)
-    begin, end = End(ends[1], rests[0]), End(ends[0], rests[1])
-    time = straight_time(legs.way, begin, end, sampled.bounds)
-    within = np.maximum(way.tolerance[lines.window], way.tolerance[lines.window + 1])
-    return _sampled(sampled.bounds, Legs(legs.way, time, begin, end), way.length, within)
+        found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * scale
+        speed[line] = np.minimum(scale, found + np.abs(direction) @ way.limit[2] * h * h_behind / 6.0)
+        ends.append(End(speed, end.rests))
+    one, other = way.tolerance[lines.window], way.tolerance[lines.window + 1]
+    time = straight_time(np.maximum(length - one - other, 0.0), ends[1], ends[0], bounds)
+    speed = largest_speed(length + 2.0 * np.maximum(one, other), ends[1].speed, ends[0].speed, bounds)
+    longer = sampled._replace(half=np.minimum(np.maximum(time, legs.time) / 2.0, sampled.settles))
+    return _timed(lines, longer)._replace(speeds=((way.tangent, sampled.speed), (along, speed)))
 
 
 def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
@@ -204,21 +224,22 @@ def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
         vertex=run.vertex[node],
         tangent=run.tangent[leg][:, moved],
         length=run.length[leg],
-        feed=sampled.speed,
+        feed=run.feed[leg],
         line=run.line[leg],
         limit=run.limit[:, moved],
     )
     begins, ends = np.zeros(len(node), dtype=bool), np.zeros(len(node), dtype=bool)
     begins[np.append(0, np.cumsum(count + 1)[:-1])] = ends[np.cumsum(count + 1) - 1] = True
-    return _timed(Lines(window, way, sampled.half, sampled.half, begins, ends), sampled)
+    speeds = ((way.tangent, sampled.speed),)
+    return _timed(Lines(window, way, sampled.half, sampled.half, begins, ends, speeds), sampled)
 
 
 def _timed(lines: Lines, sampled: Sampled) -> Lines:
-    """Lines with their samples and speeds."""
+    """Lines with their samples."""
     n = np.arange(1, SAMPLES + 1)
     even = np.minimum(FIRST * sampled.crossed, sampled.half / SAMPLES)[:, None]
     time = even * n + (sampled.half[:, None] - even * SAMPLES) * (n / SAMPLES) ** DENSER
-    return lines._replace(way=lines.way._replace(feed=sampled.speed), front=time, back=time)
+    return lines._replace(front=time, back=time)
 
 
 def _layout(lines: Lines) -> Layout:

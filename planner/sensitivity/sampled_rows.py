@@ -18,11 +18,12 @@ class Lines(NamedTuple):
     """L lines of several chains, W = L + chains waypoints, of which line l joins window[l] and the next.
 
     window : (L,)
-    way    : of these waypoints and lines only; feed is the largest speed along each line
+    way    : of these waypoints and lines only
     front  : (L, S) times of samples behind the begin [s]
     back   : (L, S) before the end
     begins : (W,) whether a waypoint is the first of its chain
     ends   : (W,) whether it is the last
+    speeds : directions (L, A), and the largest speed (L,) of each line in them
     """
 
     window: Array
@@ -31,6 +32,7 @@ class Lines(NamedTuple):
     back: FloatArray
     begins: Array
     ends: Array
+    speeds: tuple[tuple[FloatArray, FloatArray], ...]
 
 
 class Layout(NamedTuple):
@@ -76,15 +78,15 @@ class Rows:
         self.bounds.append((-high if two_sided else np.full(len(high), -np.inf), high))
         self.count += len(column)
 
-    def programme(self, cost: FloatArray, start: FloatArray) -> Programme:
-        """All rows, with `cost` and `start` (n,)."""
+    def programme(self, cost: FloatArray, start: FloatArray, reach: FloatArray) -> Programme:
+        """All rows, with `cost`, `start` and `reach` (n,)."""
         row, column, value = (np.concatenate(of) for of in zip(*self.entries, strict=True))
         order = np.lexsort((column, row))
         row, column, value = row[order], column[order], value[order]
         first = np.searchsorted(row, np.arange(self.count + 1))
         low, high = (np.concatenate(of) for of in zip(*self.bounds, strict=True))
         width = int((column[first[1:] - 1] - column[first[:-1]]).max()) + 1
-        return Programme(cost, first, column, value, low, high, start, width)
+        return Programme(cost, first, column, value, low, high, start, reach, width)
 
 
 def _columns(first: Array, axes: int) -> Array:
@@ -124,8 +126,9 @@ def add_derivatives(rows: Rows, lines: Lines, at: Layout) -> None:
         (variable[behind, : samples + 1], time[behind, : samples + 1]),
     ):
         of = _columns(np.stack([nodes[:, :-1], nodes[:, 1:]], axis=-1), axes).reshape(len(nodes), samples, -1)
-        by = np.concatenate([-way.tangent, way.tangent], axis=1) / way.feed[:, None]
-        rows.add(of, by[:, None] / np.diff(times, axis=1)[..., None], 1.0)
+        for along, speed in lines.speeds:
+            by = np.concatenate([-along, along], axis=1) / speed[:, None]
+            rows.add(of, by[:, None] / np.diff(times, axis=1)[..., None], 1.0)
 
 
 def add_places(rows: Rows, lines: Lines, at: Layout, outer: FloatArray) -> None:
@@ -178,15 +181,15 @@ def add_gaps(rows: Rows, lines: Lines, at: Layout) -> None:
     gap, front, back = at.gap[:, None], at.front, at.back
     rows.add(gap, -np.ones(gap.shape), 0.0)
     of = np.concatenate([_columns(front[:, -1], axes), _columns(back[:, -1], axes), gap], axis=1)
-    by = np.concatenate([-way.tangent, way.tangent, -way.feed[:, None]], axis=1)
-    along = (way.tangent * step).sum(axis=1)
-    rows.add(of, by / along[:, None], -1.0)
+    for along, speed in lines.speeds:
+        by = np.concatenate([-along, along, -speed[:, None]], axis=1)
+        rows.add(of, by / way.length[:, None], -(along * step).sum(axis=1) / way.length)
     for k in range(axes):
         if way.limit[0, k] >= way.feed.max():
             continue
         for sign in (1.0, -1.0):
-            by = np.array([-sign, sign, -way.limit[0, k]]) / along[:, None]
-            rows.add(of[:, [k, axes + k, -1]], by, -sign * step[:, k] / along)
+            by = np.array([-sign, sign, -way.limit[0, k]]) / way.length[:, None]
+            rows.add(of[:, [k, axes + k, -1]], by, -sign * step[:, k] / way.length)
     for order in (1, 2):
         mine, other = lines.front[:, -order - 1 :], -lines.back[:, -order - 1 :]
         apart = mine[:, -1] - mine.mean(axis=1) + other.mean(axis=1) - other[:, -1]

@@ -83,11 +83,11 @@ def test_motions_are_near_to_it(make, machine: Machine, apart: float) -> None:
     assert plan.least_time < plan.cycle_time < (1.0 + apart) * plan.least_time
 
 
-def test_a_straight_line_takes_just_that() -> None:
-    for x, feed in ((0.01, 6000), (3.0, 6000), (200.0, 6000), (50.0, 300)):
-        plan = planner.plan(planner.read_program(text=f"G21 F{feed}\nG1 X{x}\nM2\n"), MILL, method="stop")
-        assert plan.least_time == pytest.approx(plan.cycle_time, abs=1.01 * MILL.dt, rel=1e-5)
-        assert plan.least_time <= plan.cycle_time
+@pytest.mark.parametrize("to", ["X0.01", "X3", "X200", "X50 F300"])
+def test_a_straight_line_takes_just_that(to: str) -> None:
+    plan = planner.plan(planner.read_program(text=f"G21 F6000\nG1 {to}\nM2\n"), MILL, method="stop")
+    assert plan.least_time == pytest.approx(plan.cycle_time, abs=1.01 * MILL.dt, rel=1e-5)
+    assert plan.least_time <= plan.cycle_time
 
 
 STEPS = 60  # of constant jerk

@@ -8,8 +8,9 @@ from a motion that need keep neither: gaps and what is missing of g + s = 0 shri
 the last sum is as it was guessed, and d the distance of the node from its leg (numbers.py). Kinematics and
 rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
-change of h costs `prox` in every iteration, so that steps stay where the linear model holds. So does a change
-of the velocity where the normal acceleration is limited (normal_rows.py).
+change of h costs `prox` in every iteration, so that steps stay where the linear model holds, and no step goes
+farther than that holds for the kinematics, but for `BENT`: along a phase of constant acceleration nodes slide for
+nothing else. A change of the velocity costs too where the normal acceleration is limited (normal_rows.py).
 
 A window is searched on single numbers, or several side by side, one in each lane (base/lanes.py): what is found in one does
 not depend on the others, and a window that has ended waits for the last one.
@@ -25,7 +26,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, magnitude, pick, put, smaller, where
+from planner.base.lanes import anywhere, larger, magnitude, pick, put, root, smaller, where
 from planner.base.views import vector, wide1, wide2, wide3
 from planner.joint.memory import THREE, lanes_of, room_of, rows_in, scratch_of
 from planner.joint.recursion import END, Factor, backward, factor_steps, forward, gaps
@@ -50,6 +51,11 @@ OFF = 2e-9
 # Where the last node's gap does not get less by this share in each of so many iterations in a row, once prox grows, its
 # rho (recursion.py) grows by so many times, up to a value at which the recursion still has five digits [-].
 SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
+# By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
+# share of what it was [-]: a step that bends them by more is shortened.
+BENT, BENT_OF = 0.05, 0.3
+# What rows may be off their slacks at the end, each times its multiplier, as a share of the complementarity [-].
+OWED = 0.1
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
 ITERATIONS = 140  # 20 to 90 are the rule
 
@@ -60,9 +66,7 @@ class Tuning(NamedTuple):
     pull: float  # weight of ((h - guess)/guess)^2, against a mean step's time
     prox: float  # the same of the change in one iteration
     gap: float  # complementarity at the end, share of the time
-    # By how much a row may be broken at the end, and how far the slack of an active one (z > s) may be off:
-    # limits are narrowed by more than that (problem.py). Slacks of the others follow no more closely than the
-    # tangents that are kept.
+    # By how much a row may be broken at the end: limits are narrowed by more than that (problem.py).
     missed: float
     least: float  # to which prox falls while the time settles
     first_gap: float  # complementarity of the start, share of the time
@@ -138,12 +142,22 @@ def _end(sizes, lane, done, iteration, group, rows, x, u, found):
             found.z[i, r] = put(found.z[i, r], lane, z)
 
 
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _go(sizes, x, u, factor, along):
+    """A share of the step of nodes and controls."""
+    for i in range(sizes.steps):
+        for k in range(len(sizes.state)):
+            x[i, k] += along * factor.dx[i, k]
+        for k in range(len(sizes.control)):
+            u[i, k] += along * factor.du[i, k]
+
+
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
 def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 3, W),
     which is overwritten; tuning (7, W). What each comes to is set in `found`."""
     width, group = sizes.width, lanes_of(sizes, numbers)
-    N, R, S, C = sizes.steps, sizes.rows, len(sizes.state), len(sizes.control)
+    R, S = sizes.rows, len(sizes.state)
     x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
     rows = rows_in(sizes, work, wide2(motion[2], width, THREE))
     tuned = wide1(tuning, width)
@@ -175,7 +189,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)
     products, broken = _start(sizes, rows, count, time, tune)
-    missed = zero + np.inf  # nothing has ended before the first step
+    owed = zero + np.inf  # nothing has ended before the first step
     prox, before, close, still, settled = tune.prox, time, zero, zero, zero
     rho, off_before, slow = zero + END, zero + np.inf, zero
     active = zero
@@ -197,7 +211,8 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
         rho = where(slow == SLOW_FOR, smaller(STIFFER * rho, STIFFEST + zero), rho)
         slow = where(slow == SLOW_FOR, zero, slow)
         off_before = where(settled > 0.0, off, off_before)
-        reached = where(larger(broken, missed) <= tune.missed, where(gap_most <= OFF, settled, zero), zero)
+        holds = where(broken <= tune.missed, where(owed <= OWED * tune.gap * time, settled, zero), zero)
+        reached = where(gap_most <= OFF, holds, zero)
         lost = where(products <= LOST * time, zero, 1.0 + zero)
         if iteration == ITERATIONS:
             lost = 1.0 + zero
@@ -211,6 +226,12 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
         bad = factor_steps(
             sizes, group, bends, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
         )
+        stiff = where(bad > 0.0, where(rho > END, active, zero), zero)
+        if anywhere(stiff > 0.0):  # more digits than there are
+            rho = where(stiff > 0.0, END + zero, rho)
+            bad = factor_steps(
+                sizes, group, bends, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
+            )
         if anywhere(active * bad > 0.0):
             for lane in range(len(sizes.width)):
                 if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
@@ -228,12 +249,15 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
             sizes, group, x, u, gap, rows, False, aim, second, factor, room, change
         )
         along, dual = where(active > 0.0, along, zero), where(active > 0.0, dual, zero)
+        linear, allowed = (1.0 - along) * gap_most, larger(BENT + zero, BENT_OF * gap_most)
+        _go(sizes, x, u, factor, along)
+        gap_most, off = gaps(sizes, group, x, u, gap)
+        bent = larger(gap_most - linear, allowed)
+        if anywhere(active * bent > active * allowed):
+            back = along * (1.0 - root(allowed / bent))
+            _go(sizes, x, u, factor, -back)
+            along = along - back
+            gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        for i in range(N):
-            for k in range(S):
-                x[i, k] += along * factor.dx[i, k]
-            for k in range(C):
-                u[i, k] += along * factor.du[i, k]
-        products, broken, missed = put_rows(sizes, group, bends, x, u, rows, along, dual, looking, scratch)
-        gap_most, off = gaps(sizes, group, x, u, gap)
+        products, broken, owed = put_rows(sizes, group, bends, x, u, rows, along, dual, looking, scratch)

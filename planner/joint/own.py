@@ -44,13 +44,9 @@ WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.se
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where
 # it would be.
 JOIN_WITHIN = SIZES.searched_join
-# What a change of a step's duration costs in one iteration (interior_point.py), in turn [-]: windows that do
-# not converge with the first may with the second, and the other way round. By how much rows may be missed at
-# the end [-]: on some windows with arcs they keep trembling by 1e-5. Where a plan is made otherwise if one
-# window fails there is one try.
-TRIES = (0.1, 1e-6), (0.1, 5e-5), (1.0, 5e-5)
-# The most that rows may be missed by [-].
-MISSED_MOST = max(missed for _, missed in TRIES)
+# What a change of a step's duration costs in one iteration (interior_point.py), and by how much rows may be missed at
+# the end [-].
+PROX, MISSED = 0.1, 1e-6
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
 # Laws of the position are about a place, and of the tolerance along a curve the rows know the tangents at nodes.
@@ -62,7 +58,6 @@ TIGHTENED, TIGHTER = 3, 1.002
 SHORTENED = 1e-3
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
-Tries = tuple[tuple[float, float], ...]
 KEPT = "no faster motion was found there"
 FOUND = "the best motion near its start, geometry and feed together"
 
@@ -185,7 +180,7 @@ class _Search:
             np.sqrt((np.abs(a) / run.acceleration).max(axis=1)),
             *(law_shares(run, self.guess, at) ** (1.0 / run.laws.orders)).T,
         )
-        by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED_MOST), 1.0)[:, None]
+        by = np.maximum(np.max(shares, axis=0) / (1.0 - NARROWED * MISSED), 1.0)[:, None]
         state[at, 1] /= by
         state[at, 2] /= by**2
 
@@ -205,16 +200,15 @@ class _Search:
     ) -> Generator[Sweep, list[bool], bool]:
         """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are
         of no use, the first one that fails gives the search up. Whether none did."""
-        tries = TRIES if parts else TRIES[:1]
-        tasks = [self._window(lo, hi, tries) for lo, hi in zip(begin, end, strict=True)]
+        tasks = [self._window(lo, hi) for lo, hi in zip(begin, end, strict=True)]
         ended = yield Sweep(tasks, all_needed=not parts)
         self.windows += len(tasks)
         self.solved += sum(ended)
         return parts or all(ended)
 
-    def _window(self, lo: int, hi: int, tries: Tries) -> Task:
+    def _window(self, lo: int, hi: int) -> Task:
         """Improve the steps lo .. hi - 1, and tell so."""
-        solved = yield from self._improve(lo, hi, tries)
+        solved = yield from self._improve(lo, hi)
         self._done.append(hi - lo)
         if self.settings.progress is not None:
             self.settings.progress(min(sum(self._done) / self._all, 1.0))
@@ -225,10 +219,10 @@ class _Search:
         begin = max(near - JOIN_WITHIN, 0)
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int, tries: Tries) -> Task:
+    def _improve(self, lo: int, hi: int) -> Task:
         """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from
         what these have found. Whether it did not fail."""
-        if (yield from self._improved(lo, hi, tries)):
+        if (yield from self._improved(lo, hi)):
             return True
         if hi - lo < 2 * LEAST or not self.settings.divide:
             return False
@@ -236,51 +230,46 @@ class _Search:
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
         before = float(self.guess.h[lo:hi].sum())
-        yield from self._improve(lo, middle, TRIES[:1])
-        yield from self._improve(middle, hi, TRIES[:1])
+        yield from self._improve(lo, middle)
+        yield from self._improve(middle, hi)
         if self.guess.h[lo:hi].sum() < before:
-            yield from self._improved(lo, hi, tries)
+            yield from self._improved(lo, hi)
         return False
 
-    def _improved(self, lo: int, hi: int, tries: Tries) -> Task:
-        """Whether an optimum of the steps lo .. hi - 1 was found, with one of the `tries`; if it is faster it
-        takes their place."""
+    def _improved(self, lo: int, hi: int) -> Task:
+        """Whether an optimum of the steps lo .. hi - 1 was found; if it is faster it takes their place."""
         run, smooth = self.run, self.settings.smooth
-        for prox, missed in tries:
-            pull, taken = PULL, False
-            tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
-            needed, beside = near(run.laws, begun), np.full(hi - lo, -1)
-            for number in range(TOLD if len(run.laws) else TIGHTENED):
-                which = np.flatnonzero(needed)
-                window = window_of(run, begun, begun.lo, begun.hi, missed, tight, smooth, which, beside)
-                tuning = Tuning(pull, prox, self.settings.gap, missed, self.settings.least, *START)
-                done, iterations, z = yield Asked(window, tuning)
-                self.iterations.append(iterations)
-                if not done:
+        tuning = Tuning(PULL, PROX, self.settings.gap, MISSED, self.settings.least, *START)
+        tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
+        needed, beside, taken = near(run.laws, begun), np.full(hi - lo, -1), False
+        for number in range(TOLD if len(run.laws) else TIGHTENED):
+            which = np.flatnonzero(needed)
+            window = window_of(run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside)
+            done, iterations, z = yield Asked(window, tuning)
+            self.iterations.append(iterations)
+            if not done:
+                break
+            rows_of_switch = int((beside >= 0).sum())
+            over = self._taken(lo, hi, window, begun, beside)
+            if over is None:
+                self.price[lo:hi] = step_prices(run, window, z)
+                taken, begun = True, Window(self.guess, lo, hi)
+                shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
+                if shorter <= SHORTENED * window.u[:, -1].sum():
                     break
-                rows_of_switch = int((beside >= 0).sum())
-                over = self._taken(lo, hi, window, begun, beside)
-                if over is None:
-                    self.price[lo:hi] = step_prices(run, window, z)
-                    taken, begun = True, Window(self.guess, lo, hi)
-                    shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
-                    if shorter <= SHORTENED * window.u[:, -1].sum():
-                        return True
-                    continue
-                if (beside >= 0).sum() > rows_of_switch:
-                    continue
-                if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
-                    break
-                pull = PULL_AGAIN if run.laws.moved else PULL
-                of_laws = over[:, 1:]
-                # rows that are far off are asked for about other places first
-                near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
-                tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
-                tight[:, 1:] *= np.where(near_enough, tightened(of_laws, number), 1.0)
-                needed |= (of_laws > NEAR).any(axis=0)
-            if taken:
-                return True
-        return False
+                continue
+            if (beside >= 0).sum() > rows_of_switch:
+                continue
+            if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
+                break
+            tuning = tuning._replace(pull=PULL_AGAIN if run.laws.moved else PULL)
+            of_laws = over[:, 1:]
+            # rows that are far off are asked for about other places first
+            near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
+            tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
+            tight[:, 1:] *= np.where(near_enough, tightened(of_laws, number), 1.0)
+            needed |= (of_laws > NEAR).any(axis=0)
+        return taken
 
     def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Array) -> FloatArray | None:
         """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are

@@ -42,7 +42,7 @@ comes nearer to V once more on the other side, nodes there have the row too (che
 """
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import anywhere, larger, where
+from planner.base.lanes import anywhere, larger, magnitude, where
 from planner.joint.lane_rows import put_bent, put_laws, put_passed
 from planner.joint.normal_rows import put_normal_rows
 from planner.joint.places import put_places
@@ -150,13 +150,13 @@ def tangent_of(sizes, group, rows, i, c, k):
 def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
     on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps. Returns the sum of s z,
-    the largest row, and the most that is missing of g + s = 0 of active ones (z > s). A row that is not there is -1.
+    the largest row, and the sum of z |g + s|: in units of time, what rows are off their slacks. A row that is not there is -1.
     room: y (13, A), nearest (N, 3) and top (N,)."""
     axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
     y, nearest, top = room
     more = 8 * axes
     put_places(sizes, group, x, u, rows, nearest, top)
-    products, broken, missed = 0.0 * along, 0.0 * along, 0.0 * along
+    products, broken, owed = 0.0 * along, 0.0 * along, 0.0 * along
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
         bent = bent_at(sizes, group, i)
@@ -224,5 +224,5 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
             rows.q[i, r] = z_r * (g_r + s_r) * per
             products += s_r * z_r
             broken = larger(g_r, broken)
-            missed = larger(where(z_r > s_r, g_r + s_r, 0.0), missed)
-    return products, broken, missed
+            owed += z_r * magnitude(g_r + s_r)
+    return products, broken, owed

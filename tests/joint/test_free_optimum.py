@@ -9,7 +9,7 @@ from whole_plans import dense_motion
 
 import planner
 from benchmarks.controls import planned_ngc
-from benchmarks.jobs import problems
+from benchmarks.jobs import problems, random_lines
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.joint import stages
@@ -98,3 +98,12 @@ def test_windows_of_blocks_far_shorter_than_the_tolerance_end() -> None:
     assert plan.verdict.passed
     assert [step.kept for step in told.steps if step.name == "search"] == [True]
     assert plan.cycle_time < 0.1716
+
+
+def test_windows_whose_nodes_slide_along_a_phase_end() -> None:
+    """A random job that turns back at full acceleration within the tolerance: nodes slide along that for nothing, and a step that
+    goes as far as its slacks let it leaves the kinematics by half a mean step."""
+    told = Trace()
+    plan = planner.plan(*random_lines.job(96), log=told)
+    assert [step.kept for step in told.steps if step.name == "search"] == [True]
+    assert plan.cycle_time < 3.7454

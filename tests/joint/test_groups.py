@@ -271,9 +271,9 @@ def test_lanes_find_what_single_numbers_find():
     asked = []
     for name in ("corner", "arcs", "pentagon", "pushed", "turned", "own", "powered"):
         run, guess = begun(name)
-        missed = own.TRIES[0][1]
+        missed = own.MISSED
         window = window_of(run, guess, 0, len(guess), missed, which=np.arange(len(run.laws)))
-        asked.append(Asked(window, Tuning(PULL, own.TRIES[0][0], 1e-4, missed, 1.0, *own.START)))
+        asked.append(Asked(window, Tuning(PULL, own.PROX, 1e-4, missed, 1.0, *own.START)))
 
     def solved(order, width):
         copies = [

@@ -196,7 +196,7 @@ def _of_plan(plan: Plan, blank: Row) -> Row:
     row = dataclasses.replace(
         row, status=SOLVED, cycle_s=plan.trajectory.cycle_time, free=row_of_plan(plan.method, plan).free
     )
-    if SUITES[row.suite].merits:
+    if row.suite in SUITES and SUITES[row.suite].merits:
         row = dataclasses.replace(row, bound_s=plan.least_time, active=_active(plan.grid))
     return _judged(plan.verdict, row)
 

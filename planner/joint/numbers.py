@@ -16,7 +16,7 @@ ROUNDING = 1e-4
 # where time does not depend on them; elsewhere these cost less than 1e-4 of the time, on the mean.
 SMOOTH_AT_FEED, SMOOTH, CENTRE = 1e-2, 3e-4, 1e-3
 # A step whose ends are as fast as this share of the feed runs at it [-].
-AT_FEED = 0.98
+AT_FEED = 0.995
 
 
 def jerk_weights(run: TubeRun, leg: Array, velocity: FloatArray, least: float) -> FloatArray:

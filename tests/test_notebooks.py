@@ -68,9 +68,9 @@ def executed() -> dict[str, NotebookNode | Exception]:
 
 
 def kinds(notebook: NotebookNode) -> list[list[str]]:
-    """What each code cell gives: text and pictures, the kinds of either in their order."""
+    """What each code cell gives: the kinds of text and pictures."""
     return [
-        list(dict.fromkeys(kind for one in cell.outputs for kind in one.get("data", {one.output_type: 0})))
+        sorted({kind for one in cell.outputs for kind in one.get("data", {one.output_type: 0})})
         for cell in code(notebook)
     ]
 

@@ -16,12 +16,15 @@ from benchmarks.jobs import problems
 from benchmarks.solvers.random_paths import CURVES
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
+from planner.machine.kinematics import at_tip
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
+from planner.report.interactive.points import tip_path
 
 FREE = 1e9  # a limit that is not printed, so that it never acts [mm/s2, mm/s3]
 ON_THE_PATH = 1e-3  # tolerance of cases whose path is exact: small beside the chords of a period [mm]
 SINUSOID_POINTS = 2001  # through which a cubic spline is within 1e-8 mm of the formula
+POCKET_POINTS = 501  # of the five-axis path
 HALF_TURN = 5.0  # radius of the half-arcs of the tube problem [mm]
 
 
@@ -74,6 +77,20 @@ def sinusoid() -> Nurbs:
     return _nurbs(spline.c, spline.t)
 
 
+def pocket() -> tuple[Nurbs, Nurbs]:
+    """Ma et al. 2022, appendix 1, after Beudaert et al. 2012: the curve of the tip, and that of a second point of the tool."""
+    knots = [0, 0, 0, 0, 0.2, 0.4, 0.6, 0.8, 1, 1, 1, 1]
+    bottom = zip((5, -10, 10, 20, 30, 40, 50, 55), (0, 20, 20, 30, 30, 30, 20, 0), [0] * 8, strict=True)
+    top = zip((0, -15, 5, 15, 30, 45, 55, 60), (0, 20, 25, 35, 35, 35, 25, 0), [15] * 8, strict=True)
+    return _nurbs(list(bottom), knots), _nurbs(list(top), knots)
+
+
+def pocket_program() -> Program:
+    """The pocket as tips and directions of the tool; no feed is printed."""
+    bottom, top = (curve.at(np.linspace(0.0, 1.0, POCKET_POINTS)) for curve in pocket())
+    return tip_path(ma(), bottom, directions=top - bottom, feed=1000.0)
+
+
 def tube() -> Program:
     """The test problem CNOC of pins-ocs/OCP-tests, data/CNOC_Data.rb: seven rows of two lines each, that rise by 2 mm to their middle,
     joined by half-arcs on the right and lines on the left."""
@@ -124,6 +141,23 @@ def nie(inside: bool) -> Machine:
         normal_acceleration=1000.0,
         tangential_acceleration=1000.0,
         tangential_jerk=1e5,
+    )
+
+
+def ma() -> Machine:
+    """Ma et al. 2022, table 4, a tilting table whose axes meet in the origin of the workpiece (their eq. 2). A chord error of at most
+    0.125 um at 2 ms is a normal acceleration of the tip of at most 250 mm/s2 (their eq. 6)."""
+    linear = Axis(velocity=100.0, acceleration=500.0, jerk=3000.0)
+    a, c = (
+        Axis(velocity=np.rad2deg(v), acceleration=np.rad2deg(0.5), jerk=np.rad2deg(1.5)) for v in (0.4, 0.8)
+    )
+    return Machine(
+        name="Ma",
+        dt=0.002,
+        tolerance=2.0 * ON_THE_PATH,
+        axes={"x": linear, "y": linear, "z": linear, "a": a, "c": c},
+        kinematics={"type": "xyzac-trt"},
+        normal_acceleration=8.0 * 0.125e-3 / 0.002**2,
     )
 
 
@@ -217,6 +251,12 @@ CASES = (
         differs="1 um of tolerance; no jerk limit", program=_exact(sinusoid, 1000.0), machine=he,
     ),
     Case(
+        name="five-axis pocket", source="Ma et al., J. Comput. Des. Eng. 9 (2022) 2355, 10.1093/jcde/qwac116", way="optimal:quick",
+        published="ICVP 9.44; LP 22.976; Beckhoff, without jerk limits, 24.564", length=98.168,
+        differs="2 um of tolerance, of the direction too at 50 mm; their control is constant in some 200 steps",
+        program=pocket_program, machine=lambda: at_tip(ma()),
+    ),
+    Case(
         name="CNOC", source="pins-ocs/OCP-tests, test CNOC", published="", way="optimal", length=498.056,
         differs="its objective is to hold the feed of 173 mm/s, not the time; the smaller one of its two jerks along the path; jerk of "
         "the axes for the normal one",
@@ -244,8 +284,7 @@ LEFT_OUT = {
     "Beudaert et al. 2012, open pocket (planned 2.8 s, measured 3.7 s)": "the path is printed, but not where the machine's rotary axes "
     "are, and the limits are those of its axes",
     "Beudaert et al. 2012, lock (4.2 s, 4.5 s)": "the path is a figure",
-    "Ma et al. 2022, open pocket (ICVP 9.44 s, LP 22.98 s, Beckhoff 24.56 s)": "control points and limits are printed, but were not at "
-    "hand when this was written",
+    "Ma et al. 2022, impeller (3.16 s) and S piece (11.55 s)": "the paths are figures",
     "He et al. 2022, squircle (1.7000 s)": "does not reproduce: the optimum of the printed data is 1.646 s wherever it starts",
     "Consolini et al. 2022, kappa = 0.2 sin(s/10) (20.65 s)": "does not reproduce: the optimum of the printed data is 15.214 s",
     "J-NNC, square and circle (100 mm/s, 2000 mm/s2, 62,500 mm/s3)": "their sizes and times were not at hand",

@@ -98,7 +98,7 @@ SMALL = (
 )
 USUAL = (*QUICK_WAYS, "toppra", "copp", "copp:quick", "ruckig", "linuxcnc", *MODELS)
 RANDOM_RIVALS = ("stop", "kinematic", "optimal/bezier", "optimal/fir", "optimal/kinematic")
-PUBLISHED_WAYS = ("optimal", "second-order", "bezier", "fir", "fir-plain", "kinematic", "stop")
+PUBLISHED_WAYS = ("optimal", "optimal:quick", *QUICK_WAYS[2:-1], "fir-plain", "stop")
 LARGE = ("optimal", "optimal:quick", "second-order", "toppra", "linuxcnc", "kinematic", "stop", *MODELS)
 
 

@@ -251,7 +251,7 @@ CASES = (
         differs="1 um of tolerance; no jerk limit", program=_exact(sinusoid, 1000.0), machine=he,
     ),
     Case(
-        name="five-axis pocket", source="Ma et al., J. Comput. Des. Eng. 9 (2022) 2355, 10.1093/jcde/qwac116", way="optimal:quick",
+        name="five-axis pocket", source="Ma et al., J. Comput. Des. Eng. 9 (2022) 2355, 10.1093/jcde/qwac116", way="optimal",
         published="ICVP 9.44; LP 22.976; Beckhoff, without jerk limits, 24.564", length=98.168,
         differs="2 um of tolerance, of the direction too at 50 mm; their control is constant in some 200 steps",
         program=pocket_program, machine=lambda: at_tip(ma()),

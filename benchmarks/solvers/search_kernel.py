@@ -3,7 +3,7 @@
     python -m benchmarks.solvers.search_kernel [--job NAME ...] [--windows N] [--passes N]    into results/search-kernel.json and .md
 
 Every window that a plan asks for is written down. The longest ones are then solved again, processor seconds, the least of some
-passes: on single numbers, as plans do it; four of the same side by side in lanes, where none waits for another; and one of
+passes: on single numbers; four of the same side by side in lanes, where none waits for another; and one of
 these groups with a single window in it. Reading windows into the kernel's memory and back is in all of it.
 """
 
@@ -53,9 +53,9 @@ def windows_of(program: Program, machine: Machine) -> list[Asked]:
     """The windows that a plan asks for, as they were asked for."""
     seen, usual = list[Asked](), groups.solve_windows
 
-    def solve(asked: list[Asked]) -> Any:
+    def solve(asked: list[Asked], width: int) -> Any:
         seen.extend(copy_of(one) for one in asked)
-        return usual(asked)
+        return usual(asked, width)
 
     groups.solve_windows = solve
     try:

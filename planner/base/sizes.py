@@ -72,9 +72,14 @@ class Sizes:
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time
-    # steps of a window, which is half as long at least: joins that are searched once more must not touch one
-    # another
-    searched_window: int = _size(ROUTES, 1_500, 200)
+    # steps of a run that is one window: divided, some end up to 9e-3 slower
+    searched_whole: int = _size(ROUTES, 1_500, 200)
+    # steps of a window of others, which is three quarters as long at least: joins that are searched once more must not
+    # touch one another. Longer ones take more iterations, and four of them side by side have no room in a processor's cache
+    searched_window: int = _size(ROUTES, 500, 200)
+    searched_in_lanes: int = _size(
+        ROUTES, 5_000, 200
+    )  # steps of searches whose windows are solved side by side
     searched_overlap: int = _size(ROUTES, 120, 30)  # steps on each side of a join that is searched once more
     # steps between a join and where it would be: it is where the motion uses least of its limits
     searched_join: int = _size(ROUTES, 40, 10)

@@ -2,14 +2,14 @@
 
     python -m planner.commands.ahead [corners]
 
-plans two programs with the usual method and bounds their times, which compiles what is not kept yet, and
-prints the files of all kernels that this has used. What another method, a curve of another kind or a longer
-job needs is compiled when it is first used.
+plans three programs with the usual method and bounds their times, which compiles what is not kept yet, and
+prints the files of all kernels that this has used. What another method or a curve of another kind needs is
+compiled when it is first used.
 
 Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by
 side, the second time with `corners`: three moves that need not be read, on corners that need no splines. That
-comes to geometry, path, feedrate, samples and verdict while the first compiles the reading and the splines.
-Both keep their kernels in the same place, and each loads what it finds.
+comes to geometry, path, feedrate, samples and verdict while the first compiles the reading and the splines;
+and then the last of the programs. Both keep their kernels in the same place, and each loads what it finds.
 """
 
 import sys
@@ -19,7 +19,9 @@ from planner.base.names import OPTIMAL, SINGLE_CORNERS
 
 MACHINE = "mill"
 # Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so
-# short that other corners might be faster, which are planned beside it.
+# short that other corners might be faster, which are planned beside it. The last one is so long that windows of
+# its search are solved side by side (joint/groups.py).
+LEGS = 450
 PROGRAMS = (
     """G21 G90 G17 G64 P0.02
 G1 X20 F3000
@@ -38,6 +40,7 @@ G1 X30
 M2
 """,
     "G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X6 Y11 I-5 J1\nM2\n",
+    "\n".join(["G21 G90 G64 P0.02 F3000", *(f"G1 X{k} Y{k % 2}" for k in range(1, LEGS)), "M2\n"]),
 )
 POINTS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 1.0, 0.0))  # [mm]
 FEED = 10.0  # [mm/s]
@@ -57,16 +60,19 @@ def compile_ahead() -> list[str]:
 
 
 def compile_corners() -> bool:
-    """Plan moves through `POINTS`; returns whether the plan passed."""
+    """Plan moves through `POINTS`, then the last of the programs; returns whether both passed."""
     import numpy as np
 
     from planner.machine import load_machine
     from planner.nc.points import program_of_points
+    from planner.nc.reader import parse_program
     from planner.planning.methods.registry import plan
 
+    machine = load_machine(MACHINE)
     program = program_of_points(np.array(POINTS), np.full(len(POINTS) - 1, FEED), None)
-    made = plan(program, load_machine(MACHINE), method=OPTIMAL, geometry=SINGLE_CORNERS)
-    return made.verdict is not None and made.verdict.passed
+    made = plan(program, machine, method=OPTIMAL, geometry=SINGLE_CORNERS)
+    long = plan(parse_program(PROGRAMS[-1], machine), machine)
+    return all(one.verdict is not None and one.verdict.passed for one in (made, long))
 
 
 if __name__ == "__main__":

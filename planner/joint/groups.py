@@ -2,7 +2,8 @@
 
 A search tells sweep by sweep what can be searched side by side, as tasks; a task tells window by window what is
 to be solved. Both are generators, resumed with what became of that. Windows that are ready wait until there are
-enough of them to find some of about the same length: a group takes as long as its longest. What a search finds
+enough of them to find some of about the same length: a group takes as long as its longest. Searches of few steps would
+seldom fill one: their windows are solved on single numbers, one at a time. What a search finds
 does not depend on its group, nor on the number of threads. Searches are begun when windows are wanted, so that
 few of them are on their way at any time.
 """
@@ -14,15 +15,14 @@ from itertools import count
 from threading import Condition
 from typing import Any, NamedTuple, TypeVar
 
+from planner.base.lanes import WIDTH
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
-from planner.joint.window_solver import WIDTH, Asked, Solved, alike, kind_of, solve_windows
+from planner.joint.window_solver import Asked, Solved, kind_of, solve_windows
 
 # Windows that wait when a group is put together, if there are so many.
 WAITING = 8 * WIDTH
-# What windows together that are not alike are worth against others [-]: they take different numbers of iterations,
-# and rows that only one of them has.
-MIXED = 0.8
+IN_LANES = SIZES.searched_in_lanes  # steps: windows of searches of fewer together are solved one at a time
 QUIET = SIZES.windows_shared  # steps: searches of fewer together are worth no thread
 Task = Generator[Asked, Solved, bool]  # returns whether it has ended well
 
@@ -43,10 +43,10 @@ Search = Generator[Sweep, list[bool], T]
 def searched(searches: Iterable[Search[T]], steps: int, tell: Callable[[], None] = lambda: None) -> list[T]:
     """What the searches return, in their order.
 
-    steps : that they have together, about
+    steps : that they have together, about: whether there are threads, and windows side by side
     tell  : called in this thread now and then
     """
-    groups = Groups(searches)
+    groups = Groups(searches, WIDTH if steps > IN_LANES else 1)
     if steps > QUIET:
         side_by_side([groups.work] * threads(), groups.stop, tell)
     else:
@@ -84,39 +84,32 @@ class _Ready(NamedTuple):
 
 
 class Sort(NamedTuple):
-    """By what windows are put together."""
+    """By what windows are put together; the kind is None for one that is solved by itself."""
 
     steps: int
-    kind: Hashable
-    alike: Hashable
+    kind: Hashable | None
 
 
 def together(waiting: list[Sort]) -> list[int]:
-    """Which windows to solve next, `WIDTH` of one kind at most: those that leave least of a group as long as its
-    longest idle, and rather windows that are alike."""
-    steps, kinds, alikes = zip(*waiting, strict=True)
-    longest_first = sorted(range(len(steps)), key=lambda at: -steps[at])
-    best, most = [0], 0.0
-    for keys, worth in ((alikes, 1.0), (kinds, MIXED)):
-        of_one: dict[Hashable, list[int]] = {}
-        for at in longest_first:
-            of_one.setdefault(keys[at], []).append(at)
-        for of in of_one.values():
-            for k in range(max(len(of) - WIDTH, 0) + 1):
-                group = of[k : k + WIDTH]
-                filled = worth * sum(steps[at] for at in group) / (WIDTH * steps[group[0]])
-                if filled > most:
-                    best, most = group, filled
-    return best
+    """Which windows to solve next: the longest of those that are solved by themselves; where there are none, `WIDTH` of one
+    kind at most, those that leave least of a group as long as its longest idle."""
+    of_kind: dict[Hashable | None, list[int]] = {}
+    for at in sorted(range(len(waiting)), key=lambda at: -waiting[at].steps):
+        of_kind.setdefault(waiting[at].kind, []).append(at)
+    if None in of_kind:
+        return of_kind[None][:1]
+    groups = (of[k : k + WIDTH] for of in of_kind.values() for k in range(max(len(of) - WIDTH, 0) + 1))
+    return max(groups, key=lambda group: sum(waiting[at].steps for at in group) / waiting[group[0]].steps)
 
 
 class Groups:
-    """Searches, from which any number of threads take windows (`work`).
+    """Searches, from which any number of threads take windows (`work`), `width` of them at most.
 
     found : what the searches have returned, by their number
     """
 
-    def __init__(self, searches: Iterable[Search[Any]]):
+    def __init__(self, searches: Iterable[Search[Any]], width: int):
+        self.width = width
         self.found: dict[int, Any] = {}
         self._new: Iterator[_Running] = map(_Running, count(), searches)
         self._going: list[_Running] = []  # with tasks that have not been begun
@@ -169,7 +162,8 @@ class Groups:
         return solve
 
     def _solve(self, group: list[_Ready]) -> None:
-        for one, solved in zip(group, solve_windows([one.asked for one in group]), strict=True):
+        width = 1 if group[0].sort.kind is None else self.width
+        for one, solved in zip(group, solve_windows([one.asked for one in group], width), strict=True):
             self._resume(one.running, one.task, solved)
 
     def _resume(self, running: _Running, task: Task, solved: Solved | None = None) -> None:
@@ -183,7 +177,8 @@ class Groups:
             assert running.ended is not None
             running.ended += ended
             if asked is not None and not running.given_up():
-                sort = Sort(len(asked.window.u), kind_of(asked), alike(asked))
+                kind = None if self.width == 1 else kind_of(asked)
+                sort = Sort(len(asked.window.u), kind)
                 self._ready.append(_Ready(running, task, asked, sort))
                 return
             running.left -= 1

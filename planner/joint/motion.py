@@ -6,7 +6,6 @@ down by lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -56,38 +55,38 @@ def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Ste
 
 def integrated(begin: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
     """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A)
-    [mm, s].
+    [mm, s]. Of several motions at once with further dimensions before these.
 
     h    : (N,) durations [s]
     jerk : (N, A) constant on each step [mm/s3]
     """
-    h, state = h[:, None], np.empty((len(h) + 1, 3, jerk.shape[1]))
-    a = state[:, 2] = _summed(begin[2], h * jerk)
-    v = state[:, 1] = _summed(begin[1], h * (a[:-1] + h * jerk / 2))
-    state[:, 0] = _summed(begin[0], h * (v[:-1] + h * (a[:-1] / 2 + h * jerk / 6)))
-    return state
+    h, p, v, a = h[..., None], *np.moveaxis(begin[..., None, :, :], -2, 0)
+    a = _summed(a, h * jerk)
+    v = _summed(v, h * (a[..., :-1, :] + h * jerk / 2))
+    p = _summed(p, h * (v[..., :-1, :] + h * (a[..., :-1, :] / 2 + h * jerk / 6)))
+    return np.stack([p, v, a], axis=-2)
 
 
 def _summed(begin: FloatArray, change: FloatArray) -> FloatArray:
-    """(N+1, A) begin (A,) and the sums of the changes (N, A) after it."""
-    return begin + np.vstack([np.zeros_like(change[:1]), np.cumsum(change, axis=0)])
+    """(.., N+1, A) begin (.., 1, A) and the sums of the changes (.., N, A) after it."""
+    return np.concatenate([begin, begin + np.cumsum(change, axis=-2)], axis=-2)
 
 
 def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
     """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those
-    given, changed least.
+    given, changed least. Of several motions at once with further dimensions before these.
 
-    h    : (N,) durations [s]
+    h    : (N,) durations [s], of which some may be 0
     jerk : (N, A) [mm/s3]
     """
-    lasts = h.sum()
-    rest = (lasts - np.cumsum(h)) / lasts  # after each step, in units of the whole time
+    lasts = h.sum(axis=-1)[..., None]
+    rest = (lasts - np.cumsum(h, axis=-1)) / lasts  # after each step, in units of the whole time
     own = h / lasts
     to_end = np.stack(
-        [own * (own**2 / 6 + rest * (own / 2 + rest / 2)), own * (own / 2 + rest), own]
+        [own * (own**2 / 6 + rest * (own / 2 + rest / 2)), own * (own / 2 + rest), own], axis=-2
     )  # of p, v, a, in those units
-    missed = (integrated(begin, h, jerk)[-1] - end) / lasts ** np.array([[3.0], [2.0], [1.0]])
-    return jerk - np.linalg.lstsq(to_end, missed, rcond=None)[0]
+    missed = (integrated(begin, h, jerk)[..., -1, :, :] - end) / lasts[..., None] ** [[3.0], [2.0], [1.0]]
+    return jerk - np.linalg.pinv(to_end) @ missed
 
 
 def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -98,11 +97,14 @@ def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple
     jerk : (N, A) [mm/s3]
     """
     ends = np.linspace(0, len(h), max(len(h) // CLOSED_EVERY, 1) + 1).astype(int)
-    nodes, jerks = state.copy(), np.empty_like(jerk)
-    for lo, hi in pairwise(ends.tolist()):
-        jerks[lo:hi] = closed(state[lo], state[hi], h[lo:hi], jerk[lo:hi])
-        nodes[lo:hi] = integrated(state[lo], h[lo:hi], jerks[lo:hi])[:-1]
-    return nodes, jerks
+    begin, steps = ends[:-1], np.diff(ends)
+    number = np.arange(steps.max())
+    there = number < steps[:, None]
+    of = np.minimum(begin[:, None] + number, len(h) - 1)
+    lasting = np.where(there, h[of], 0.0)  # a step of no duration stands for one that is not there
+    jerks = closed(state[begin], state[ends[1:]], lasting, jerk[of])
+    nodes = integrated(state[begin], lasting, jerks)[:, :-1]
+    return np.concatenate([nodes[there], state[-1:]]), jerks[there]
 
 
 def _largest_square(v: FloatArray, middle: FloatArray, after: FloatArray, counts: FloatArray) -> FloatArray:

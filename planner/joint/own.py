@@ -38,9 +38,10 @@ from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
 from planner.joint.window_solver import Asked
 
-# Steps of a window at most, on each side of a join that is searched once more, and of the smallest part that
-# a window which fails is divided into.
-WINDOW, OVERLAP, LEAST = SIZES.searched_window, SIZES.searched_overlap, SIZES.searched_least
+# Steps of a run that is one window, of a window of others at most, on each side of a join that is searched once more, and
+# of the smallest part that a window which fails is divided into.
+WHOLE, WINDOW = SIZES.searched_whole, SIZES.searched_window
+OVERLAP, LEAST = SIZES.searched_overlap, SIZES.searched_least
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where
 # it would be.
 JOIN_WITHIN = SIZES.searched_join
@@ -151,7 +152,8 @@ class _Search:
     def sweeps(self) -> Generator[Sweep, list[bool], bool]:
         """All windows, and then all joins; whether it was not given up."""
         steps = len(self.guess)
-        even = np.linspace(0, steps, max(int(np.ceil(steps / WINDOW)), 1) + 1).astype(int)
+        parts = 1 if steps <= WHOLE else int(np.ceil(steps / WINDOW))
+        even = np.linspace(0, steps, parts + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
         if not self.settings.divide:  # no step of the guess is kept
             self._slow(joins)

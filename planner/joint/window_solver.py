@@ -1,4 +1,4 @@
-"""Windows of steps (problem.py), solved together where they are alike."""
+"""Windows of steps (problem.py), solved by themselves or side by side."""
 
 from collections.abc import Hashable, Sequence
 from typing import NamedTuple
@@ -6,15 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.lanes import WIDTH as LANES
-from planner.joint.group import group_of, place_of, rows_of
+from planner.joint.group import AXES, group_of, place_of, rows_of
 from planner.joint.interior_point import Found, Tuning, solve_group
 from planner.joint.memory import work_of
 from planner.joint.problem import StepWindow
-
-# Windows that are solved together. Four alike take 0.3 to 0.8 of the time in full `LANES`, but one alone there 1.3 to 3 times
-# that on single numbers (`python -m benchmarks.solvers.search_kernel`), and windows of a group wait for its longest.
-WIDTH = 1
 
 
 class Asked(NamedTuple):
@@ -32,23 +27,19 @@ class Solved(NamedTuple):
     z: FloatArray  # (N, R) multipliers of its rows, in units of time
 
 
-def kind_of(asked: Asked) -> Hashable:
-    """Windows of one kind may be solved together."""
-    return asked.window.u.shape[1]
-
-
-def alike(asked: Asked) -> Hashable:
-    """The kind of a window, and what its iterations and their cost depend on most."""
+def kind_of(asked: Asked) -> Hashable | None:
+    """What windows have in common that are solved side by side: their axes, and the iterations they take about. None for one
+    that gains nothing by it: rows of arcs, curves and laws are worked out lane by lane. For more axes no kernel with
+    `LANES` is compiled."""
     window = asked.window
     bent = bool(window.limits.passed.any() or window.legs.radius.any())
-    return kind_of(asked), asked.tuning.gap, bent, len(window.which)
+    axes = window.u.shape[1] - 1
+    return None if bent or len(window.which) or axes > AXES[0] else (axes, asked.tuning.gap)
 
 
-def solve_windows(asked: Sequence[Asked], width: int | None = None) -> list[Solved]:
-    """Solve `width` windows of one kind at most side by side, None for one on single numbers and more in `LANES`; what is found
-    in one of them does not depend on the others."""
-    if width is None:
-        width = 1 if len(asked) == 1 else LANES
+def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
+    """Solve `width` windows of one kind at most: in `LANES`, or one on single numbers, which rounds in another order. What is
+    found in one of them does not depend on the others."""
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))
     tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T

@@ -63,7 +63,9 @@ def test_small_sizes_go_together():
     around their joins, or two threads would work on the same steps."""
     for found in (USUAL, chosen(SMALL)):
         assert found.relaxed_window > 2 * found.relaxed_overlap
-        assert found.searched_window / 2 > 2 * (found.searched_overlap + found.searched_join)
+        assert found.searched_whole / (found.searched_whole // found.searched_window + 1) > 2 * (
+            found.searched_overlap + found.searched_join
+        )
         assert found.searched_join < found.searched_overlap
 
 

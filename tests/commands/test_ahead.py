@@ -44,8 +44,11 @@ def test_a_package_that_was_built_plans_without_compiling(tmp_path: Path) -> Non
     job.write_text(
         "G21 G90 G64 P0.02 F3000\nG1 X20\nG2 X24 Y4 I4\nG1 X40 Y3 Z1\nX15 Y20\nM2\n", encoding="utf-8"
     )
+    zigzag = "\n".join(f"G1 X{k} Y{k % 3}" for k in range(500))
+    (long := tmp_path / "long.ngc").write_text(f"G21 G90 G64 P0.02 F3000\n{zigzag}\nM2\n", encoding="utf-8")
     cache = tmp_path / "cache"
-    assert cycle_time(job, build, NUMBA_CACHE_DIR=str(cache)) == cycle_time(job, ROOT)
+    for one in (job, long):
+        assert cycle_time(one, build, NUMBA_CACHE_DIR=str(cache)) == cycle_time(one, ROOT)
     assert not cache.exists()  # nothing was compiled
 
 

@@ -255,6 +255,7 @@ def test_ipopt_finds_nothing_more_where_it_ends(name):
 def test_windows_find_what_the_whole_run_finds(monkeypatch):
     run, guess = begun("pentagon")
     whole = TubeOwn().solve(run, guess)
+    monkeypatch.setattr(own, "WHOLE", 0)
     monkeypatch.setattr(own, "WINDOW", (len(guess) + 1) // 2)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 5)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
@@ -297,13 +298,15 @@ def test_where_a_window_fails_the_start_stays_and_is_joined(monkeypatch):
     """The motion of the start between two windows that were found: verified, nothing jumps, and it is said."""
     solve = groups.solve_windows
 
-    def hasty(asked):
+    def hasty(asked, width):
         inner = [one.window.x[0].any() and abs(one.window.x[-1, 2:]).max() > 0 for one in asked]
         return [
-            one._replace(done=one.done and not fails) for one, fails in zip(solve(asked), inner, strict=True)
+            one._replace(done=one.done and not fails)
+            for one, fails in zip(solve(asked, width), inner, strict=True)
         ]
 
     monkeypatch.setattr(groups, "solve_windows", hasty)
+    monkeypatch.setattr(own, "WHOLE", 60)
     monkeypatch.setattr(own, "WINDOW", 60)
     monkeypatch.setattr(own, "OVERLAP", 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 10)

@@ -73,13 +73,12 @@ def solved(monkeypatch) -> list[list[tuple[int, int]]]:
     """The groups that are solved: the shapes of their windows, which are the answers."""
     seen: list[list[tuple[int, int]]] = []
 
-    def solve(asked):
+    def solve(asked, width):
+        assert len(asked) <= width
         seen.append([one.window.u.shape for one in asked])
         return seen[-1]
 
     monkeypatch.setattr(groups, "solve_windows", solve)
-    monkeypatch.setattr(groups, "WIDTH", LANES)
-    monkeypatch.setattr(groups, "WAITING", 8 * LANES)
     return seen
 
 
@@ -110,12 +109,28 @@ def test_all_windows_are_solved_once_in_groups_of_one_kind_and_about_one_length(
         assert used > 0.8 * LANES * sum(max(group)[0] for group in solved)
 
 
-def test_windows_that_are_alike_are_together_where_there_are_enough(monkeypatch):
-    monkeypatch.setattr(groups, "WIDTH", LANES)
-    few = [Sort(50, 3, 1e-3), Sort(49, 3, 1e-5)]
-    many = [*few, Sort(48, 3, 1e-3), Sort(47, 3, 1e-5)] * 2
-    assert sorted(groups.together(few)) == [0, 1]
-    assert {many[at].alike for at in groups.together(many)} == {1e-3}
+def test_only_windows_of_one_kind_are_together_and_what_is_solved_by_itself_comes_first():
+    waiting = [Sort(50, 1e-3), Sort(90, 1e-5), Sort(49, 1e-3), Sort(80, 1e-5), Sort(70, 1e-5)]
+    assert groups.together(waiting) == [1, 3, 4]
+    assert groups.together([*waiting, Sort(20, None), Sort(30, None)]) == [6]
+
+
+def test_windows_side_by_side_are_straight_and_of_few_axes():
+    straight = asked_for(20)
+    bent = asked_for(20)
+    bent.window.legs.radius = np.ones(1)
+    held = asked_for(20)
+    held.window.which = (0,)
+    assert kind_of(straight) == kind_of(asked_for(90)) is not None
+    assert kind_of(straight) != kind_of(asked_for(20, axes=2))
+    assert [kind_of(one) for one in (bent, held, asked_for(20, axes=5))] == [None] * 3
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_searches_of_few_steps_have_their_windows_solved_one_at_a_time(solved, threads):
+    use_threads(threads)
+    searched([search([[task([asked_for(20)])]], []) for _ in range(50)], groups.IN_LANES)
+    assert [len(group) for group in solved] == [1] * 50
 
 
 def test_searches_are_begun_when_windows_are_wanted(solved):
@@ -151,12 +166,12 @@ def test_an_error_or_an_interrupt_ends_all_searches(monkeypatch, solved, threads
     use_threads(threads)
     solve, many = groups.solve_windows, 0
 
-    def breaks(asked):
+    def breaks(asked, width):
         nonlocal many
         many += 1
         if many == 5:
             raise error
-        return solve(asked)
+        return solve(asked, width)
 
     monkeypatch.setattr(groups, "solve_windows", breaks)
     before = threading.active_count()
@@ -170,7 +185,7 @@ def test_an_error_or_an_interrupt_ends_all_searches(monkeypatch, solved, threads
 
 @pytest.fixture
 def small_windows(monkeypatch) -> None:
-    for name, steps in (("WINDOW", 40), ("OVERLAP", 8), ("JOIN_WITHIN", 4), ("LEAST", 15)):
+    for name, steps in (("WHOLE", 40), ("WINDOW", 40), ("OVERLAP", 8), ("JOIN_WITHIN", 4), ("LEAST", 15)):
         monkeypatch.setattr(own, name, steps)
 
 
@@ -187,8 +202,8 @@ def jobs():
         return made, [solver.solve(run, guess) for solver, run, guess in made]
 
 
-def in_lanes(asked):
-    """Also a window by itself: single numbers are rounded in another order."""
+def in_lanes(asked, width):
+    """Also what plans solve on single numbers, which are rounded in another order."""
     return solve_windows(asked, LANES)
 
 
@@ -205,7 +220,8 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed)
 
     def shuffled(waiting):
         order = rng.permutation(len(waiting)).tolist()
-        return [at for at in order if waiting[at].kind == waiting[order[0]].kind][:width]
+        kind = waiting[order[0]].kind
+        return [at for at in order if waiting[at].kind == kind][: 1 if kind is None else width]
 
     monkeypatch.setattr(groups, "together", shuffled)
     monkeypatch.setattr(groups, "solve_windows", in_lanes)
@@ -233,22 +249,22 @@ def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
     """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
     whatever the group; where parts are of use, all are."""
     run, guess = begun("pentagon")
+    monkeypatch.setattr(own, "WHOLE", 0)
     monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
-    monkeypatch.setattr(groups, "WIDTH", width)
     monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
     windows, solve = set[bytes](), groups.solve_windows
     second = None
 
-    def second_fails(asked):
+    def second_fails(asked, _):
         nonlocal second
         for one in asked:
             windows.add(one.window.origin.tobytes())
             if len(windows) == 2 and second is None:
                 second = one.window.origin.tobytes()
-        found = solve(asked)
+        found = solve(asked, 1 if width == 1 else LANES)
         return [
             one._replace(done=False) if window.window.origin.tobytes() == second else one
             for one, window in zip(found, asked, strict=True)
@@ -289,8 +305,8 @@ def test_lanes_find_what_single_numbers_find():
 
     order = list(range(len(asked)))
     together, reverse = {}, {}
-    for kind in {kind_of(one) for one in asked}:
-        of_kind = [at for at in order if kind_of(asked[at]) == kind][:LANES]
+    for axes in (2, 3):
+        of_kind = [at for at in order if asked[at].window.u.shape[1] - 1 == axes][:LANES]
         together |= solved(of_kind, LANES)
         reverse |= solved(of_kind[::-1], LANES)
     assert sum(end.done for end, _ in together.values()) > LANES

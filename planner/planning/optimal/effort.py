@@ -26,6 +26,8 @@ COARSE = 3.2e-2
 # The first steps of a search, those of the second one, and the gaps of both [-].
 FIRST_CUT, SECOND_CUT = Cut(per_unit=1.0, of_leg=1.0), Cut(per_unit=4.0, of_leg=1.0)
 FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
+# Of large motions.
+LARGE_GAP = 1e-4
 # For the best of efforts.
 BEST_CUT, BEST_GAP = Cut(per_unit=8.0, of_leg=2.0), 1e-6
 
@@ -51,12 +53,15 @@ class Search:
     again: bool = True  # search once more where that has not ended
     # steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a
     # step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the
-    # time for 2e-3 less motion
+    # time for 2e-3 less motion. And instead of `finer` once more in steps about as long, with the tolerance that
+    # chords and filters need beside what was found: that is most of what `finer` gains, for half of its time
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:
         """That of a motion of so many steps."""
-        return self if steps <= self.small else dataclasses.replace(self, finer=(), again=False)
+        if steps <= self.small:
+            return self
+        return dataclasses.replace(self, finer=((self.cut, LARGE_GAP),), again=False)
 
 
 # Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two

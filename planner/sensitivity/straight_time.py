@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 
 UNLIMITED = 1e15  # instead of no limit [mm, s]
 BISECTIONS = 50  # of the largest speed
@@ -39,42 +40,7 @@ def straight_time(way: FloatArray, begin: End, end: End, most: Bounds) -> FloatA
     begin, end : of each
     most       : limits of each
     """
-    top = most.speed
-    low = np.minimum(np.maximum(begin.speed, end.speed), top)
-    time, covered = _up_and_down(top, begin, end, most)
-    found = np.where(covered <= way, time + (way - covered) / top, 0.0)
-    # without a phase at the top: the largest speed between both ends' and the top, from below
-    needs, fits = covered > way, _up_and_down(low, begin, end, most)[1] <= way
-    high = top.copy()
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2.0
-        short = _up_and_down(middle, begin, end, most)[1] <= way
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    time, covered = _up_and_down(low, begin, end, most)
-    found = np.where(needs & fits, time + np.maximum(way - covered, 0.0) / np.maximum(high, TINY), found)
-    # too short to get from one end's speed to the other's: as if only the slower end were known
-    slow, push = np.minimum(begin.speed, end.speed), most.acceleration
-    alone = (np.sqrt(slow**2 + 2.0 * push * way) - slow) / push
-    return np.maximum(np.where(needs & ~fits, alone, found), way / top)
-
-
-def _up_and_down(top: FloatArray, begin: End, end: End, most: Bounds) -> tuple[FloatArray, FloatArray]:
-    """Time and distance from one end to the speed `top` and from there to the other end."""
-    one, other = (_to_speed(top, at, most) for at in (begin, end))
-    return one[0] + other[0], one[1] + other[1]
-
-
-def _to_speed(top: FloatArray, at: End, most: Bounds) -> tuple[FloatArray, FloatArray]:
-    """Time and distance from an end to the speed `top`, without acceleration there."""
-    A, J = most.acceleration, most.jerk
-    resting = np.where(top <= A**2 / J, 2.0 * np.sqrt(top / J), top / A + A / J)
-    speed = np.minimum(at.speed, top)
-    more = top - speed
-    pushed = np.maximum(more - A**2 / (2.0 * J), 0.0) / A  # time at the full acceleration
-    falling = np.minimum(np.sqrt(2.0 * more / J), A / J)  # and of the falling one
-    middle = speed + A * pushed
-    way = speed * pushed + A * pushed**2 / 2.0 + middle * falling + J * falling**3 / 3.0
-    return np.where(at.rests, resting, pushed + falling), np.where(at.rests, resting * top / 2.0, way)
+    return np.asarray(_straight_times(way, begin, end, most))
 
 
 def largest_speed(way: FloatArray, begin: FloatArray, end: FloatArray, most: Bounds) -> FloatArray:
@@ -84,10 +50,73 @@ def largest_speed(way: FloatArray, begin: FloatArray, end: FloatArray, most: Bou
     begin, end : (n,) speeds that are not exceeded at their ends [mm/s]
     most       : limits of each
     """
-    low, high = np.minimum(np.maximum(begin, end), most.speed), most.speed.copy()
     free = np.zeros(len(way), dtype=bool)
+    return np.asarray(_largest_speeds(way, End(begin, free), End(end, free), most))
+
+
+@njit(cache=True, error_model="numpy")
+def _straight_times(way, begin, end, most):
+    """`straight_time`."""
+    found = np.empty(len(way))
+    for n in range(len(way)):
+        top, push = most.speed[n], most.acceleration[n]
+        time, covered = _up_and_down(top, n, begin, end, most)
+        if covered <= way[n]:
+            found[n] = time + (way[n] - covered) / top
+            continue
+        low, high = _between(way[n], n, begin, end, most)
+        time, covered = _up_and_down(low, n, begin, end, most)
+        if covered <= way[n]:  # without a phase at the top
+            found[n] = time + (way[n] - covered) / max(high, TINY)
+        else:  # too short to get from one end's speed to the other's: as if only the slower end were known
+            slow = min(begin.speed[n], end.speed[n])
+            found[n] = (np.sqrt(slow * slow + 2.0 * push * way[n]) - slow) / push
+        found[n] = max(found[n], way[n] / top)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _largest_speeds(way, begin, end, most):
+    """`largest_speed`."""
+    found = np.empty(len(way))
+    for n in range(len(way)):
+        found[n] = _between(way[n], n, begin, end, most)[1]
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _between(way, n, begin, end, most):
+    """The largest speed on a way, between both ends' speeds and the top, from below and above."""
+    high = most.speed[n]
+    low = min(max(begin.speed[n], end.speed[n]), high)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2.0
-        short = _up_and_down(middle, End(begin, free), End(end, free), most)[1] <= way
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return high
+        if _up_and_down(middle, n, begin, end, most)[1] <= way:
+            low = middle
+        else:
+            high = middle
+    return low, high
+
+
+@njit(cache=True, error_model="numpy")
+def _up_and_down(top, n, begin, end, most):
+    """Time and distance of way n from one end to the speed `top` and from there to the other end."""
+    time, way = _to_speed(top, n, begin, most)
+    more_time, more_way = _to_speed(top, n, end, most)
+    return time + more_time, way + more_way
+
+
+@njit(cache=True, error_model="numpy")
+def _to_speed(top, n, at, most):
+    """Time and distance of way n from an end to the speed `top`, without acceleration there."""
+    A, J = most.acceleration[n], most.jerk[n]
+    if at.rests[n]:
+        resting = 2.0 * np.sqrt(top / J) if top <= A * A / J else top / A + A / J
+        return resting, resting * top / 2.0
+    speed = min(at.speed[n], top)
+    more = top - speed
+    pushed = max(more - A * A / (2.0 * J), 0.0) / A  # time at the full acceleration
+    falling = min(np.sqrt(2.0 * more / J), A / J)  # and of the falling one
+    middle = speed + A * pushed
+    way = speed * pushed + A * pushed**2 / 2.0 + middle * falling + J * falling**3 / 3.0
+    return pushed + falling, way

@@ -44,6 +44,10 @@ from planner.sensitivity.straight_time import TINY, Bounds, End, largest_speed, 
 from planner.sensitivity.waypoints import Way
 
 SAMPLES = 20  # of a line on each side
+OF_CORNER, NEARBY = (
+    10,
+    8.0,
+)  # the same where corners are looked at alone, and up to when, of the time of the tolerance [-]
 FIRST = 0.15  # the time of the first sample, of that in which the tolerance is crossed [-]
 DENSER = 2.5  # power by which samples are closer to corners
 SETTLING = 1.5  # up to where samples go, of the time in which a line gets to its largest speed [-]
@@ -135,6 +139,7 @@ def programme_of(
     beside = np.stack([padded[chains[:, 0]], padded[chains[:, 1] + 1]])
     outer = np.where(run.stop[chains.T][..., None], 0.0, beside)[..., moved]
     lines = _with_corners(lines, at, sampled.only(leg), outer)
+    at = _layout(lines)
     rows = Rows()
     add_derivatives(rows, lines, at)
     add_places(rows, lines, at, outer)
@@ -194,19 +199,20 @@ def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray)
     legs, ends = sampled.legs, []
     for line, end in ((behind - 1, legs.end), (behind, legs.begin)):
         speed = np.where(end.rests, 0.0, bounds.speed)
-        scale, direction = speed[line], along[line]
+        unit, direction = end.speed[line], along[line]  # what is known, as a unit
         cost = np.zeros(n)
-        cost[variables] = -middle[..., None] * (direction / scale[:, None])[:, None]
+        cost[variables] = -middle[..., None] * (direction / unit[:, None])[:, None]
         programme = rows.programme(cost, np.zeros(n), reach)
         z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
-        found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * scale
-        speed[line] = np.minimum(scale, found + np.abs(direction) @ way.limit[2] * h * h_behind / 6.0)
+        found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * unit
+        speed[line] = np.minimum(speed[line], found + np.abs(direction) @ way.limit[2] * h * h_behind / 6.0)
         ends.append(End(speed, end.rests))
     one, other = way.tolerance[lines.window], way.tolerance[lines.window + 1]
     time = straight_time(np.maximum(length - one - other, 0.0), ends[1], ends[0], bounds)
     speed = largest_speed(length + 2.0 * np.maximum(one, other), ends[1].speed, ends[0].speed, bounds)
-    longer = sampled._replace(half=np.minimum(np.maximum(time, legs.time) / 2.0, sampled.settles))
-    return _timed(lines, longer)._replace(speeds=((way.tangent, sampled.speed), (along, speed)))
+    half = np.minimum(np.maximum(time, legs.time) / 2.0, sampled.settles)
+    lines = _timed(lines, half, sampled.crossed, SAMPLES)
+    return lines._replace(speeds=((way.tangent, sampled.speed), (along, speed)))
 
 
 def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
@@ -231,14 +237,15 @@ def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
     begins, ends = np.zeros(len(node), dtype=bool), np.zeros(len(node), dtype=bool)
     begins[np.append(0, np.cumsum(count + 1)[:-1])] = ends[np.cumsum(count + 1) - 1] = True
     speeds = ((way.tangent, sampled.speed),)
-    return _timed(Lines(window, way, sampled.half, sampled.half, begins, ends, speeds), sampled)
+    lines = Lines(window, way, sampled.half, sampled.half, begins, ends, speeds)
+    return _timed(lines, np.minimum(sampled.half, NEARBY * sampled.crossed), sampled.crossed, OF_CORNER)
 
 
-def _timed(lines: Lines, sampled: Sampled) -> Lines:
-    """Lines with their samples."""
-    n = np.arange(1, SAMPLES + 1)
-    even = np.minimum(FIRST * sampled.crossed, sampled.half / SAMPLES)[:, None]
-    time = even * n + (sampled.half[:, None] - even * SAMPLES) * (n / SAMPLES) ** DENSER
+def _timed(lines: Lines, half: FloatArray, crossed: FloatArray, samples: int) -> Lines:
+    """Lines with so many samples up to `half`."""
+    n = np.arange(1, samples + 1)
+    even = np.minimum(FIRST * crossed, half / samples)[:, None]
+    time = even * n + (half[:, None] - even * samples) * (n / samples) ** DENSER
     return lines._replace(front=time, back=time)
 
 

@@ -44,10 +44,8 @@ from planner.sensitivity.straight_time import TINY, Bounds, End, largest_speed, 
 from planner.sensitivity.waypoints import Way
 
 SAMPLES = 20  # of a line on each side
-OF_CORNER, NEARBY = (
-    10,
-    8.0,
-)  # the same where corners are looked at alone, and up to when, of the time of the tolerance [-]
+OF_CORNER = 10  # the same where a corner is looked at alone
+NEARBY = 8.0  # up to when it is sampled then, of the time in which the tolerance is crossed [-]
 FIRST = 0.15  # the time of the first sample, of that in which the tolerance is crossed [-]
 DENSER = 2.5  # power by which samples are closer to corners
 SETTLING = 1.5  # up to where samples go, of the time in which a line gets to its largest speed [-]

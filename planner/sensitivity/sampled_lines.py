@@ -178,7 +178,23 @@ def _coordinates(way: Way, bounds: Bounds) -> tuple[FloatArray, FloatArray, Boun
 
 
 def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray) -> Lines:
-    """Lines that take longer, by speeds at corners that programmes of the samples around each corner alone bound."""
+    """Lines that take longer and have a lower largest speed, by their speeds at corners."""
+    way, legs = lines.way, sampled.legs
+    along, length, bounds = _coordinates(way, sampled.bounds)
+    begin, end = ends_at_corners(lines, at, legs, outer, (along, bounds))
+    one, other = way.tolerance[lines.window], way.tolerance[lines.window + 1]
+    time = straight_time(np.maximum(length - one - other, 0.0), begin, end, bounds)
+    speed = largest_speed(length + 2.0 * np.maximum(one, other), begin.speed, end.speed, bounds)
+    half = np.minimum(np.maximum(time, legs.time) / 2.0, sampled.settles)
+    lines = _timed(lines, half, sampled.crossed, SAMPLES)
+    return lines._replace(speeds=((way.tangent, sampled.speed), (along, speed)))
+
+
+def ends_at_corners(
+    lines: Lines, at: Layout, legs: Legs, outer: FloatArray, coordinate: tuple[FloatArray, Bounds]
+) -> tuple[End, End]:
+    """(L,) the ends of lines in a coordinate, directions (L, A) and limits in them, by programmes of the samples around each
+    corner alone; `legs` of these lines, `outer` (2, P, A) as for all of them."""
     rows, way = Rows(), lines.way
     add_derivatives(rows, lines, at)
     add_places(rows, lines, at, outer)
@@ -193,8 +209,8 @@ def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray)
     variables = np.stack([at.back[behind - 1, 0], at.waypoint[inner], at.front[behind, 0]], axis=1)
     variables = variables[..., None] + np.arange(axes)
     reach = _reach(lines, at)
-    along, length, bounds = _coordinates(way, sampled.bounds)
-    legs, ends = sampled.legs, []
+    along, bounds = coordinate
+    ends = []
     for line, end in ((behind - 1, legs.end), (behind, legs.begin)):
         speed = np.where(end.rests, 0.0, bounds.speed)
         unit, direction = end.speed[line], along[line]  # what is known, as a unit
@@ -203,14 +219,10 @@ def _with_corners(lines: Lines, at: Layout, sampled: Sampled, outer: FloatArray)
         programme = rows.programme(cost, np.zeros(n), reach)
         z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
         found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * unit
-        speed[line] = np.minimum(speed[line], found + np.abs(direction) @ way.limit[2] * h * h_behind / 6.0)
+        found += np.abs(direction) @ way.limit[2] * h * h_behind / 6.0
+        speed[line] = np.minimum(speed[line], np.maximum(found, 0.0))
         ends.append(End(speed, end.rests))
-    one, other = way.tolerance[lines.window], way.tolerance[lines.window + 1]
-    time = straight_time(np.maximum(length - one - other, 0.0), ends[1], ends[0], bounds)
-    speed = largest_speed(length + 2.0 * np.maximum(one, other), ends[1].speed, ends[0].speed, bounds)
-    half = np.minimum(np.maximum(time, legs.time) / 2.0, sampled.settles)
-    lines = _timed(lines, half, sampled.crossed, SAMPLES)
-    return lines._replace(speeds=((way.tangent, sampled.speed), (along, speed)))
+    return ends[1], ends[0]
 
 
 def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:

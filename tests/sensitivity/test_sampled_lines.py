@@ -15,7 +15,13 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Machine, load_machine
 from planner.sensitivity import sampled_lines
 from planner.sensitivity.linear_program import Programme, bounds_by_part, multipliers
-from planner.sensitivity.sampled_lines import chain_times, chains_of, programme_of, sampled_legs
+from planner.sensitivity.sampled_lines import (
+    chain_times,
+    chains_of,
+    ends_at_corners,
+    programme_of,
+    sampled_legs,
+)
 from planner.sensitivity.sampled_rows import Layout, Lines, differences
 from planner.sensitivity.waypoints import Way, way_of
 
@@ -145,3 +151,19 @@ def test_programmes_of_fewer_lines_bound_no_more(monkeypatch: pytest.MonkeyPatch
         return float(chain_times(way, sampled, found, y).sum() + left)
 
     assert bound(3) <= bound(7) <= bound(100) * (1.0 + 1e-4)
+
+
+def test_speeds_at_a_corner_are_landaus() -> None:
+    # beside one leg until the corner, and free behind it: a coordinate that is confined before, and the other one behind
+    jerk, eps = 5e4, 0.02
+    axis = Axis(velocity=1e4, acceleration=1e7, jerk=jerk)
+    machine = Machine(name="soft", dt=1e-3, tolerance=eps, axes=dict.fromkeys("xyz", axis))
+    way = way_through(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]), machine)
+    found = np.array([[0, 2]])
+    sampled, moved = sampled_legs(way), np.array([True, True, False])
+    lines = sampled_lines._lines_of(way, sampled, found, moved)
+    at, outer = sampled_lines._layout(lines), np.zeros((2, 1, 2))
+    begin, end = ends_at_corners(lines, at, sampled.legs, outer, (lines.way.tangent, sampled.bounds))
+    most = np.cbrt(243.0 / 8.0 * eps**2 * jerk)
+    for speed in (begin.speed[1], end.speed[0]):
+        assert most <= speed < 1.04 * most

@@ -131,13 +131,13 @@ def programme_of(
     """The programme of chains, and y of the legs before them and behind them (2, P, A), 0 at stops."""
     moved = np.abs(run.tangent[run.line]).max(axis=0) > 0.0  # others have nothing to tell
     leg = np.concatenate([np.arange(*ends) for ends in chains])
-    lines = _lines_of(run, sampled.only(leg), chains, moved)
-    at = _layout(lines)
+    lines = lines_of(run, sampled.only(leg), chains, moved)
+    at = layout_of(lines)
     padded = np.pad(y, ((1, 1), (0, 0)))
     beside = np.stack([padded[chains[:, 0]], padded[chains[:, 1] + 1]])
     outer = np.where(run.stop[chains.T][..., None], 0.0, beside)[..., moved]
     lines = _with_corners(lines, at, sampled.only(leg), outer)
-    at = _layout(lines)
+    at = layout_of(lines)
     rows = Rows()
     add_derivatives(rows, lines, at)
     add_places(rows, lines, at, outer)
@@ -225,8 +225,8 @@ def ends_at_corners(
     return ends[1], ends[0]
 
 
-def _lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
-    """The lines of chains, and when they are sampled, in the axes that move."""
+def lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
+    """The lines of `chains` (P, 2), of which `sampled` is, and when corners are looked at alone; in the axes that `moved` (A,)."""
     first, behind = chains.T
     count = behind - first
     chain = np.repeat(np.arange(len(first)), count)
@@ -259,8 +259,8 @@ def _timed(lines: Lines, half: FloatArray, crossed: FloatArray, samples: int) ->
     return lines._replace(front=time, back=time)
 
 
-def _layout(lines: Lines) -> Layout:
-    """Variables in order: of each chain its first waypoint, then of each line the samples behind its begin, tau, those before
+def layout_of(lines: Lines) -> Layout:
+    """The n variables in order: of each chain its first waypoint, then of each line the samples behind its begin, tau, those before
     its end, and the waypoint there."""
     (count, samples), axes = lines.front.shape, lines.way.point.shape[1]
     n = np.arange(samples)

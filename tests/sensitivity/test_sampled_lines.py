@@ -19,6 +19,8 @@ from planner.sensitivity.sampled_lines import (
     chain_times,
     chains_of,
     ends_at_corners,
+    layout_of,
+    lines_of,
     programme_of,
     sampled_legs,
 )
@@ -161,8 +163,8 @@ def test_speeds_at_a_corner_are_landaus() -> None:
     way = way_through(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]), machine)
     found = np.array([[0, 2]])
     sampled, moved = sampled_legs(way), np.array([True, True, False])
-    lines = sampled_lines._lines_of(way, sampled, found, moved)
-    at, outer = sampled_lines._layout(lines), np.zeros((2, 1, 2))
+    lines = lines_of(way, sampled, found, moved)
+    at, outer = layout_of(lines), np.zeros((2, 1, 2))
     begin, end = ends_at_corners(lines, at, sampled.legs, outer, (lines.way.tangent, sampled.bounds))
     most = np.cbrt(243.0 / 8.0 * eps**2 * jerk)
     for speed in (begin.speed[1], end.speed[0]):

@@ -2,7 +2,7 @@
 changed the planner since; of a suite's report, since the oldest of its rows ("Rows of planner COMMIT, ...").
 
 A figure that README.md quotes may be `README_LIMIT` commits old. The pages of docs/ quote measurements that take hours, and may quote
-older ones; those above `STALE` are listed in docs/benchmarks.md, which `python -m benchmarks report` writes.
+older ones; those above `STALE` are listed in results/ages.md, which `python -m benchmarks report` writes.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.record import RESULTS, markdown
+from benchmarks.record import RESULTS, markdown, write_results
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE = ROOT / "docs" / "benchmarks.md"
-BEGIN, END = "<!-- ages: written by `python -m benchmarks report` -->", "<!-- end of ages -->"
+NAME = "ages"  # of the list in results/
 README_LIMIT = 300  # commits that changed the planner: about a week of this project's work
 STALE = 200  # of the same, from which a result of docs/ is listed
 _MADE = re.compile(
@@ -71,10 +70,9 @@ def _only_there(name: str, results: Path) -> bool:
 
 
 def pages() -> dict[str, str]:
-    """README.md and the pages of docs/ by name, without the list of ages itself."""
+    """README.md and the pages of docs/ by name."""
     files = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    texts = {file: file.read_text(encoding="utf-8") for file in files}
-    return {str(file.relative_to(ROOT)): text.partition(BEGIN)[0] for file, text in texts.items()}
+    return {str(file.relative_to(ROOT)): file.read_text(encoding="utf-8") for file in files}
 
 
 def has_history() -> bool:
@@ -118,26 +116,16 @@ def too_old(found: list[Age], page: str, limit: int) -> list[Age]:
 
 
 def write_stale(folder: Path) -> list[Path]:
-    """Write the list of stale results into docs/benchmarks.md, where `folder` is that of the results and there is history."""
-    if folder.resolve() != RESULTS.resolve() or not has_history() or not PAGE.is_file():
+    """Write the list of stale results, where `folder` is that of the results and there is history."""
+    if folder.resolve() != RESULTS.resolve() or not has_history():
         return []
-    text = PAGE.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    old = [age for age in ages() if age.commits is None or age.commits > STALE]
-    rows = [
-        [
-            f"[{age.name}](../benchmarks/results/{age.name})",
-            age.made.commit,
-            age.made.date,
-            str(age.commits),
-            ", ".join(age.pages),
-        ]
-        for age in old
-    ]
-    table = markdown(["result", "made at", "on", "commits since", "quoted in"], rows) if rows else "None.\n"
-    PAGE.write_text(f"{head}{BEGIN}\n\n{table}\n{END}{tail}", encoding="utf-8")
-    return [PAGE]
+    old = [age for age in ages() if age.name != f"{NAME}.md" and (age.commits is None or age.commits > STALE)]
+    columns = ["result", "made at", "on", "commits since", "quoted in"]
+    rows = [[age.name, age.made.commit, age.made.date, str(age.commits), ", ".join(age.pages)] for age in old]
+    about = f"Results that are older than {STALE} commits to the planner:\n\n"
+    table = markdown(columns, rows) if rows else "None.\n"
+    write_results(NAME, {"rows": [dict(zip(columns, row, strict=True)) for row in rows]}, about + table)
+    return [RESULTS / f"{NAME}.md"]
 
 
 def _git(*arguments: str) -> str:

@@ -16,7 +16,7 @@ CASES = {case.name: case for case in published.CASES}
 ROWS = read(RESULTS / "published.jsonl").rows
 
 
-@pytest.mark.parametrize("name", CASES.keys() - {"five-axis pocket"})
+@pytest.mark.parametrize("name", [name for name in CASES if name != "five-axis pocket"])
 def test_the_path_is_as_long_as_printed(name: str) -> None:
     case = CASES[name]
     toolpath = toolpath_from_program(case.program(), case.machine())

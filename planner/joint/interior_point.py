@@ -54,6 +54,9 @@ SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 # By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
 # share of what it was [-]: a step that bends them by more is shortened.
 BENT, BENT_OF = 0.05, 0.3
+# By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
+# are too long for ever, windows run round and round.
+WARY, WARIEST = 2.0, 10.0
 # What rows may be off their slacks at the end, each times its multiplier, as a share of the complementarity [-].
 OWED = 0.1
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
@@ -257,6 +260,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
             back = along * (1.0 - root(allowed / bent))
             _go(sizes, x, u, factor, -back)
             along = along - back
+            prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("clarabel")
 pytest.importorskip("ruckig")
 
-from benchmarks.jobs.known import SORTS, job, to_a_point
+from benchmarks.jobs.known import SORTS, job, to_a_point, turning_back
 from benchmarks.judge.known_optima import above
 from benchmarks.solvers.one_axis import AGREE, fastest
 
@@ -19,6 +19,12 @@ SEEDS = (1, 2, 3)
 @pytest.mark.parametrize("sort", [sort for sort, _ in SORTS], ids=lambda sort: sort.__name__)
 def test_optimal_takes_the_time_that_is_known(sort, seed):
     assert -KNOWN < above(job(sort, seed)) < WITHIN
+
+
+@pytest.mark.parametrize("seed", [144, 539, 591])
+def test_windows_that_ran_round_and_round_end(seed):
+    """Steps that are shortened again and again for what they bend."""
+    assert -KNOWN < above(job(turning_back, seed)) < WITHIN
 
 
 def test_one_part_from_rest_to_rest_takes_four_phases_of_jerk():

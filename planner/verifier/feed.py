@@ -36,17 +36,17 @@ class Feeds:
         self._pieces, self._bounds, self._switches = pieces, bounds, Switches(pieces, bounds)
         self._worst, self._row = worst, row
         self._block = np.zeros(1, dtype=np.int64)  # the first one that chords can still be on
-        self._left: Chords | None = None
+        self._left = list[Chords]()  # blocks: put together when they are judged
+        self._gap = 0.0  # between them at most [s]
 
     def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
         """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for
         `Switches.take`."""
         self._switches.take(new, skip, first, last)
         new = Chords(*(column[skip:].copy() for column in new))
-        if self._left is not None:
-            new = Chords(*(np.concatenate(pair) for pair in zip(self._left, new, strict=True)))
-        self._left = new
-        gap = float(np.diff(new.t).max(initial=0.0))
+        before = self._left[-1].t[-1:] if self._left else new.t[:1]
+        self._left += [new] if len(new.t) else []
+        gap = self._gap = float(np.diff(new.t, prepend=before).max(initial=self._gap))
         pace = float(np.linalg.norm(self._bounds.velocity))
         push = self._bounds.acceleration * gap
         room = 2.0 * gap * (pace + (push if np.isfinite(push) else pace))  # the longest reach of a vertex
@@ -58,8 +58,10 @@ class Feeds:
         self._judge(np.inf)
 
     def _judge(self, until: float) -> None:
-        chords = self._left
-        if chords is None or len(chords.t) < 2 or chords.place[1] > until:
+        if not self._left or self._first_end() > until:
+            return
+        chords = Chords(*(np.concatenate(blocks) for blocks in zip(*self._left, strict=True)))
+        if len(chords.t) < 2:
             return
         worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
         over = np.zeros(len(chords.t))
@@ -75,7 +77,13 @@ class Feeds:
             seen = tuple(worst.tolist())
             self._worst.keep(self._row, seen, float(chords.t[k]), chords.position[k], int(chords.piece[k]))
         self._switches.along[JUDGED] = float(chords.place[done - 1])
-        self._left = Chords(*(column[done - 1 :].copy() for column in chords))
+        self._left = [Chords(*(column[done - 1 :].copy() for column in chords))]
+        self._gap = float(np.diff(self._left[0].t).max(initial=0.0))
+
+    def _first_end(self) -> float:
+        """The place at which the first chord ends; inf without one."""
+        places = [place for chords in self._left[:2] for place in chords.place[:2].tolist()]
+        return places[1] if len(places) > 1 else float("inf")
 
 
 @kernel()

@@ -149,7 +149,9 @@ def test_everything_says_the_same(name: str, tmp_path: Path) -> None:
     again = saved_plan(tmp_path / "out")[0].verdict
     assert again is not None
     rows = dict(verdict_rows(again))
-    assert rows["corners missed by"] == told["corners missed by"]
+    # of rows in between setpoints, which the plan has pieces for: within what the verdict knows of it
+    missed = [float(one["corners missed by"].removesuffix(" µm")) for one in (rows, told)]
+    assert missed[0] == pytest.approx(missed[1], abs=5e-3)
     if plan.joints is None:  # from setpoints of the joints alone a corner at the tip cannot be looked at
         assert rows["corners"].partition(";")[0] == told["corners"].partition(";")[0]
 

@@ -23,7 +23,7 @@ from planner.base.sizes import SIZES
 from planner.feedrate.solution import Status
 from planner.joint.checks import Keeps, switches_missed, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
-from planner.joint.guess import Guess
+from planner.joint.guess import Guess, unit_of
 from planner.joint.interior_point import Tuning
 from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
 from planner.joint.law_window import NEAR, Window, near
@@ -42,6 +42,9 @@ from planner.joint.window_solver import Asked
 # of the smallest part that a window which fails is divided into.
 WHOLE, WINDOW = SIZES.searched_whole, SIZES.searched_window
 OVERLAP, LEAST = SIZES.searched_overlap, SIZES.searched_least
+# A window of steps far shorter than what shapes a corner (`unit_of`) is longer than `WINDOW`: it lasts so many units on
+# the mean [-], or has `WHOLE` steps.
+LASTS = 50.0
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where
 # it would be.
 JOIN_WITHIN = SIZES.searched_join
@@ -152,7 +155,8 @@ class _Search:
     def sweeps(self) -> Generator[Sweep, list[bool], bool]:
         """All windows, and then all joins; whether it was not given up."""
         steps = len(self.guess)
-        parts = 1 if steps <= WHOLE else int(np.ceil(steps / WINDOW))
+        parts = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
+        parts = 1 if steps <= WHOLE else int(max(parts, np.ceil(steps / WHOLE)))
         even = np.linspace(0, steps, parts + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
         if not self.settings.divide:  # no step of the guess is kept

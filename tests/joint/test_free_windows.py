@@ -255,8 +255,8 @@ def test_ipopt_finds_nothing_more_where_it_ends(name):
 def test_windows_find_what_the_whole_run_finds(monkeypatch):
     run, guess = begun("pentagon")
     whole = TubeOwn().solve(run, guess)
-    monkeypatch.setattr(own, "WHOLE", 0)
-    monkeypatch.setattr(own, "WINDOW", (len(guess) + 1) // 2)
+    for name in ("WHOLE", "WINDOW"):
+        monkeypatch.setattr(own, name, (len(guess) + 1) // 2)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 5)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     parts = TubeOwn().solve(run, guess)

@@ -249,8 +249,8 @@ def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
     """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
     whatever the group; where parts are of use, all are."""
     run, guess = begun("pentagon")
-    monkeypatch.setattr(own, "WHOLE", 0)
-    monkeypatch.setattr(own, "WINDOW", len(guess) // 5 + 1)
+    for name in ("WHOLE", "WINDOW"):
+        monkeypatch.setattr(own, name, len(guess) // 5 + 1)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided

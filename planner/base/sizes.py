@@ -72,14 +72,13 @@ class Sizes:
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time
-    # steps of a run that is one window: divided, some end up to 9e-3 slower
+    # steps of a run that is one window: divided, 3 of 150 random jobs ended 2e-3 to 1.1e-2 slower
     searched_whole: int = _size(ROUTES, 1_500, 200)
     # steps of a window of others, which is three quarters as long at least: joins that are searched once more must not
     # touch one another. Longer ones take more iterations, and four of them side by side have no room in a processor's cache
     searched_window: int = _size(ROUTES, 500, 200)
-    searched_in_lanes: int = _size(
-        ROUTES, 5_000, 200
-    )  # steps of searches whose windows are solved side by side
+    # steps of searches together from which their windows are solved side by side
+    searched_in_lanes: int = _size(ROUTES, 5_000, 200)
     searched_overlap: int = _size(ROUTES, 120, 30)  # steps on each side of a join that is searched once more
     # steps between a join and where it would be: it is where the motion uses least of its limits
     searched_join: int = _size(ROUTES, 40, 10)
@@ -92,7 +91,7 @@ class Sizes:
     # more have a coarser grid, which leaves 0.3 to 0.5 % (feedrate/sampling/samples.py)
     corners_finely: int = _size(EFFORT, 50_000, 2)
     searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (planning/attempts.py)
-    searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: up to 2e-3 (planning/optimal/effort.py)
+    searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: 7e-5 on reliefs (planning/optimal/effort.py)
     searched_most: int = _size(EFFORT, 1_000_000, 200)  # steps: what takes a minute or two on two processors
     # blocks of a job beside whose motion on a path method kinematic is planned
     rivals_planned: int = _size(EFFORT, 40_000, 100)

@@ -30,7 +30,7 @@ class Solved(NamedTuple):
 def kind_of(asked: Asked) -> Hashable | None:
     """What windows have in common that are solved side by side: their axes, and the iterations they take about. None for one
     that gains nothing by it: rows of arcs, curves and laws are worked out lane by lane. For more axes no kernel with
-    `LANES` is compiled."""
+    lanes is compiled."""
     window = asked.window
     bent = bool(window.limits.passed.any() or window.legs.radius.any())
     axes = window.u.shape[1] - 1
@@ -38,7 +38,7 @@ def kind_of(asked: Asked) -> Hashable | None:
 
 
 def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
-    """Solve `width` windows of one kind at most: in `LANES`, or one on single numbers, which rounds in another order. What is
+    """Solve `width` windows of one kind at most: in lanes (base/lanes.py), or one on single numbers, which rounds in another order. What is
     found in one of them does not depend on the others."""
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))

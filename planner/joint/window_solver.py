@@ -38,7 +38,7 @@ def kind_of(asked: Asked) -> Hashable | None:
 
 
 def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
-    """Solve `width` windows of one kind at most: in lanes (base/lanes.py), or one on single numbers, which rounds in another order. What is
+    """Solve `width` windows of one kind at most: in lanes, or one on single numbers, which rounds in another order. What is
     found in one of them does not depend on the others."""
     sizes, group, bends, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))

@@ -54,7 +54,8 @@ class Search:
     # steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a
     # step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the
     # time for 2e-3 less motion. And instead of `finer` once more in steps about as long, with the tolerance that
-    # chords and filters need beside what was found: on reliefs that is all but 7e-5 of what `finer` gains, in three quarters of its time
+    # chords and filters need beside what was found: on reliefs that leaves 7e-5 of the time, in
+    # three quarters of the computing
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:

@@ -153,11 +153,13 @@ class Times(Record):
 class DialectData(Record):
     """How the control reads programs: `least_increment` [mm] is the length of a number without a point, or
     None: a whole unit; `lathe` says whether they are a lathe's, or None: their words tell; `inch` whether
-    lengths are inches before the first G20 or G21."""
+    lengths are inches before the first G20 or G21; `subprograms` names those of the machine's builder that
+    move nothing."""
 
     least_increment: Positive | None = None
     lathe: bool | None = None
     inch: bool = False
+    subprograms: tuple[str, ...] = ()
 
 
 class ControlData(Record):

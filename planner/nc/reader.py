@@ -131,6 +131,8 @@ def execute(
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
+    if reading.dialect == AUTO and detect.is_siemens(words, source):
+        language = SIEMENS
     dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading)
     if detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE

@@ -72,7 +72,7 @@ class ToolPointSwitch:
             needs = "the tool centre point (G43.4) needs a machine with a table [kinematics]"
             raise block.fault(f"{needs}; add it to the machine file", "tool length")
         now = self._word(block, tool)
-        if self.chain is None or (now == self._on and tool is None):
+        if self.chain is None or (now == self.on and tool is None):
             return
         length = float(state.tool_offset[2]) or self.chain.data.tool_length
         if now and state.tool_offset[:2].any():
@@ -80,7 +80,7 @@ class ToolPointSwitch:
                 "the tool centre point needs a tool on the spindle's axis; this one has an offset in x or y"
             )
             raise block.fault(text, "tool point" if block.tool_point is not None else "tool length")
-        if now != self._on or (now and length != self.switches[-1].length):
+        if now != self.on or (now and length != self.switches[-1].length):
             self._move(state, now, length)
             self.switches.append(Switch(table.blocks, block.line, now, length))
 
@@ -89,20 +89,21 @@ class ToolPointSwitch:
         stand at 0, where they were `before` (A,), too."""
         code = block.g.get("one-shot", 0)
         turned = before[state.turns].any() or state.position[state.turns].any()
-        if self._on and code in _JOINT_PLACES and turned:
+        if self.on and code in _JOINT_PLACES and turned:
             raise block.fault(
-                f"the tool centre point is on ({self._on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
+                f"the tool centre point is on ({self.on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
                 "place of the joints; switch the tool centre point off before it (G49, M429, M129)",
                 "one-shot",
             )
 
     @property
-    def _on(self) -> str:
+    def on(self) -> str:
+        """The word that has it on; empty where it is off."""
         return self.switches[-1].word if self.switches else ""
 
     def _word(self, block: Block, tool: int | None) -> str:
         """The word that has it on after the words of a block; empty where it is off."""
-        now = self._on
+        now = self.on
         if tool == G43_4:
             now = "G43.4"
         elif tool in CANCELLED and now == "G43.4":
@@ -117,7 +118,7 @@ class ToolPointSwitch:
         scale = np.where(state.turns, RAD_PER_DEG, 1.0)
         here = zip(state.letters.lower(), (state.position * scale).tolist(), strict=True)
         place = dict.fromkeys("abc", 0.0) | dict(here)
-        if self._on:
+        if self.on:
             place |= self.chain.with_tool(self.switches[-1].length).joints(place)
         if now:
             place |= self.chain.with_tool(length).point(place)

@@ -13,7 +13,7 @@ from planner.base.errors import InputError
 from planner.nc import codes, settings
 from planner.nc.hpgl import instructions
 from planner.nc.language.heidenhain import definitions
-from planner.nc.language.siemens import commands
+from planner.nc.language.siemens import tables
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
@@ -246,8 +246,16 @@ S_NOTHING = {
         ["G450", "G451"], "outer corners under compensation, which is off; G451 with it is refused"
     ),
     **dict.fromkeys(["G601", "G602", "G603"], "when an exact stop ends: at the setpoint"),
-    **dict.fromkeys(commands.IDLE, "siemens/commands.py: IDLE"),
-    **dict.fromkeys(commands.IDLE_CALLS, "siemens/commands.py: IDLE_CALLS"),
+    **dict.fromkeys(tables.IDLE, "siemens/tables.py: IDLE"),
+    **dict.fromkeys(["ADISPOS=0.5"], "the tolerance of rapid moves, which are not blended"),
+    **dict.fromkeys(["FGROUP", "FGROUP(X)"], "F is the speed of X, Y, Z"),
+    **dict.fromkeys(["G110", "G111"], "a pole, which polar coordinates behind it refer to"),
+    **dict.fromkeys(
+        ["G140", "G460"], "how compensation would approach with G147 and G247, which are refused"
+    ),
+    **dict.fromkeys(["G25", "G25 X1", "G26", "G26 S100"], "limits of the spindle and of the working area"),
+    **dict.fromkeys(["G961 S100", "G971 S1"], "spindle speed: feeds stay per minute"),
+    "G290": "the language of Siemens, in which the program is",
     "TRAFOOF": "the end of TRAORI, which is refused without kinematics",
 }
 
@@ -279,15 +287,15 @@ SPELLED = (
 
 
 def test_words_of_sinumerik() -> None:
-    tables = {
-        *commands.IDLE,
-        *commands.SAID,
-        *commands.REFUSED,
+    every = {
+        *tables.IDLE,
+        *tables.SAID,
+        *tables.REFUSED,
         "TRAORI",
         "TRAFOOF",
         *(f"G{n}" for n in range(1000) if n < 720 or n % SAMPLED == 0),
     }
-    words = {CALLED.get(word, word) for word in (*tables, *commands.IDLE_CALLS)} | set(SPELLED)
+    words = {CALLED.get(word, word) for word in every} | set(SPELLED)
     assert doing_nothing(words, ("",), sinumerik, SIEMENS) == {CALLED.get(word, word) for word in S_NOTHING}
 
 

@@ -160,6 +160,7 @@ class CornerMove:
     kind: str  # one of KINDS
     size: float  # R, or the number of the chamfer [mm]
     line: int  # where it stands
+    modal: bool = False  # of all moves: none where it has no room, such as before a move along the tool axis
     first: Move | None = None
 
     def joined(self, second: Move, normal: int) -> tuple[list[Move], Move]:
@@ -167,7 +168,10 @@ class CornerMove:
         first = self.first
         assert first is not None
         rises = any(move.begin[normal] != move.end[normal] for move in (first, second))
-        if rises or first.stands(normal) or second.stands(normal):
+        out = rises or first.stands(normal) or second.stands(normal)
+        if self.modal and (out or 0 in (first.code, second.code)):
+            return [first], second
+        if out:
             raise ValueError("a rounding or chamfer stands between two moves in the plane")
         corner, before, after = in_plane(first.end, normal), first.leaving(normal), second.tangent(normal)
         turn = cmath.phase(after / before)

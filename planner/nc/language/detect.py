@@ -15,20 +15,47 @@ from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
 from planner.nc.lexer import FAULT, Words, split_words
-from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, SIEMENS, Reading
+from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, Reading
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
 # that fits nowhere is tried in 2^n ways, such as n comments in a file of no language.
 _LOOKED_AT = 20_000  # bytes at the start of a file that tell its language, and hold the first %
 _CONVERSATIONAL = re.compile(
-    rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b", re.MULTILINE | re.IGNORECASE
-)
-_SIEMENS = re.compile(
-    rb"^[ \t]*(?:N\d+[ \t]*)?(DEF[ \t]+(?:REAL|INT|BOOL|STRING)|PROC[ \t]|EXTERN[ \t]|M?CALL[ \t]+CYCLE|CYCLE\d+[ \t]*\(|MSG[ \t]*\(|"
-    rb"WORKPIECE[ \t]*\(|SUPA\b|TRAORI\b|TRAFOOF\b|TRANS[ \t]|STOPRE\b|%_N_|[XYZABC]=|R\d+=|(?:ENDIF|ENDWHILE|ENDLOOP|ENDFOR)\b|"
-    rb"GOTO[FB]\b)",
+    rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b|"
+    rb"^[ \t]*\d+[ \t]+(?:L[ \t]+I?[XYZM]|CC[ \t]|LBL[ \t]+\d)",
     re.MULTILINE | re.IGNORECASE,
 )
+# Marks of a Sinumerik's program, behind words of its line that all dialects have; texts of messages are none.
+_SIEMENS = re.compile(
+    r"\s*(?:/\d?\s*)?(?!N?\d*\s*M(?:11[78]|2[38]|3[023])\b)(?:[A-NP-Z][-+]?(?:\d+\.?\d*|\.\d+)(?![\d.]*\s*=)\s*)*+(?:"
+    r"[A-Z_]{2}\w*:\s*(?:N\d+|[GXYZ][\d=]|[A-Z]\d+=)|(?:CR|AP|RP|RNDM?|CHF|CHR|ADIS(?:POS)?|TURN|[IJK]1|ANG|SPOSA?|FRCM?|FB|T|[SMH]\d+|R\d+|OFFN|OVR|[XYZABC]1|DISR|DISC|LIMS|[ABC]3|"
+    r"[XYZABCUVWIJKF])\s*=(?!=)|R\d+\s*=|(?:ACC|VELOLIM|FA|FL|SPOSA?|POSA?|R)\[|"
+    r"(?:MSG|CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|WORKPIECE|SETMS|FGROUP|TRAORI|TRACYL|CASE|SETAL)\s*\(|"
+    r"DEF\s+(?:CHAN\s+|NCK\s+)?(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|\$(?:AA|AC|P|TC|MN|MC|MA|SN|SC|A)_|%_N_|"
+    r"(?:GOTO[FBC]|EXTCALL|PROC|EXTERN|CASE)\s|IF\b[^[#]*\bGOTO[FBC]\b|(?:FOR\s+\w+\s*=|CALL\s*\")|"
+    r"(?:SUPA|CIP|CT|A?(?:TRANS|ROTS?|SCALE|MIRROR)|TRAORI|TRAFOOF|TRANSMIT|STOPRE|DIAM(?:ON|OF|90)|CFC|CFIN|CFTCP|KONT|NORM|"
+    r"BRISK|SOFT|DRIVE|FFWO[NF]|COMP(?:ON|OF|CAD|CURV|SURF)|ORI(?:WKS|MKS|AXES|VECT|SON|SOF)|RTLIO[NF]|CDO[NF]2?|WALIMO[NF]|FNORM|"
+    r"UPATH|SPATH|ENDIF|ENDWHILE|ENDLOOP|ENDFOR|MCALL|[BAC]SPLINE|UNTIL|LOOP|INVCW|INVCCW|M17|RET)\b)",
+    re.IGNORECASE,
+)
+_SIEMENS_CODES = (
+    500.0,
+    *map(float, range(505, 600)),
+    601.0,
+    602.0,
+    603.0,
+    621.0,
+    331.0,
+    332.0,
+    641.0,
+    642.0,
+    643.0,
+    644.0,
+    645.0,
+    700.0,
+    710.0,
+)
+_SUBPROGRAMS = (".mpf", ".spf")
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
 # of an NC program.)
@@ -108,11 +135,20 @@ def is_plotter_file(data: bytes, source: str) -> bool:
 
 
 def language_of(data: bytes) -> str | None:
-    """`HEIDENHAIN` for conversational programs, `SIEMENS` for those of a Sinumerik; None for all others."""
-    head = data[:_LOOKED_AT]
-    if _CONVERSATIONAL.search(head):
-        return HEIDENHAIN
-    return SIEMENS if _SIEMENS.search(head) else None
+    """`HEIDENHAIN` for conversational programs; None for all others."""
+    return HEIDENHAIN if _CONVERSATIONAL.search(data[:_LOOKED_AT]) else None
+
+
+def is_siemens(words: Words, source: str) -> bool:
+    """True if a program is one of a Sinumerik: by the ending of its file, its G codes, or a mark anywhere in
+    it."""
+    codes = words.value[words.letter == ord("G")]
+    if source.lower().endswith(_SUBPROGRAMS) or np.isin(codes, _SIEMENS_CODES).any():
+        return True
+    odd = words.rows_with(
+        np.flatnonzero((words.letter == FAULT) | np.isin(words.letter, (ord("%"), ord("O"))))
+    )
+    return any(_SIEMENS.match(row_text(words, row)) for row in odd)
 
 
 def without_leader(data: bytes) -> tuple[bytes, str]:

@@ -88,7 +88,10 @@ class _Files:
         """Compile a file; returns what cannot be read in it."""
         first, begin = self.rows.add_file(words, name)
         source = Source(words, len(self.sources), first, begin, self.integers)
-        source.at_tip = self.run.interpreter.ignored.at_tip
+        interpreter = self.run.interpreter
+        source.at_tip = interpreter.ignored.at_tip
+        if interpreter.machine is not None and interpreter.machine.dialect is not None:
+            source.harmless = frozenset(map(str.upper, interpreter.machine.dialect.subprograms))
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)

@@ -58,7 +58,16 @@ def rounded(x: float) -> float:
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 
 
+def array_index(index: float, size: float) -> float:
+    """The index of an array's value. Raises ValueError for none of its values."""
+    if not 0 <= round(index) < size:
+        raise ValueError(f"index {index:g} of an array of {size:g} values, 0 to {size - 1:g}")
+    return float(round(index))
+
+
 FUNCTIONS: dict[str, Callable[..., object]] = {
+    "array_index": array_index,
+    "remainder": math.remainder,
     **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
     **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, modulo, rounded)},
     "power": math.pow,

@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
+from planner.nc.language import swivel
 from planner.nc.language.approach import KINDS, Approach, Departure
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.heidenhain import cycles as heidenhain_cycles
 from planner.nc.language.heidenhain.moves import OUT_OF_PLANE
-from planner.nc.language.making import ASSUMED, Maker, Making, Row
+from planner.nc.language.making import ASSUMED, TAPPED, Maker, Making, Row, around
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.siemens import cycles as siemens_cycles
 from planner.nc.language.travel_rows import STANDS, turned
@@ -31,25 +33,23 @@ from planner.nc.program import Kind
 AXES = "XYZ"
 SIEMENS = ("TRANS", "ROT", "SCALE", "MIRROR")  # by `kind`; + ADDED for A...
 ADDED = 10  # more than the indices in SIEMENS
+_G63 = 63.0
 _FLAT = 1e-9  # relative, below which three points are on a line
 
 
 def siemens(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    """TRANS and the others; `kind` is the index in SIEMENS. Raises ValueError for turns out of the plane."""
+    """TRANS and the others; `kind` is the index in SIEMENS. Raises ValueError."""
     kind = round(given["kind"])
     matrix, shift = making.travel.programmed if kind >= ADDED else (np.eye(3), np.zeros(3))
     name = SIEMENS[kind % ADDED]
     step, by = np.eye(3), np.zeros(3)
-    for axis, letter in enumerate(AXES):
+    for axis in (2, 1, 0) if name == "ROT" else (0, 1, 2):  # ROT: about Z, the new Y, the new X
+        letter = AXES[axis]
         if letter not in given:
             continue
         if name == "TRANS":
             by[axis] = given[letter] * making.unit
         elif name == "ROT":
-            if axis != making.interpreter.state.normal and given[letter] % 360.0:
-                raise ValueError(
-                    f"a rotation about {letter} tilts the plane; axes that turn are not planned here, and a tilted plane needs them"
-                )
             step = step @ turned(given[letter], axis)
         elif name == "SCALE":
             if given[letter] == 0.0:
@@ -97,7 +97,7 @@ def heidenhain(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
 def in_force(making: Making, given: Mapping[str, float]) -> None:
     """The frame, behind the row of `siemens` or `heidenhain`."""
     matrix, shift = making.travel.programmed
-    if (matrix == np.eye(3)).all():
+    if (matrix == np.eye(3)).all() and not making.travel.tilted:
         shift = np.zeros(3)  # a G52
     if making.travel.active or (matrix != np.eye(3)).any():
         making.travel.set_frame(matrix, shift)
@@ -115,7 +115,7 @@ def _origin(making: Making) -> list[Row]:
     if making.travel.compensated:
         text = "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
         raise ValueError(text)
-    only = (matrix == np.eye(3)).all()
+    only = (matrix == np.eye(3)).all() and not making.travel.tilted
     values = shift / making.unit if only else np.zeros(3)
     return [[("G", 52.0), *zip(AXES, values.tolist(), strict=True)]]
 
@@ -165,7 +165,8 @@ def corner(making: Making, given: Mapping[str, float]) -> None:
     """A rounding or chamfer at the end of the next move: kind (index in corner_moves.KINDS) and size."""
     if given["size"] < 0.0:
         raise ValueError("a rounding or chamfer is not negative")
-    making.travel.corner(CORNERS[round(given["kind"])], given["size"] * making.unit, making.place.line)
+    kind, size = CORNERS[round(given["kind"])], given["size"] * making.unit
+    making.travel.corner(kind, size, making.place.line, modal="modal" in given)
 
 
 def _direction(making: Making) -> complex:
@@ -246,6 +247,30 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 
 
+def _dwell_turns(making: Making, given: Mapping[str, float]) -> list[Row]:
+    """A dwell of so many turns of the spindle. Raises ValueError where it stands."""
+    speed = making.interpreter.state.spindle.speed
+    if not speed > 0.0:
+        raise ValueError("G4 S, a dwell in turns of the spindle, needs the spindle's speed S before it")
+    return [[("G", 4.0), ("P", given["turns"] / speed * SECONDS_PER_MINUTE)]]
+
+
+def _tap_path(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
+    """G331 and G332, in and out at lead times speed, and G63, at F: a straight move between full stops."""
+    state = making.interpreter.state
+    speed = given.get("S", state.spindle.speed)
+    feed = given.get("F", state.feed * SECONDS_PER_MINUTE / making.unit)
+    if given["code"] != _G63:
+        feed = abs(given["lead"]) * speed
+    if not feed > 0.0:
+        raise ValueError("tapping by G331 needs the lead (K) and the speed S, G63 its F")
+    making.assume(TAPPED)
+    ends = [(axis, given[axis]) for axis in AXES if axis in given]
+    stop: Row = [("G", 4.0), ("P", 0.0)]
+    turn: list[Row] = [[("S", speed)]] if "S" in given else []
+    yield from around(making, [*turn, stop, [("G", 1.0), ("F", feed), *ends], stop], feed=True)
+
+
 def _assume(making: Making, given: Mapping[str, float]) -> None:
     """Sentences of ASSUMED by their names. Raises ValueError where nothing may be assumed."""
     for name in given:
@@ -269,6 +294,9 @@ MAKERS: dict[str, Maker] = {
     **siemens_cycles.MAKERS,
     **heidenhain_cycles.MAKERS,
     "corner": corner,
+    "dwell turns": _dwell_turns,
+    "tap path": _tap_path,
+    "swivel": swivel.siemens,
     "tangent arc": tangent_arc,
     "arc through": arc_through,
     "frame in force": in_force,

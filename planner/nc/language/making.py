@@ -22,9 +22,11 @@ ASSUMED = {
     "orientation": "the angles of rotary axes change evenly on a block (ORIAXES), not as the tool's direction turns",
     "rapid axes": "rapid moves are straight lines, as with RTLION",
     "spindle position": "positioning the spindle (SPOS) takes no time in this plan",
+    "waits": "waits for other channels and spindles (WAITM, WAITS) take no time",
     "tool offset": "offsets of tools (D) are not added: z is that of the tool's tip",
     "tool centre feed": "F holds for the tool's centre (CFTCP); CFC and CFIN, the control's default, have it on the contour of arcs",
 }
+TAPPED = "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
 Row = list[tuple[str, float]]
 Cycle = Callable[["Making", Mapping[str, float]], Iterable[Row]]
 Maker = Callable[["Making", Mapping[str, float]], Iterable[Row] | None]
@@ -198,8 +200,7 @@ def tapped(
     if not (speed > 0.0 and lead != 0.0):
         raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
     size = abs(lead)
-    text = "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
-    making.assume(text)
+    making.assume(TAPPED)
     first, second = (3.0, 4.0) if lead > 0.0 else (4.0, 3.0)
     if start:
         yield go(hole.clear)

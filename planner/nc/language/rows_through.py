@@ -18,21 +18,25 @@ from planner.nc.language.travel_rows import (
     AXES,
     CENTRES,
     RADIUS,
+    ROTARY,
     TURNS,
     Coordinates,
     G,
     M,
     Move,
     TravelRow,
+    tilted_rows,
     travel_rows_of,
     words_of,
 )
 from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
+from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
 # G codes of planes with their normals, and M codes that end the program.
 _PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
 _ENDS = (2.0, 30.0)
+_SWITCHES = (*TOOL_POINT_ON, *TOOL_POINT_OFF)  # M codes behind which x, y, z are others
 # G codes behind which the position is asked of the interpreter.
 _PLACING = frozenset(
     (10.0, 43.0, 43.1, 43.2, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3)
@@ -69,6 +73,15 @@ class RowsThrough(Coordinates):
         self.last: Move | None = None
         self.lost = False
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
+        # the tilted plane in force, and with it frames that tilt; where rows have come to in it
+        self.swivelled = self._tilt = np.eye(3), np.zeros(3)
+        self._flat = np.zeros(3)
+        self.waiting = False  # for a move of the rotary axes, behind which the tool centre point is on
+
+    @property
+    def tilted(self) -> bool:
+        """True if a plane is tilted or moved beside the frame."""
+        return bool(self._tilt[1].any() or (self._tilt[0] != np.eye(3)).any())
 
     @property
     def compensated(self) -> bool:
@@ -85,7 +98,7 @@ class RowsThrough(Coordinates):
         if self._idle():
             out += self._restored(words)
             if out:
-                yield words_of(out, words.data, words.files)
+                yield self._words(out, words)
             self.active = self.lost = False
             yield words
             return
@@ -97,11 +110,11 @@ class RowsThrough(Coordinates):
             except ValueError as fault:
                 raise self._fault(one, str(fault)) from fault
             if foreign:
-                yield words_of(out, words.data, words.files)
+                yield self._words(out, words)
                 out = []
                 self._look()
         if out:
-            yield words_of(out, words.data, words.files)
+            yield self._words(out, words)
 
     def end(self) -> list[TravelRow]:
         """Rows left to execute when the program has ended without M2 or M30. Raises ValueError."""
@@ -110,7 +123,20 @@ class RowsThrough(Coordinates):
             raise ValueError("APPR is followed by no contour")
         if self._offset is not None:
             self._leave()
-        return self._taken()
+        return self._through_tilt(self._taken())
+
+    def _words(self, rows: list[TravelRow], words: Words) -> Words:
+        return words_of(self._through_tilt(rows), words.data, words.files)
+
+    def _through_tilt(self, rows: list[TravelRow]) -> list[TravelRow]:
+        """Rows of the tilted plane in the work system."""
+        if not self.tilted:
+            return rows
+        out: list[TravelRow] = []
+        for row in rows:
+            moves, self._flat = tilted_rows(row, self._flat, self._tilt, self._unit, self.normal)
+            out += moves
+        return out
 
     def _taken(self) -> list[TravelRow]:
         out, self._ahead = self._ahead, []
@@ -132,7 +158,7 @@ class RowsThrough(Coordinates):
             if _PLANES[code] != self.normal:
                 if self.compensated:
                     raise ValueError("the plane changes while cutter radius compensation is on")
-                self._no_corner()
+                self._no_corner(out)
             self.normal = _PLANES[code]
         if others & {20.0, 21.0} and (20.0 in others) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
@@ -143,20 +169,28 @@ class RowsThrough(Coordinates):
         ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
         if foreign or changes:
-            self._no_corner()
+            self._no_corner(out)
         if (foreign or changes) and self.compensated:
             what = "a tool change" if changes else f"G{min(foreign):g}"
             raise ValueError(f"{what} while cutter radius compensation is on; switch it off before (R0, G40)")
         if foreign - _PLACING:
             raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
         if foreign:
-            out.append(TravelRow(words, row.line, row.frame))
+            row = TravelRow(words, row.line, row.frame)
+            on = self.tilted and self.interpreter.tool_point.on and 53.0 in foreign
+            switches = (float(TOOL_POINT_OFF[1]), float(TOOL_POINT_ON[1]))
+            off, back = (TravelRow([(M, code, words[0][2])], row.line, row.frame) for code in switches)
+            out += [off, row, back] if on else [row]
             return True
         if moved and 4.0 not in others:
             self._move(TravelRow(words, row.line, row.frame), out)
         elif words:
             self._pass(TravelRow(words, row.line, row.frame), out, last=ends)
-            return changes
+            turning = self.waiting and any(letter in ROTARY for letter, _, _ in words)
+            if turning:
+                out.append(TravelRow([(M, float(TOOL_POINT_ON[1]), words[0][2])], row.line, row.frame))
+                self.waiting = False
+            return changes or turning or any(word[0] == M and word[1] in _SWITCHES for word in words)
         return False
 
     def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
@@ -164,9 +198,10 @@ class RowsThrough(Coordinates):
             raise ValueError("APPR is followed by no contour")
         if self._corner is not None:
             if last:
-                self._no_corner()
-            self._between.append(row)
-            return
+                self._no_corner(out)
+            else:
+                self._between.append(row)
+                return
         if self._offset is None:
             out.append(row)
             return
@@ -228,13 +263,24 @@ class RowsThrough(Coordinates):
         rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
         out += [self._in_units(one) for one in rows]
 
-    def _no_corner(self) -> None:
+    def _no_corner(self, out: list[TravelRow] | None = None) -> None:
+        """No move follows that a corner might lead to; a modal one is none then, and its move comes."""
         waits = self._corner or self._coming
-        if waits is not None:
+        if waits is None:
+            return
+        if not waits.modal:
             text = (
                 f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind it"
             )
             raise ValueError(text)
+        first, self._corner, self._coming = waits.first, None, None
+        waiting, self._between = self._between, []
+        rows: list[TravelRow] = []
+        if first is not None:
+            self._go(first, rows)
+        for row in waiting:
+            self._pass(row, rows, last=False)
+        (self._ahead if out is None else out).extend(rows)
 
     @property
     def _unit(self) -> float:
@@ -254,7 +300,9 @@ class RowsThrough(Coordinates):
             self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))
 
     def _look(self) -> None:
-        self._mapped = self.interpreter.state.programmed()[:3].copy()
+        there = self.interpreter.state.programmed()[:3] - self._tilt[1]
+        self._mapped = np.asarray(np.linalg.solve(self._tilt[0], there))
+        self._flat = self._mapped.copy()
         self.place = self.unmapped(self._mapped)
         self._beside = False
 
@@ -269,7 +317,7 @@ class RowsThrough(Coordinates):
         """True if rows may pass as they are: nothing waits, and no turned round G2 or G3 counts behind."""
         waits = self.compensated or self._beside or self._coming is not None or self._corner is not None
         turned = self.motion in (2, 3) and self.motion != self.interpreter.state.motion
-        return self.is_plain and not (waits or turned)
+        return self.is_plain and not (waits or turned or self.tilted)
 
     def _restored(self, words: Words) -> list[TravelRow]:
         """Rows that bring back G91 and the motion code, where rows behind them count on them."""

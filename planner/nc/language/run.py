@@ -55,6 +55,7 @@ class Dialect:
     parser    : of a file: `parse` gives procedures, `faults` are those of its lines
     files     : names, in small letters, of the file that holds a subprogram
     set_up    : gives a run the makers of its rows
+    unknown   : what is said of a subprogram, {0}, that is not there
     """
 
     language: Language
@@ -62,6 +63,7 @@ class Dialect:
     parser: Callable[[Source], Any]
     files: Callable[[str], frozenset[str]]
     set_up: Callable[["ProgramRun"], object] = lambda run: None
+    unknown: str = "there is no such subprogram in this program or its folder"
 
 
 class Ended(Exception):
@@ -100,6 +102,7 @@ class ProgramRun:
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
         self.system.travel = self.travel
+        self._unknown = dialect.unknown
         dialect.set_up(self)
 
     def start(self, main: str = "") -> ProgramFault | None:
@@ -303,7 +306,7 @@ class ProgramRun:
 
     def _function(self, name: str, word: str) -> Callable[..., float | None]:
         if name not in self.functions and (not self.load(name) or name not in self.functions):
-            raise ValueError(f"{word}: there is no such subprogram in this program or its folder")
+            raise ValueError(f"{word}: {self._unknown.format(word)}")
         return self.functions[name]
 
     def _frame_of(self, place: tuple[int, int, int], name: str) -> int:

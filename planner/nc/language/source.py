@@ -42,10 +42,12 @@ class SourceLine:
 class Source:
     """One file: its words, and the lines among them that may belong to the language.
 
-    at_tip : the machine has kinematics: words that switch the tool centre point are read
+    at_tip   : the machine has kinematics: words that switch the tool centre point are read
+    harmless : subprograms of the machine's builder that move nothing, as the machine file says
     """
 
     at_tip = False
+    harmless: frozenset[str] = frozenset()
 
     def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin

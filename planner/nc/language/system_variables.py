@@ -200,10 +200,13 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
 class PositionVariables(SystemVariables):
     """Positions of the axes alone, for languages whose parameters do not hold the state of the control."""
 
-    numbers = frozenset((FIRST_POSITION, FIRST_POSITION + 1, FIRST_POSITION + 2))
+    numbers = frozenset(range(FIRST_POSITION, FIRST_POSITION + 6))
 
     def get(self, parameter: int | str, depth: int) -> float:
         axis = int(parameter) - FIRST_POSITION
+        if axis >= 3:
+            state, letter = self.interpreter.state, "ABC"[axis - 3]
+            return float(state.programmed()[state.letters.index(letter)]) if letter in state.letters else 0.0
         if self.travel is not None and self.travel.active:
             return float(self.travel.place[axis]) / self.interpreter.state.unit
         return self.here(axis)

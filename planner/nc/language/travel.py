@@ -3,6 +3,8 @@ compensation, corners."""
 
 from collections.abc import Callable
 
+import numpy as np
+
 from planner.base.arrays import FloatArray
 from planner.nc.language.approach import Approach, Departure
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
@@ -35,8 +37,21 @@ class Travel(RowsThrough):
         if self.compensated:
             raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
         self._begin()
-        self.matrix, self.shift = matrix, shift
+        out = self._out_of_plane(matrix)
+        whole, there = self.swivelled[0] @ matrix, self.swivelled[0] @ shift + self.swivelled[1]
+        before = self._tilt[0] @ self._mapped + self._tilt[1]
+        self._tilt = (whole, there) if out else self.swivelled
+        self.matrix, self.shift = (np.eye(3), np.zeros(3)) if out else (matrix, shift)
+        self._mapped = np.asarray(np.linalg.solve(self._tilt[0], before - self._tilt[1]), dtype=np.float64)
+        self._flat = self._mapped.copy()
         self.place = self.unmapped(self._mapped)
+
+    def swivel(self, matrix: FloatArray, shift: FloatArray, *, waiting: bool = False) -> None:
+        """The programmed frame ends, and points are at matrix (3, 3) times them and shift (3,) [mm] in the
+        tilted plane; `waiting` for a move of the rotary axes, behind which the tool centre point is on. Raises
+        ValueError."""
+        self.swivelled, self.waiting = (matrix, shift), waiting
+        self.set_frame(np.eye(3), np.zeros(3))
 
     def compensate(self, side: int, assume: Callable[[str], None]) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what
@@ -83,12 +98,13 @@ class Travel(RowsThrough):
         self._approach, self.lost = approach, True
         self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)
 
-    def corner(self, kind: str, size: float, line: int) -> None:
-        """A rounding or chamfer at the end of the next move, of a size in mm. Raises ValueError."""
-        if self._coming is not None:
+    def corner(self, kind: str, size: float, line: int, *, modal: bool = False) -> None:
+        """A rounding or chamfer at the end of the next move, of a size in mm; where it is `modal` there is
+        none if no move in the plane follows. Raises ValueError."""
+        if self._coming is not None and not self._coming.modal:
             raise ValueError("a second rounding or chamfer before the next move")
         self._begin()
-        self._coming = CornerMove(kind, size * self.scale(), line)
+        self._coming = CornerMove(kind, size * self.scale(), line, modal)
 
     def depart(self, departure: Departure) -> None:
         """DEP: leave the contour; compensation is off behind it. Raises ValueError."""

@@ -9,13 +9,28 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, ArcWay, arc_from_centre, arc_from_radius, in_plane
+from planner.nc.arcs import (
+    FULL_TURN,
+    IN_PLANE,
+    Arc,
+    ArcWay,
+    arc_from_centre,
+    arc_from_radius,
+    at_place,
+    in_plane,
+)
 from planner.nc.lexer import Words
 from planner.nc.state import System
 
 G, M = ord("G"), ord("M")
 AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
 TURNS, RADIUS = ord("P"), ord("R")
+ROTARY = (ord("A"), ord("B"), ord("C"))
+_KNOT, _PIECE, _PIECE_OF_HELIX = (
+    ord("K"),
+    math.pi / 2.0,
+    math.pi / 36.0,
+)  # most of an arc in a piece of a curve
 STANDS = 1e-9  # a move that is shorter stays where it is [mm]
 STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
 _EVEN = 1e-9  # relative error of a frame that still counts as even
@@ -92,6 +107,65 @@ def arc_words(arc: Arc, begin: FloatArray, normal: int, at: int) -> list[tuple[i
     words = [(CENTRES[a], float(arc.centre[a] - begin[a]), at) for a in IN_PLANE[normal]]
     more = math.ceil((abs(arc.sweep) - FULL_TURN) / (2.0 * math.pi))
     return [*words, (TURNS, float(more), at)] if more > 1 else words
+
+
+def tilted_rows(
+    row: TravelRow, begin: FloatArray, tilt: tuple[FloatArray, FloatArray], unit: float, normal: int
+) -> tuple[list[TravelRow], FloatArray]:
+    """A row of a plane (G90, centres as I J K) in the coordinates in which the plane is tilted, and where it
+    ends in the plane (3,) [mm]. Arcs become G6.2, rational curves of degree 2, exact without a rise along the
+    normal; a helix has pieces of 5 degrees, within 1e-6 of its rise.
+
+    begin : (3,) where it begins [mm]
+    tilt  : matrix (3, 3) and shift (3,) [mm]
+    """
+    given = {letter: value * unit for letter, value, _ in row.words if letter in (*AXES, *CENTRES)}
+    if not set(AXES) & given.keys() and not set(CENTRES) & given.keys():
+        return [row], begin
+    end = np.array([given.get(letter, begin[k]) for k, letter in enumerate(AXES)])
+    code = [value for letter, value, _ in row.words if letter == G and value in (2.0, 3.0)]
+    at = row.words[0][2]
+    drop = {*AXES, *CENTRES} | ({TURNS} if code else set())
+    rest = [word for word in row.words if word[0] not in drop and word[:2] not in ((G, 2.0), (G, 3.0))]
+
+    def place(point: FloatArray) -> list[tuple[int, float, int]]:
+        found = (tilt[0] @ point + tilt[1]) / unit
+        return list(zip(AXES, found.tolist(), [at] * 3, strict=True))
+
+    if not code:
+        return [TravelRow([*rest, *place(end)], row.line, row.frame)], end
+    turns = next((value for letter, value, _ in row.words if letter == TURNS), 1.0)
+    centre = begin + np.array([given.get(letter, 0.0) for letter in CENTRES])
+    arc = arc_from_centre(begin, end, centre, ArcWay(normal, code[0] == 2.0, round(turns), unit))
+    points, weights = _curve(arc, begin, end, normal)
+    rows = []
+    for k in range(len(points) + 3):
+        words = [(_KNOT, float(min(max(k - 1, 0) // 2, (len(points) - 1) // 2)), at)]
+        if k == 0:
+            words = [(G, 6.2, at), (TURNS, 3.0, at), *rest, *words]
+        if k < len(points):
+            words += [*place(points[k]), (RADIUS, weights[k], at)]
+        rows.append(TravelRow(words, row.line, row.frame))
+    return rows, end
+
+
+def _curve(arc: Arc, begin: FloatArray, end: FloatArray, normal: int) -> tuple[list[FloatArray], list[float]]:
+    """Control points (3,) and weights of an arc from begin to end (3,)."""
+    rises = begin[normal] != end[normal]
+    count = max(1, math.ceil(abs(arc.sweep) / (_PIECE_OF_HELIX if rises else _PIECE)))
+    half, centre = arc.sweep / count / 2.0, in_plane(arc.centre, normal)
+    first, last = in_plane(begin, normal) - centre, in_plane(end, normal) - centre
+    points, weights = [], []
+    for k in range(2 * count + 1):
+        share, odd = k / (2 * count), k % 2
+        size = abs(first) + (abs(last) - abs(first)) * share
+        spoke = first / abs(first) * size * cmath.rect(1.0 / math.cos(half) if odd else 1.0, k * half)
+        point = at_place(centre + spoke, begin, normal)
+        point[normal] = begin[normal] + (end[normal] - begin[normal]) * share
+        points.append(point)
+        weights.append(math.cos(half) if odd else 1.0)
+    points[-1] = end
+    return points, weights
 
 
 def travel_rows_of(words: Words) -> Iterator[TravelRow]:
@@ -173,6 +247,11 @@ class Coordinates:
     def unmapped(self, point: FloatArray) -> FloatArray:
         """(3,) the point of the program that is there."""
         return np.asarray(np.linalg.solve(self.matrix, point - self.shift), dtype=np.float64)
+
+    def _out_of_plane(self, matrix: FloatArray) -> bool:
+        """True if a matrix (3, 3) turns the plane out of itself."""
+        plane, normal = list(IN_PLANE[self.normal]), self.normal
+        return bool(matrix[normal, plane].any() or matrix[plane, normal].any())
 
     def check_even(self) -> None:
         """Arcs stay arcs. Raises ValueError."""

@@ -9,83 +9,31 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.makers import ADDED, SIEMENS
-from planner.nc.language.siemens import cycles
-from planner.nc.language.siemens.text import LineTokens, SiemensControl, handed_over, position, variable
-from planner.nc.language.source import Source
-
-# Letters of words with the same meaning in RS274NGC.
-PLAIN_LETTERS = "NGXYZIJKFSM"
-# G codes with the same meaning.
-RETURNS = (2, 17, 30)  # M codes that end a subprogram
-SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 54, 55, 56, 57, 90, 91, 94)
-# G codes of Siemens that are others here; an empty tuple changes nothing.
-CODES: dict[int, tuple[float, ...]] = {
-    9: (),  # exact stop of one block; a full stop is added behind it
-    **dict.fromkeys((53, 153), (53.0,)),
-    60: (61.1,),
-    64: (64.0,),
-    **dict.fromkeys((642, 643, 644, 645), (64.0,)),
-    70: (20.0,),
-    71: (21.0,),
-    500: (59.3,),  # whose origin is set to 0 before it
-    700: (20.0,),
-    710: (21.0,),
-    **dict.fromkeys((450, 451, 601, 602, 603, 621, 95 * 100), ()),
-}
-# Commands that move nothing and change nothing of what is planned: feedforward, compressors (their tolerance
-# is the program's), how orientations change where that is as planned, the defaults of approaches, frames and
-# collision checks.
-IDLE = frozenset((
-    "FNORM", "FFWON", "FFWOF", "SOFT", "COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF", "UPATH", "SPATH",
-    "FIFOCTRL", "ORIMKS", "ORIAXES", "ORIMACHAX", "TOFRAMEOF", "PAROTOF",
-    "TOWSTD", "CUT2D", "CUT2DF", "CDON", "CDOF", "CDOF2", "NORM", "KONT", "DIAMOF", "CFTCP", "RTLION",
-))  # fmt: skip
-# The same with arguments or a value behind them.
-IDLE_CALLS = frozenset(("SETMS", "WORKPIECE", "MSG", "EXTERN", "LIMS"))
-# Commands and words that are not followed and may change geometry or time: what is said of them (making.py).
-SAID = {
-    **dict.fromkeys(("BRISK", "DRIVE"), "acceleration"),
-    **dict.fromkeys(("CFC", "CFIN"), "tool centre feed"),
-    **dict.fromkeys(("ORIWKS", "ORIVECT", "ORIVIRT1"), "orientation"),
-    "RTLIOF": "rapid axes",
-    "SPOS": "spindle position",
-}
-# Commands that switch the tool centre point on and off, and the M codes of RS274NGC that stand for them.
-TOOL_POINT = {"TRAORI": 428.0, "TRAFOOF": 429.0}
-# Commands that tilt or bend the coordinates.
-REFUSED = (
-    "ROTS", "AROTS", "CROTS", "TRANSMIT", "TRACYL", "RNDM", "ENDLABEL", "CASE",
-)  # fmt: skip
-REMEDY = "let the CAM system write the moves out"
-TYPES = frozenset(("REAL", "INT", "BOOL"))
-_CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
-# Commands and cycles of the control, which are no files.
-_OF_THE_CONTROL = re.compile(
-    r"CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|RND|RNDM|CHF|CHR|POLY|BSPLINE|ASPLINE|CSPLINE|SPLINEPATH|CIP|CT|INVCW|INVCCW|"
-    r"TANG\w*|TRA\w*|COUP\w*|G\d+|DISR|DISCL|ANG|AP|RP|OFFN|FB|FA|SETPIECE|EXTCALL|PCALL|MCALL|STOPRE|ORI\w*|A3|B3|C3|LEAD|TILT|STR\w*"
+from planner.nc.language.siemens import cycles, patterns, tables
+from planner.nc.language.siemens.declarations import Declarations, changed
+from planner.nc.language.siemens.text import (
+    LineTokens,
+    handed_over,
+    position,
 )
-_COMPENSATES = re.compile(rb"G4[12]\b")
+
+_CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
 _TIMES = re.compile(r"P(\d+)")
 _NAMES_MAX = 32  # parameters of a subprogram
+_SYSTEM_OF = {1: 1, 2: 2, 3: 3, 4: 4}  # $P_UIFR[n] is G54 to G57, P of G10 L2
+_CLOSER = {"AC": "", "IC": "", "DC": "WRAPPED", "ACP": "TURNED", "ACN": "TURNED"}
 
 
-class Commands(SiemensControl):
+class Commands(Declarations):
     """Statements of commands: cycles, frames, variables, messages, calls."""
-
-    def __init__(self, source: Source):
-        super().__init__(source)
-        self.names: set[str] = set()  # of the variables
-        self.absolute = True  # G90 is in force
-        self.unit = 1.0  # mm per unit of the program
-        self.cycle: list[tree.Statement] | None = None  # of MCALL, which follows every row that moves
-        self.compensates = bool(_COMPENSATES.search(source.words.data))  # the file has G41 or G42
 
     def _cycle(self, reader: LineTokens, name: str) -> None:
         place = reader.place
         given = self._arguments(reader)
         if name == "CYCLE800":
-            if any(one is not None and one not in (tree.ZERO, tree.Number(-0.0)) for one in given[4:]):
-                raise reader.fault("CYCLE800 with angles tilts the part; axes that turn are not planned yet")
+            values = {f"p{k}": value for k, value in enumerate(given) if value is not None}
+            self.body.append(tree.made(place, "swivel", **values))
+            self.body.append(tree.made(place, "frame in force"))
         elif name == "CYCLE832":
             if given and given[0] is not None and given[0] != tree.ZERO:
                 self.body.append(tree.row(place, ("G", 64.0), ("P", given[0])))
@@ -100,10 +48,8 @@ class Commands(SiemensControl):
         known = cycles.ARGUMENTS[name]
         for k, more in enumerate(given[len(known) :]):
             if more not in (None, tree.ZERO, tree.Number(-0.0)):
-                text = (
-                    f"argument {len(known) + k + 1} of {name}, of later controls, is not read; leave it out"
-                )
-                raise reader.fault(text, 0)
+                which = f"argument {len(known) + k + 1} of {name}, of later controls,"
+                raise reader.fault(f"{which} is not read; leave it out", 0)
         values = {key: value for key, value in zip(known, given, strict=False) if value is not None}
         try:
             cycles.check(name, values)
@@ -111,30 +57,13 @@ class Commands(SiemensControl):
             raise reader.fault(str(fault), 0) from fault
         return [tree.made(place, name, **values)]
 
-    def _arguments(self, reader: LineTokens) -> list[tree.Expression | None]:
-        """The arguments in the brackets behind a cycle; None for what is left out or a text."""
-        given: list[tree.Expression | None] = []
-        if not reader.take("("):
-            return given
-        while not reader.take(")"):
-            if reader.peek() == ",":
-                given.append(None)
-            elif reader.kind() == "text":
-                reader.pop()
-                given.append(None)
-            else:
-                given.append(reader.expression())
-            if not reader.take(",") and reader.peek() != ")":
-                raise reader.fault(") is missing")
-        return given
-
     def _pattern(self, reader: LineTokens) -> None:
         name = reader.peek(-1)
         if self.cycle is None:
             raise reader.fault(f"{name} stands behind MCALL with a drilling cycle, which it repeats", 0)
         given = self._arguments(reader)
         try:
-            self.body += cycles.pattern_rows(reader.place, name, given, self.cycle)
+            self.body += patterns.pattern_rows(reader.place, name, given, self.cycle)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
 
@@ -143,10 +72,16 @@ class Commands(SiemensControl):
             self.cycle = None
             return
         name = reader.pop().text
-        known = [one for one in cycles.ARGUMENTS if one not in cycles.POCKETS]
-        if name not in known:
+        known = [one for one in cycles.ARGUMENTS if one not in (*cycles.POCKETS, *cycles.RADIAL)]
+        if name in cycles.ARGUMENTS and name not in known:
             raise reader.fault(f"MCALL {name} is not read; read are {', '.join(known)}", 0)
-        self.cycle = self._drilled(reader, name, self._arguments(reader))
+        if name in known:
+            self.cycle = self._drilled(reader, name, self._arguments(reader))
+            return
+        self.cycle, body, self.body = [], self.body, []
+        given = self._arguments(reader)
+        self._append_call(reader, name, given, tree.ONE)
+        self.cycle, self.body = self.body, body
 
     def _frame(self, reader: LineTokens) -> None:
         """TRANS, ROT, SCALE, MIRROR: a frame; ATRANS and the others: one beside the one before."""
@@ -155,6 +90,9 @@ class Commands(SiemensControl):
         given: dict[str, tree.Expression] = {}
         while not reader.ended:
             at, token = reader.at(), reader.pop()
+            if token.text in ("TRANS", "ROT", "SCALE", "MIRROR") or token.text[0] == "G":
+                reader.next -= 1
+                break
             letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
             single = token.kind == "word" or len(token.text) == len(letter)
             if letter not in ("X", "Y", "Z", "RPL") or not single:
@@ -167,20 +105,6 @@ class Commands(SiemensControl):
         self.body.append(tree.made(place, "siemens frame", kind=kind, **given))
         self.body.append(tree.made(place, "frame in force"))
 
-    def _define(self, reader: LineTokens) -> None:
-        kind = reader.pop().text
-        if kind not in TYPES:
-            raise reader.fault(f"DEF {kind} is not read; read are {', '.join(sorted(TYPES))}", 0)
-        while True:
-            if reader.kind() != "name" or reader.peek(1) == "[":
-                raise reader.fault("the name of a variable is expected here; arrays are not read")
-            name = reader.pop().text
-            self.names.add(name)
-            value = reader.expression() if reader.take("=") else tree.ZERO
-            self.body.append(tree.assign(reader.place, (variable(name), value)))
-            if not reader.take(","):
-                return
-
     def _message(self, reader: LineTokens) -> None:
         match = re.search(r'"([^"]*)"', reader.text)
         reader.leave()
@@ -188,7 +112,35 @@ class Commands(SiemensControl):
             self.body.append(tree.Message(reader.place, (match.group(1),)))
 
     def _refused(self, reader: LineTokens) -> None:
-        raise reader.fault(f"{reader.peek(-1)} is not read; {REMEDY}", reader.tokens[reader.next - 1].at)
+        raise reader.fault(tables.refusal(reader.peek(-1)), reader.tokens[reader.next - 1].at)
+
+    def _offset(self, reader: LineTokens) -> None:
+        """$P_UIFR[n, X, TR] = value and $P_UIFR[n] = CTRANS(X, value, ...): a work system's origin."""
+        at = reader.tokens[reader.next - 1].at
+        reader.expect("[")
+        number, words = reader.expression(), []
+        system = _SYSTEM_OF.get(int(number.value)) if isinstance(number, tree.Number) else None
+        if reader.take(","):
+            axis = reader.pop().text
+            reader.expect(",")
+            part = reader.pop().text
+            reader.expect("]")
+            reader.expect("=")
+            words = [(axis, reader.expression())]
+        else:
+            part = "TR" if reader.take("]") and reader.take("=") and reader.take("CTRANS") else ""
+            words = [(axis, tree.ZERO) for axis in "XYZ"] if part and reader.take("(") else []
+            while words and not reader.take(")"):
+                axis = reader.pop().text
+                reader.expect(",")
+                words = [(one, old) for one, old in words if one != axis] + [(axis, reader.expression())]
+                reader.take(",")
+        if system is None or part != "TR" or not words or any(axis not in "XYZ" for axis, _ in words):
+            text = "settable frames are read as $P_UIFR[1 to 4, X, TR] = value and = CTRANS(X, value, ...); put others into "
+            raise reader.fault(text + "[work_offsets] of the machine file", at)
+        self.body.append(
+            tree.row(reader.place, ("G", 10.0), ("L", 2.0), ("P", float(system)), *sorted(words))
+        )
 
     def _tool_point(self, reader: LineTokens) -> None:
         """TRAORI and TRAFOOF, alone or as NAME(1). Raises ProgramFault for others, and without kinematics."""
@@ -197,7 +149,7 @@ class Commands(SiemensControl):
         if reader.take("(") and not (reader.take("1") and reader.take(")")):
             raise reader.fault(f"{name} is read alone, or as {name}(1)", at)
         if self.source.at_tip:
-            self.body.append(tree.row(reader.place, ("M", TOOL_POINT[name])))
+            self.body.append(tree.row(reader.place, ("M", tables.TOOL_POINT[name])))
         elif name == "TRAORI":
             text = "TRAORI is not read on a machine without a table [kinematics]; add it to the machine file"
             raise reader.fault(text, at)
@@ -209,27 +161,38 @@ class Commands(SiemensControl):
             reader.pop()
             return None
         kind = reader.peek()
-        if kind in ("AC", "IC") and reader.peek(1) == "(":
-            reader.next += 2
-            value = reader.expression()
-            reader.expect(")")
-            if letter in "IJK":
-                return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
-            if letter not in "XYZ":
-                raise reader.fault("AC and IC stand with X Y Z and I J K", at - reader.start)
-            if (kind == "AC") == self.absolute:
-                return value
-            return value - position(letter) if kind == "AC" else position(letter) + value
-        return reader.expression()
+        if kind not in _CLOSER or reader.peek(1) != "(":
+            return reader.expression()
+        reader.next += 2
+        value = reader.expression()
+        reader.expect(")")
+        if letter in "IJK":
+            return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
+        if letter not in "XYZABC" or (kind not in ("AC", "IC") and letter in "XYZ"):
+            raise reader.fault(
+                "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C", at - reader.start
+            )
+        here = position(letter)
+        if kind in ("DC", "ACP", "ACN"):  # the shortest way there, or that in a direction
+            way = here - value if kind == "ACN" else value - here
+            step = tree.op(_CLOSER[kind], way)
+            value = here - step if kind == "ACN" else here + step
+        elif (kind == "AC") == self.absolute:
+            return value
+        elif kind == "IC":
+            return here + value
+        return value if self.absolute else value - here
 
     def _is_call(self, reader: LineTokens) -> bool:
         """True if the line is a call by a name."""
-        name, known = reader.peek(), self.names | IDLE | IDLE_CALLS | SAID.keys()
-        is_name = reader.kind() == "name" and _CALLED.fullmatch(name)
-        if not is_name or name in known:
+        name, known = (
+            reader.peek(),
+            self.names.keys() | tables.IDLE | tables.SAID.keys() | tables.REFUSED.keys(),
+        )
+        if reader.kind() != "name" or not _CALLED.fullmatch(name) or name in known:
             return False
         behind = reader.peek(1)
-        return not _OF_THE_CONTROL.fullmatch(name) and (behind in ("", "(") or bool(_TIMES.fullmatch(behind)))
+        return name not in cycles.ARGUMENTS and (behind in ("", "(", "P") or bool(_TIMES.fullmatch(behind)))
 
     def _call(self, reader: LineTokens) -> None:
         name = reader.pop().text
@@ -238,52 +201,52 @@ class Commands(SiemensControl):
         if match := _TIMES.fullmatch(reader.peek()):
             reader.pop()
             times = tree.Number(float(match.group(1)))
+        elif reader.take("P"):
+            reader.expect("=")
+            times = reader.expression()
         if not reader.ended:
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
 
     def _call_text(self, reader: LineTokens) -> None:
+        """CALL "NAME", EXTCALL "NAME", EXTCALL ("NAME"), CALL BLOCK label TO label."""
+        if reader.take("BLOCK"):
+            self._call_block(reader)
+            return
+        bracket = reader.take("(")
         if reader.kind() != "text":
             raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
         text = reader.pop().text.strip('"')
-        stem = re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").split("/")[-1])
+        if bracket:
+            reader.expect(")")
+        stem = re.sub(r"(?i)\A_N_", "", text.replace("\\", "/").replace(":", "/").split("/")[-1])
         name = re.sub(r"(?i)(_SPF|\.SPF|_MPF|\.MPF)\Z", "", stem)
         self._append_call(reader, name.upper(), [], tree.ONE)
 
     def _append_call(
         self, reader: LineTokens, name: str, given: list[tree.Expression | None], times: tree.Expression
     ) -> None:
+        if name in self.source.harmless:
+            self.body.append(
+                tree.Message(
+                    reader.place, (f"{name} is assumed not to move anything, as the machine file says",)
+                )
+            )
+            return
         if len(given) > _NAMES_MAX:
             raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
-        handed: list[tuple[tree.Parameter, tree.Expression]] = [
-            (handed_over(k), given[k] if k < len(given) and given[k] is not None else tree.ZERO)  # type: ignore[misc]
-            for k in range(_NAMES_MAX if given else 0)
-        ]
-        if handed:
-            self.body.append(tree.assign(reader.place, *handed))
-        self.body.append(tree.Call(reader.place, name.lower(), None, name, times))
-
-    def _procedure(self, reader: LineTokens) -> None:
-        if reader.kind() != "name":
-            raise reader.fault("PROC is followed by the subprogram's name")
-        reader.pop()
-        taken: list[tuple[tree.Parameter, tree.Expression]] = []
-        if reader.take("("):
-            while not reader.take(")"):
-                kind, name = reader.peek(), reader.peek(1)
-                if kind not in TYPES or reader.ended:
-                    raise reader.fault(f"a value of PROC is one of {', '.join(sorted(TYPES))} and a name")
-                reader.next += 2
-                self.names.add(name)
-                taken.append((variable(name), handed_over(len(taken))))
-                if not reader.take(",") and reader.peek() != ")":
-                    raise reader.fault(") is missing")
-        reader.leave()  # SAVE, DISPLOF and others
-        if taken:
-            self.body.append(tree.assign(reader.place, *taken))
-
-    def _return(self, reader: LineTokens) -> None:
-        self.body.append(tree.Return(reader.place))
+        place = reader.place
+        values = [tree.ZERO if one is None else one for one in given]
+        values += [tree.ZERO] * (_NAMES_MAX - len(given) if given else 0)
+        pairs = [(handed_over(k), value) for k, value in enumerate(values)]
+        pairs += [(changed(k), tree.ZERO) for k in range(len(given))]
+        if pairs:
+            self.body.append(tree.assign(place, *pairs))
+        self.body.append(tree.Call(place, name.lower(), None, name, times))
+        for k, one in enumerate(given):
+            if isinstance(one, tree.Named | tree.Numbered):
+                back: list[tree.Statement] = [tree.assign(place, (one, handed_over(k)))]
+                self.body.append(tree.If(place, ((tree.op("EQ", changed(k), tree.ONE), back),), []))
 
 
 def siemens_files(name: str) -> frozenset[str]:

@@ -9,17 +9,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.nc.language.makers import SIEMENS, with_makers
+from planner.nc.language.makers import with_makers
 from planner.nc.language.run import Dialect
-from planner.nc.language.siemens import commands, cycles
-from planner.nc.language.siemens.block_words import EACH_LINE, BlockWords
+from planner.nc.language.siemens import commands, patterns, tables
+from planner.nc.language.siemens.block_words import COMMANDS, EACH_LINE, BlockWords
 from planner.nc.language.siemens.text import LANGUAGE, LineTokens, variable
 from planner.nc.language.source import SourceLine
 from planner.nc.language.system_variables import PositionVariables
-from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
+from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign, made
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
+_MODES = (0, 1, 2, 3, 17, 18, 19, 90, 91)
 _NUMBER = re.compile(r"\s*[N:]\s*(\d+)\s*", re.IGNORECASE)
 
 
@@ -39,9 +40,9 @@ class SiemensParser(BlockWords):
     def _special(self) -> list[int]:
         words = self.source.words
         letter, value = words.letter, words.value
-        same = np.isin(letter, [ord(c) for c in commands.PLAIN_LETTERS])
-        same &= (letter != ord("G")) | np.isin(value, commands.SAME_CODES)
-        same &= (letter != ord("M")) | ~np.isin(value, commands.RETURNS if self.source.file else (17,))
+        same = np.isin(letter, [ord(c) for c in tables.PLAIN_LETTERS])
+        same &= (letter != ord("G")) | np.isin(value, tables.SAME_CODES)
+        same &= (letter != ord("M")) | ~np.isin(value, tables.RETURNS if self.source.file else (17,))
         targets = [int(label) for label in _TARGETS.findall(words.data)]
         same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = words.rows_with(np.flatnonzero(~same))
@@ -53,14 +54,21 @@ class SiemensParser(BlockWords):
         if self.circular:
             self._check_motion(one_by_one)
         letter, value = self.source.words_of(rows)
-        modes = value[(letter == ord("G")) & np.isin(value, (90, 91))]
-        self.absolute = bool(modes[-1] == 90) if len(modes) else self.absolute
-        if self.cycle is None:
+        codes = value[letter == ord("G")]
+        for code in codes[np.isin(codes, _MODES)].tolist():
+            self.absolute = code == 90.0 if code in (90.0, 91.0) else self.absolute
+            self.normal = {17.0: 2, 18.0: 1, 19.0: 0}.get(code, self.normal)
+            self.turns = code > 1.0 if code <= 3.0 else self.turns
+        if self.cycle is None and self.rounding is None:
             self.body.append(rows)
             return
         for row in one_by_one:
-            self.body += self.source.plain(row, row + 1)
-            if np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any():
+            moves = np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any()
+            (plain,) = self.source.plain(row, row + 1)
+            if moves and self.rounding is not None:
+                self.body.append(made(plain.place, "corner", kind=0.0, size=self.rounding, modal=ONE))
+            self.body.append(plain)
+            if moves and self.cycle is not None:
                 self.body += self.cycle
 
     def _check_motion(self, rows: range) -> None:
@@ -79,32 +87,29 @@ class SiemensParser(BlockWords):
         at = 0
         if text.lstrip().startswith("/"):
             at = text.index("/") + 1  # the lexer has left out skipped lines
-        number = _NUMBER.match(text, at)
         labels = []
-        if number:
-            at = number.end()
-            labels.append(f"N{int(number.group(1))}")
-        while label := _LABEL.match(text, at):
-            labels.append(label.group(1).upper())
+        while label := _NUMBER.match(text, at) or _LABEL.match(text, at):
+            name = label.group(1).upper()
+            labels.append(f"N{int(name)}" if name.isdecimal() else name)
             at = label.end()
         for name in labels:
             self._label(name, line.place)
         body, first = self.body, len(self.body)
         self._statement(text, at, line)
         if self.body is body:
-            self.lines.update((name, body[first:]) for name in labels)
+            self.lines.update((name, (body, first, len(body))) for name in labels)
 
     def _statement(self, text: str, at: int, line: SourceLine) -> None:
         reader = LineTokens(" " * at + text[at:], line.place, line.start, self.names)
         if reader.ended:
             return
-        read = _STATEMENTS.get(reader.peek())
+        read = None if reader.peek() in self.names else _STATEMENTS.get(reader.peek())
         if read is not None:
             reader.pop()
             read(self, reader)
             if not reader.ended:
                 raise reader.fault(f"{reader.peek()} is not expected here")
-        elif self._is_call(reader):
+        elif reader.peek() not in COMMANDS and self._is_call(reader):
             self._call(reader)
         else:
             self._words(reader)
@@ -126,17 +131,24 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     **dict.fromkeys(
         ("GOTO", "GOTOF", "GOTOB", "GOTOC"), lambda parser, reader: parser._jump(reader, parser.body)
     ),
-    **dict.fromkeys((*SIEMENS, *(f"A{name}" for name in SIEMENS)), SiemensParser._frame),
     "MCALL": SiemensParser._modal_call,
-    **dict.fromkeys(cycles.PATTERNS, SiemensParser._pattern),
+    **dict.fromkeys(patterns.PATTERNS, SiemensParser._pattern),
     "MSG": SiemensParser._message,
-    **dict.fromkeys(("EXTERN", "WORKPIECE"), lambda parser, reader: reader.leave()),
-    **dict.fromkeys(commands.TOOL_POINT, SiemensParser._tool_point),
+    **dict.fromkeys(("EXTERN", "WORKPIECE", "GROUP_BEGIN", "REDEF"), lambda parser, reader: reader.leave()),
+    **dict.fromkeys(tables.TOOL_POINT, SiemensParser._tool_point),
     "PROC": SiemensParser._procedure,
-    "CALL": SiemensParser._call_text,
-    "RET": SiemensParser._return,
-    **dict.fromkeys(commands.REFUSED, SiemensParser._refused),
+    **dict.fromkeys(("CALL", "EXTCALL"), SiemensParser._call_text),
+    "CASE": SiemensParser._case,
+    "ENDLABEL": lambda parser, reader: None,
+    "$P_UIFR": SiemensParser._offset,
+    **dict.fromkeys(("RET", "STOPFROM"), SiemensParser._return),
+    **dict.fromkeys(
+        (one for one in tables.REFUSED if not one.startswith("G") and one not in COMMANDS),
+        SiemensParser._refused,
+    ),
 }
 
 
-DIALECT = Dialect(LANGUAGE, PositionVariables, SiemensParser, commands.siemens_files, with_makers)
+DIALECT = Dialect(
+    LANGUAGE, PositionVariables, SiemensParser, commands.siemens_files, with_makers, tables.UNKNOWN
+)

@@ -3,15 +3,14 @@
     word        = letter value | NAME = expression | NAME = AC(expression) | NAME = IC(expression)
     expression  = values with OR XOR, AND, == <> > >= < <=, + -, * / DIV MOD, NOT and signs, and brackets
     value       = number | R n | R[expression] | variable | function ( expression )
-    function    = SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND LN EXP MIN MAX
+    function    = SIN COS TAN ASIN ACOS ATAN2 SQRT ABS POT TRUNC ROUND ROUNDUP LN EXP MINVAL MAXVAL BOUND
 
-Variables are declared by DEF and are 0 at first; R parameters are R0 to R999. $AA_IW[X], $AA_IM[X] and
-$P_EP[X] are positions of an axis.
+Variables are declared by DEF and are 0 at first; arrays are parameters behind the R parameters, which are R0 to
+R999, and texts are not followed. $AA_IW[X], $AA_IM[X] and $P_EP[X] are positions of an axis.
 """
 
 import math
 import re
-from collections.abc import Container
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
@@ -20,23 +19,46 @@ from planner.nc.language.system_variables import FIRST_POSITION, PositionVariabl
 from planner.nc.language.tokens import Token, TokenReader, names, ranked
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
-LANGUAGE = tree.Language(
-    operations=ARITHMETIC | {("MOD", 2): "fmod({0},{1})"},
-    ranks=ranked("OR XOR", "AND", "== <> > >= < <=", "+ -", "* / DIV MOD"),
-    meant={"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"},
-    functions=names("SIN COS TAN ASIN ACOS SQRT ABS POT TRUNC ROUND LN EXP"),
-    conditions=COMPARISONS | LOGICAL,
-    largest=FIRST_POSITION + 2,
-    system_numbers=PositionVariables.numbers,
-    constants={"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi},
+# Values of arrays that a file may have, how many files may have some, and the first parameter.
+ARRAY_VALUES, FILES_WITH_ARRAYS, FIRST_ARRAY = 1000, 50, FIRST_POSITION + 10
+# States of a control that runs a program from its start to its end, without a simulation, and names of
+# what is set by cycles.
+_KNOWN = dict.fromkeys(
+    names(
+        "$P_ISTEST $P_SEARCH $P_SEARCHL $P_SIM $P_DRYRUN $P_PROGPATH _OFF $AN_NCK_VERSION $P_PROG_EVENT $P_TOOLD _ROUGH "
+        "_SEMIFIN _FINISH _ORI_ROUGH _ORI_SEMIFIN _ORI_FINISH _TOP_SURFACE_SMOOTH_OFF _TOP_SURFACE_SMOOTH_ON"
+    ),
+    0.0,
 )
-_TWO = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX"}  # functions of two values, by their names in the tree
-_SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP)\Z")
+LANGUAGE = tree.Language(
+    operations=ARITHMETIC
+    | {
+        ("MOD", 2): "fmod({0},{1})",
+        **{
+            (f"B_{name}", 2): f"float(int({{0}}){sign}int({{1}}))"
+            for name, sign in (("AND", "&"), ("OR", "|"), ("XOR", "^"))
+        },
+        ("BOUND", 3): "min(max({0},{1}),{2})",
+        ("INDEX", 2): "array_index({0},{1})",
+        ("WRAPPED", 1): "remainder({0},360.0)",
+        ("TURNED", 1): "({0}%360.0)",
+    },
+    ranks=ranked("OR XOR", "AND", "B_OR B_XOR", "B_AND", "== <> > >= < <=", "+ -", "* / DIV MOD"),
+    meant={"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"},
+    functions=names("SIN COS TAN ASIN ACOS SQRT ABS POT TRUNC ROUND ROUNDUP LN EXP"),
+    conditions=COMPARISONS | LOGICAL,
+    largest=FIRST_ARRAY + ARRAY_VALUES * FILES_WITH_ARRAYS,
+    system_numbers=PositionVariables.numbers,
+    constants={"TRUE": 1.0, "FALSE": 0.0, "PI": math.pi, **_KNOWN},
+)
+# Functions of several values, by their names in the tree.
+_MORE = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX", "MINVAL": "MIN", "MAXVAL": "MAX", "BOUND": "BOUND"}
+_SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP|AA_IB)\Z")
 
 
 def position(axis: str) -> tree.Numbered:
     """Where the axis is, in the program's coordinates."""
-    return tree.Numbered(tree.Number(float(FIRST_POSITION + "XYZ".index(axis))))
+    return tree.Numbered(tree.Number(float(FIRST_POSITION + AXES.index(axis))))
 
 
 def variable(name: str) -> tree.Named:
@@ -49,21 +71,27 @@ def handed_over(number: int) -> tree.Named:
     return tree.Named(f"_value {number}", True)
 
 
+AXES = ("X", "Y", "Z", "A", "B", "C")  # whose position is known
+# Variables by name: the first parameter of an array (0 for others) and its sizes; a text has one size, of 0.
+Names = dict[str, tuple[int, tuple[int, ...]]]
+TEXT = (0, (0,))
+
+
 class LineTokens(TokenReader):
     """Reads one line of a program from left to right.
 
-    names : variables that the program has declared
+    names : variables that the program has declared, arrays with their first parameter and their sizes
     """
 
     pattern = re.compile(
-        r"\s*(?:(?P<word>[XYZIJKFSTMDGHABC][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"
-        r"(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:EX[-+]?\d+)?)|(?P<name>\$?[A-Z_][A-Z0-9_]*)|(?P<text>\"[^\"]*\")|"
-        r"(?P<sign>==|<>|>=|<=|[-+*/()<>=,\[\]:]))",
+        r"\s*(?:(?P<word>[XYZIJKFSTMDGHABCUVW][-+]?(?:\d+\.?\d*|\.\d+)(?![\d_.])(?!\w*\s*[=(\[]))|"
+        r"(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:EX[-+]?\d+)?|'(?:H[\dA-F]+|B[01]+|\d+)')|(?P<name>\$?[A-Z_][A-Z0-9_]*)|"
+        r"(?P<text>\"[^\"]*\"|'[^']*')|(?P<sign>==|<>|>=|<=|<<|[-+*/()<>=,\[\]:]))",
         re.IGNORECASE,
     )
     language = LANGUAGE
 
-    def __init__(self, text: str, place: tree.SourcePlace, start: int, names: set[str]):
+    def __init__(self, text: str, place: tree.SourcePlace, start: int, names: Names):
         self.place, self.start, self.names = place, start, names
         super().__init__(text)
 
@@ -94,6 +122,9 @@ class LineTokens(TokenReader):
         return super().value()
 
     def number(self, text: str) -> float:
+        if text[0] == "'":
+            base = {"H": 16, "B": 2}.get(text[1], 10)
+            return float(int(text.strip("'HB") if base != 16 else text[2:-1], base))
         return float(text.replace("EX", "e"))
 
     def operand(self, token: Token) -> tree.Expression | None:
@@ -102,21 +133,25 @@ class LineTokens(TokenReader):
             return tree.op(name, self.value())
         if token.kind != "name":
             return None
-        if name in LANGUAGE.functions or name in _TWO:
+        if name in LANGUAGE.functions or name in _MORE:
             self.expect("(")
             operands = [self.expression()]
-            if name in _TWO:
-                self.expect(",")
+            while self.take(","):
                 operands.append(self.expression())
             self.expect(")")
-            return tree.op(_TWO.get(name, name), *operands)
+            name = {"ROUNDUP": "FUP"}.get(name, _MORE.get(name, name))
+            if (name, len(operands)) not in LANGUAGE.operations:
+                raise self.fault(f"{token.text} takes another number of values", token.at)
+            return tree.op(name, *operands)
         if _SYSTEM.match(name) and self.take("["):
             axis = self.pop().text
             self.expect("]")
-            if axis not in ("X", "Y", "Z"):
-                raise self.fault(f"{name}[{axis}]: the position of X, Y or Z is known", token.at)
+            if axis not in AXES:
+                raise self.fault(f"{name}[{axis}]: the position of {', '.join(AXES)} is known", token.at)
             return position(axis)
         parameter = self.parameter(token)
+        if parameter is None and name[0] == "$":
+            raise self.fault(f"{name} is known by the control only; write its value", token.at)
         if parameter is None:
             raise self.fault(f"{name} is not declared; write DEF REAL {name} before", token.at)
         return parameter
@@ -132,7 +167,23 @@ class LineTokens(TokenReader):
             if number >= PARAMETERS:
                 raise self.fault(f"{token.text}: there are R0 to R{PARAMETERS - 1}", token.at)
             return tree.Numbered(tree.Number(float(number + 1)))
-        return variable(token.text) if token.text in self.names else None
+        if token.text not in self.names:
+            return None
+        first, sizes = self.names[token.text]
+        if not first:
+            return None if sizes else variable(token.text)
+        if not self.take("["):
+            raise self.fault(
+                f"{token.text} is an array; write which of its values: {token.text}[0]", token.at
+            )
+        value: tree.Expression = tree.ZERO
+        for k, size in enumerate(sizes):
+            if k:
+                self.expect(",")
+            index = tree.op("INDEX", self.expression(), tree.Number(float(size)))
+            value = index if not k else value * tree.Number(float(size)) + index
+        self.expect("]")
+        return tree.Numbered(tree.op("+", tree.Number(float(first)), value))
 
 
 class SiemensControl(LineParser):
@@ -142,7 +193,8 @@ class SiemensControl(LineParser):
         super().__init__(source)
         self.labels: dict[str, int] = {}  # their numbers in the tree, by name
         self.counters = 0  # how many sections are repeated by their labels
-        self.lines: dict[str, list[tree.Statement]] = {}  # the statements of lines with labels
+        # where the statements of lines with labels stand: a body, and the first and behind the last of them
+        self.lines: dict[str, tuple[list[tree.Statement], int, int]] = {}
 
     def _label(self, name: str, place: tree.SourcePlace) -> None:
         self.body.append(tree.Label(place, self._number_of(name)))
@@ -203,32 +255,67 @@ class SiemensControl(LineParser):
         self.add_loop(closed, tree.op("LE", target, last))
 
     def _repeat(self, reader: LineTokens) -> None:
-        """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here, n times more."""
+        """REPEAT ... UNTIL, or REPEAT label P=n: the lines from the label to here (or to ENDLABEL, or to
+        the line of a second label), n times more."""
         if reader.ended:
             self._begin("REPEAT", reader, None)
             return
-        label, counter, times = self._repeated(reader, self.labels)
-        place = reader.place
-        self.body.append(tree.repeated(place, counter, times, self.labels[label]))
+        label, last, counter, times = self._repeated(reader)
+        if last or "ENDLABEL" in self.lines:
+            self._repeat_lines(reader, self._lines_between(reader, label, last or "ENDLABEL"), counter, times)
+        else:
+            self.body.append(tree.repeated(reader.place, counter, times, self.labels[label]))
 
     def _repeat_block(self, reader: LineTokens) -> None:
-        label, counter, times = self._repeated(reader, self.lines)
-        place = reader.place
-        self.body.append(tree.assign(place, (counter, tree.ZERO)))
-        body = [*self.lines[label], tree.assign(place, (counter, counter + tree.ONE))]
-        self.add_loop(tree.OpenStatement("REPEATB", place, None, body=body), tree.op("LT", counter, times))
+        label, _, counter, times = self._repeated(reader)
+        self._repeat_lines(reader, self._lines_between(reader, label, label), counter, times)
 
-    def _repeated(self, reader: LineTokens, known: Container[str]) -> tuple[str, tree.Named, tree.Expression]:
-        """The label of a repeat, its counter, and how often. Raises ProgramFault for an unknown label."""
+    def _call_block(self, reader: LineTokens) -> None:
+        """CALL BLOCK label TO label: the lines between, once."""
         label = reader.pop().text
-        if label not in known:
+        reader.expect("TO")
+        self.body += self._lines_between(reader, label, reader.pop().text)
+
+    def _lines_between(self, reader: LineTokens, first: str, last: str) -> list[tree.Statement]:
+        """The statements from a label to the line of another one."""
+        for name in (first, last):
+            if name not in self.lines:
+                raise reader.fault(f"there is no label {name} above this line", 0)
+        body, begin, end = *self.lines[first][:2], self.lines[last][2]
+        found: list[tree.Statement] = [one for one in body[begin:end] if not isinstance(one, tree.Label)]
+        if body is not self.lines[last][0] or any(
+            isinstance(s, tree.Goto) for s in tree.statements_in(found)
+        ):
+            raise reader.fault(
+                f"the lines {first} to {last} jump, or lie in different loops; write them out", 0
+            )
+        return found
+
+    def _repeat_lines(
+        self, reader: LineTokens, lines: list[tree.Statement], counter: tree.Named, times: tree.Expression
+    ) -> None:
+        self.body.append(tree.assign(reader.place, (counter, tree.ZERO)))
+        body = [*lines, tree.assign(reader.place, (counter, counter + tree.ONE))]
+        opened = tree.OpenStatement("REPEATB", reader.place, None, body=body)
+        self.add_loop(opened, tree.op("LT", counter, times))
+
+    def _repeated(self, reader: LineTokens) -> tuple[str, str, tree.Named, tree.Expression]:
+        """The label of a repeat, a second one, its counter, and how often. Raises ProgramFault for unknown
+        labels."""
+        label, last = reader.pop().text, ""
+        if label not in self.labels:
             raise reader.fault(f"there is no label {label} above this line", 0)
+        if reader.peek() in self.labels:
+            last = reader.pop().text
         times: tree.Expression = tree.ONE
-        if reader.take("P"):
+        if match := re.fullmatch(r"P(\d+)", reader.peek()):
+            times = tree.Number(float(match[1]))
+            reader.pop()
+        elif reader.take("P"):
             reader.expect("=")
             times = reader.expression()
         self.counters += 1
-        return label, variable(f"_count{self.counters - 1}"), times
+        return label, last, variable(f"_count{self.counters - 1}"), times
 
     def _until(self, reader: LineTokens) -> None:
         closed = self._close("REPEAT", reader)
@@ -237,5 +324,23 @@ class SiemensControl(LineParser):
     def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
         if reader.ended:
             raise reader.fault("a label is expected here")
-        label = reader.pop().text
+        label = reader.pop().text.strip('"').upper()
         body.append(tree.Goto(reader.place, tree.Number(float(self._number_of(label)))))
+
+    def _case(self, reader: LineTokens) -> None:
+        """CASE value OF 1 GOTOF label ... DEFAULT GOTOF label."""
+        value = reader.expression()
+        reader.expect("OF")
+        branches: list[tuple[tree.Expression, list[tree.Statement]]] = []
+        otherwise: list[tree.Statement] = []
+        while not reader.ended:
+            body: list[tree.Statement] = []
+            if not reader.take("DEFAULT"):
+                branches.append((tree.op("EQ", value, reader.value()), body))
+            else:
+                otherwise = body
+            if not reader.peek().startswith("GOTO"):
+                raise reader.fault("GOTOF or GOTOB and a label are expected here")
+            reader.pop()
+            self._jump(reader, body)
+        self.body.append(tree.If(reader.place, tuple(branches), otherwise))

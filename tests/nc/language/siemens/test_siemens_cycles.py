@@ -135,7 +135,7 @@ def test_the_direction_of_milling(cdir: int, spindle: str, left: int) -> None:
         ("CYCLE82(12,1,3,,0,0.4)", "at or above its surface"),
         ("CYCLE83(12,1,3,-9,,-2,,0.00001,0,0,1,0)", "too small an infeed"),
         ("CYCLE85(20,0,2,-10,,0.5)", "<text>:4:1: .*CYCLE85 needs FFR"),
-        ("CYCLE81(20,0,2,-10,,0.5)", "argument 6 of CYCLE81, of later controls"),
+        ("CYCLE81(20,0,2,-10,,0.5,0,2)", "DMODE 2 of CYCLE81 is not read"),
         ("POCKET4(20,0,2,-10,25,15,25,4,0,0,500,100,0,41)", "VARI 41"),
         ("POCKET4(20,0,2,-10,25,15,25,4,0,0,500,100,7,11)", "CDIR 7"),
         ("POCKET4(20,0,2,-10,4,15,25,4,0,0,500,100,0,11)", "the tool is larger"),
@@ -146,8 +146,8 @@ def test_the_direction_of_milling(cdir: int, spindle: str, left: int) -> None:
         ("POCKET3(20,0,2,-10,-60,40,8,15,25,30,4,0,0,500,100,0,11)", "are to be above 0"),
         ("G18 POCKET3(20,0,2,-10,60,40,8,15,25,30,4,0,0,500,100,0,11)", "POCKET3 in G18"),
         ("MCALL POCKET3(1)", "MCALL POCKET3 is not read"),
-        ("SLOT1(20,0,2,-10)", "SLOT1 is not read"),
-        ("LONGHOLE(20,0,2,-10)", "LONGHOLE is not read"),
+        ("SLOT1(20,0,2,-10)", "SLOT1 needs NUM"),
+        ("LONGHOLE(20,0,2,-10)", "LONGHOLE needs NUM"),
     ],
 )  # fmt: skip
 def test_cycles_that_make_no_sense_or_are_not_known_are_refused(text: str, said: str) -> None:

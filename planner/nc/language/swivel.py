@@ -1,0 +1,118 @@
+"""Tilted planes: CYCLE800 of Siemens, PLANE and cycle 19 of Heidenhain, on a machine with kinematics.
+
+The plane's coordinates are p = d + M p', M a rotation; the tool is to stand along u = M e_z. The rotary axes
+turn to one of the two pairs of angles for u (`machine/kinematics/chain.py`), as a rapid move of the joints, and
+the tool centre point is switched on behind it, so that x, y, z are the tool's tip as seen from the workpiece.
+
+    Siemens      the angles A, B, C about the axes of MODE, each about the axes turned before: M = R1 R2 R3; the zero
+                 is at (X0, Y0, Z0), and (X1, Y1, Z1) further in the plane
+    Heidenhain   M = Rz(SPC) Ry(SPB) Rx(SPA); EULER: M = Rz(EULPR) Rx(EULNU) Rz(EULROT); RELATIV: M Rx, Ry or Rz
+
+Sources: 840D sl, CYCLE800 (bits of MODE); TNC 640, conversational programming, PLANE SPATIAL.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.arrays import FloatArray
+from planner.base.units import RAD_PER_DEG
+from planner.nc.language.travel_rows import turned
+from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
+
+if TYPE_CHECKING:
+    from planner.nc.language.making import Making
+
+_ON, _OFF = float(TOOL_POINT_ON[1]), float(TOOL_POINT_OFF[1])
+_SAME = 1e-9  # of a direction's components, which are the same then
+_NO_MOVE, _STAY, _TURN, _MOVE = 0, 1, 2, 3  # what the rotary axes do
+WAYS = {"STAY": _STAY, "TURN": _TURN, "MOVE": _MOVE}
+RETRACTED = "the retraction of CYCLE800 (FR), to places that the machine's data hold, is not planned"
+MOVED = "PLANE with MOVE turns the rotary axes where the tool stands, as with TURN"
+
+
+def siemens(making: "Making", given: Mapping[str, float]) -> None:
+    """CYCLE800(FR, TC, ST, MODE, X0, Y0, Z0, A, B, C, X1, Y1, Z1, DIR ...), arguments as p0, p1 ... Raises
+    ValueError."""
+    mode = round(given.get("p3", 0.0))
+    angles = [given.get(f"p{k}", 0.0) for k in (7, 8, 9)]
+    before, behind = (np.array([given.get(f"p{k}", 0.0) for k in part]) for part in ((4, 5, 6), (10, 11, 12)))
+    if any(angles) and mode >> 6:
+        raise ValueError(
+            f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read; write angles axis by "
+            "axis (MODE 57 or 27)"
+        )
+    if round(given.get("p2", 0.0)) % 10 == 1:
+        raise ValueError(
+            "ST 1 of CYCLE800, a plane on top of the one before, is not read; write its angles from the zero"
+        )
+    if given.get("p0", 0.0) and len(given) > 1:
+        making.assume(RETRACTED)
+    matrix = np.eye(3)
+    for k, angle in enumerate(angles):
+        if angle:
+            matrix = matrix @ turned(angle, (mode >> 2 * k & 3) - 1)
+    shift = (before + matrix @ behind) * making.unit
+    side = given.get("p13", -1.0)
+    tilt(
+        making,
+        matrix,
+        shift,
+        _NO_MOVE if not given else _TURN if side else _STAY,
+        int(side) if any(angles) else 0,
+    )
+    making.travel.programmed = np.eye(3), np.zeros(3)
+
+
+def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
+    """PLANE and cycle 19: SPA SPB SPC, EULPR EULNU EULROT; `way` one of WAYS, `side` of SEQ. Raises
+    ValueError."""
+    if "EULNU" in given:
+        matrix = turned(given["EULPR"], 2) @ turned(given["EULNU"], 0) @ turned(given["EULROT"], 2)
+    else:
+        parts = (turned(given.get(f"SP{'ABC'[k]}", 0.0), k) for k in (2, 1, 0))
+        matrix = np.linalg.multi_dot(list(parts))
+    if "relative" in given:
+        matrix = making.travel.swivelled[0] @ matrix
+    if given["way"] == _MOVE:
+        making.assume(MOVED)
+    tilt(making, matrix, making.travel.parts.datum * 0.0, round(given["way"]), round(given.get("side", 0.0)))
+
+
+def tilt(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
+    """The plane p = shift + matrix p' is in force from here on, shift (3,) [mm] and matrix (3, 3). Raises
+    ValueError without kinematics.
+
+    side : sign of the tilting axis, 0 for the nearer pair of angles
+    """
+    travel, interpreter = making.travel, making.interpreter
+    state, chain, direction = interpreter.state, interpreter.tool_point.chain, matrix[:, 2]
+    level = bool(abs(direction - np.array([0.0, 0.0, 1.0])).max() < _SAME)
+    if chain is None and not level:
+        raise ValueError(
+            "a tilted plane turns the rotary axes of the machine, and its file has no table [kinematics]; add it (type, rotary "
+            "axes and their offsets)"
+        )
+    travel.swivel(np.eye(3), np.zeros(3))
+    if chain is None:
+        travel.swivel(matrix, shift)
+        return
+    letters = [letter.upper() for letter in chain.data.rotary]
+    at = [state.letters.index(letter) for letter in letters]
+    here = state.programmed()[at]
+    pairs = chain.angles(direction[None])[0] / RAD_PER_DEG
+    fitting = [pair for pair in pairs if not side or level or np.sign(pair[0]) == side]
+    target = min(fitting, key=lambda pair: float(abs(pair - here).max()))
+    for k in range(2):
+        making.numbered[120 + "ABC".index(letters[k]) + 1] = float(target[k])
+    if way == _NO_MOVE or (way != _STAY and abs(target - here).max() < _SAME):
+        target = here
+    making.take([[("M", _OFF)]])
+    if way in (_TURN, _MOVE) and (target != here).any():
+        making.take([[("G", 90.0), ("G", 0.0), *zip(letters, target.tolist(), strict=True)]])
+        making.take([] if state.absolute else [[("G", 91.0)]])
+    on = way != _NO_MOVE and bool(abs(state.programmed()[at] - target).max() < _SAME) and not level
+    if on:
+        making.take([[("M", _ON)]])
+    travel.swivel(matrix, shift, waiting=way == _STAY and not on and not level)

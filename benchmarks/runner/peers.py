@@ -29,7 +29,7 @@ from planner.base.names import NORMAL
 from planner.controls.export import models
 from planner.controls.export.candidates import standing
 from planner.controls.export.chords import Polyline, programmed_polyline
-from planner.controls.export.linuxcnc_model import linuxcnc_time
+from planner.controls.timing.linuxcnc import linuxcnc_time
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.machine import Machine
 from planner.nc.program import Kind, Program

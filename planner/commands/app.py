@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from planner.commands.compare import compare_command
+from planner.commands.control_time import time_command
 from planner.commands.export import export_command, pulses_command, report_command
 from planner.commands.info import expand_command, info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
@@ -111,6 +112,7 @@ for name, (command, line) in {
     "compare": (compare_command, "Plan a program with several methods, side by side."),
     "verify": (verify_command, "Judge a trajectory file, from any source."),
     "info": (info_command, "What a program contains, and what is not supported."),
+    "time": (time_command, "How long a control takes for a program as it is."),
     "expand": (expand_command, "Write a program without parameters, loops and calls."),
     "pulses": (pulses_command, "Make step and direction pulses of a trajectory."),
     "export": (export_command, "Write a plan for a control."),

@@ -10,6 +10,7 @@ import typer
 from planner.base.errors import InputError
 from planner.base.names import METHODS, method_name
 from planner.commands import options
+from planner.commands.machine import machine_named
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import (
     BAD_INPUT,
@@ -70,7 +71,6 @@ def compare_command(
             "--force has no effect without a file to write; name one with -o FILE or --report FILE"
         )
     methods = parse_methods(method)
-    from planner.machine import load_machine
     from planner.nc.reader import read_program
     from planner.report.comparison import (
         SUFFIXES,
@@ -87,7 +87,7 @@ def compare_command(
         check_file(output, inputs, suffixes=SUFFIXES, force=force)
     if report is not None:
         check_file(report, inputs, force=force)
-    limits = load_machine(machine or options.DEFAULT_MACHINE)
+    limits = machine_named(machine)
     program = read_program(job, limits, reading)
     rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
     about = about_job(str(job), limits, tolerance)

@@ -8,6 +8,7 @@ import typer
 from planner.base.errors import InputError
 from planner.base.files import readable
 from planner.commands import options
+from planner.commands.machine import machine_named
 from planner.commands.terminal import BAD_INPUT, guarded, say, say_json, show
 from planner.nc.reading import Reading
 
@@ -22,12 +23,11 @@ def info_command(
     reading: Reading,
 ) -> None:
     """Show what a program contains, and the line of every construct that is not supported."""
-    from planner.machine import load_machine
     from planner.nc.info import inspect_program
     from planner.report.summary import info_summary
     from planner.report.tables import info_table
 
-    found = inspect_program(job, load_machine(machine or options.DEFAULT_MACHINE), reading)
+    found = inspect_program(job, machine_named(machine), reading)
     if as_json:
         say_json(info_summary(found))
     else:
@@ -52,15 +52,12 @@ def expand_command(
     """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
     if force and output is None:
         raise InputError("--force has no effect without a file to write; name one with -o FILE")
-    from planner.machine import load_machine
     from planner.nc.language.flat import flat_program
     from planner.nc.reader import load, source_name
     from planner.report.replace import write_new
 
     data = load(job)
-    found = flat_program(
-        data, load_machine(machine or options.DEFAULT_MACHINE), reading, source=source_name(job)
-    )
+    found = flat_program(data, machine_named(machine), reading, source=source_name(job))
     text = data if found is None else readable(found[0]).encode()
     if output is None:
         typer.echo(text, nl=False)

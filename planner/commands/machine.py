@@ -1,13 +1,33 @@
 """`planner machine`: the built-in machines, and a machine file to start from."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import length_option, time_option
+from planner.commands.options import DEFAULT_MACHINE, length_option, time_option
 from planner.commands.terminal import guarded, say, show
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
+
+
+def machine_named(name: str | None) -> "Machine":
+    """The machine of `-m`: a machine file, a built-in one, or the settings of a control as they are, with notes on what
+    these leave open; None is the default."""
+    from planner.machine import load_machine
+
+    path = Path(name or DEFAULT_MACHINE)
+    if name is not None and path.is_file() and path.suffix != ".toml":
+        from planner.controls.machine_import.convert import import_machine, is_settings
+
+        if is_settings(path):
+            imported = import_machine(path)
+            for sentence in imported.assumed:
+                say(f"note: {sentence}", err=True)
+            return imported.machine
+    return load_machine(name or DEFAULT_MACHINE)
 
 
 @guarded

@@ -105,7 +105,7 @@ MachineOption = Annotated[
         "-m",
         "--machine",
         metavar="FILE",
-        help=f"machine file, or name of a built-in machine (default: {DEFAULT_MACHINE})",
+        help=f"machine file, settings of a control, or name of a built-in machine (default: {DEFAULT_MACHINE})",
         autocompletion=_machines,
     ),
 ]

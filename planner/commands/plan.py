@@ -12,6 +12,7 @@ import typer
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import users_of
 from planner.commands import options
+from planner.commands.machine import machine_named
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import Reading
@@ -122,7 +123,7 @@ def plan_command(
     with ProgressBar(quiet=quiet or verbose) as progress:
         result = plan(
             job,
-            machine or options.DEFAULT_MACHINE,
+            machine_named(machine),
             tolerance=tolerance,
             reading=reading,
             progress=progress,

@@ -11,6 +11,7 @@ import typer
 
 from planner.base.errors import InputError
 from planner.commands import options
+from planner.commands.machine import machine_named
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, NOT_SOLVED, guarded, say, say_json, show
 from planner.nc.reading import Reading
@@ -43,14 +44,13 @@ def _studied_job(
 ) -> StudiedJob:
     """The job of a command line, read. Raises InputError, for settings that the method does not use too."""
     from planner.commands.study.settings import StudiedJob
-    from planner.machine import load_machine
     from planner.nc.reader import read_program
     from planner.planning.methods.registry import check_settings
 
     check_settings(**how)
     if tolerance is not None and not 0.0 < tolerance < float("inf"):
         raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
-    limits = load_machine(machine or options.DEFAULT_MACHINE)
+    limits = machine_named(machine)
     program = read_program(job, limits, reading)
     return StudiedJob(program=program, machine=limits, tolerance=tolerance, how=how)
 

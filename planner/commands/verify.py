@@ -17,6 +17,7 @@ import typer
 from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.commands import options
+from planner.commands.machine import machine_named
 from planner.commands.progress import ProgressBar
 from planner.commands.terminal import FAILED, guarded, say, say_json, show
 from planner.nc.reading import AS_USUAL, Reading
@@ -115,8 +116,8 @@ def verify_command(
 def _machine(machine: str | None, trajectory: Path, says: FileSays) -> tuple[Machine, bool]:
     """The machine of the command line, else the one that the file brings, else the default; True if it is the
     file's."""
-    from planner.machine import load_machine, machine_from_dict
+    from planner.machine import machine_from_dict
 
     if machine is None and says.machine is not None:
         return machine_from_dict(says.machine, source=f"{trajectory} (its own machine)"), True
-    return load_machine(machine or options.DEFAULT_MACHINE), False
+    return machine_named(machine), False

@@ -164,7 +164,7 @@ class DialectData(Record):
 
 class ControlData(Record):
     """The settings of the control's own planner, for predictions of how long it takes
-    (controls/export/models.py); None for its default."""
+    (controls/timing/models.py); None for its default."""
 
     # of the control; the other keys count for programs that are written for it
     name: Literal["grbl", "klipper", "marlin", "reprapfirmware", "linuxcnc"]
@@ -175,6 +175,7 @@ class ControlData(Record):
     junction_deviation: NotNegative | None = None  # of grbl ($11) and Marlin (M205 J) [mm]
     # of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have [mm/s]
     corner_jump: dict[str, Positive] = {}
+    factor: Positive | None = None  # by which it was measured to be slower than the model of it [-]
 
 
 XYZAC, XYZBC, HEAD_TABLE, HEAD_HEAD = "xyzac-trt", "xyzbc-trt", "head-table", "head-head"

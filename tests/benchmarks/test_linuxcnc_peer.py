@@ -21,7 +21,7 @@ from planner.machine import Fir, Machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 
-MODEL = 0.03  # by which this project's model of LinuxCNC may be off [-]; planner/controls/export/linuxcnc_model.py says 2.1 %
+MODEL = 0.03  # by which this project's model of LinuxCNC may be off [-]; planner/controls/timing/linuxcnc.py says 2.1 %
 PENTAGON = 1.037  # measured in LinuxCNC 2.9 itself, of this program at G64 P0.05 Q0, without the joints' interpolation [s]
 needs_linuxcnc = pytest.mark.skipif(
     not (linuxcnc.MODULE.is_file() and linuxcnc.HEADERS.is_dir()),

@@ -26,7 +26,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
-from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
+from planner.base.units import MICROMETRE
 from planner.controls.export.chords import (
     DECIMALS,
     Polyline,
@@ -38,11 +38,12 @@ from planner.controls.export.chords import (
     spliced,
 )
 from planner.controls.export.controls import Control, takes_move
-from planner.controls.export.linuxcnc_model import joined_moves, linuxcnc_time
 from planner.controls.export.output import head_of
 from planner.controls.export.rows import Row, Source
 from planner.controls.export.source import source_of, text_of, why_not
 from planner.controls.export.translate import Translator
+from planner.controls.timing.linuxcnc import joined_moves, linuxcnc_time
+from planner.controls.timing.times import standing
 from planner.machine import Machine
 from planner.planning.job.plan import Plan
 
@@ -147,18 +148,6 @@ class Candidates:
             row, control, self.source.program.reading
         )
 
-    @cached_property
-    def feed_in_force(self) -> FloatArray:
-        """(B,) the F in force on each block [mm/s], at which such controls move with G0; inf before the first
-        F word."""
-        feed, found = np.inf, np.full(len(self.plan.program), np.inf)
-        for row in self.source.rows:
-            word = row.value("F")
-            if word is not None:
-                feed = word.value / SECONDS_PER_MINUTE
-            found[row.first : row.last] = feed
-        return found
-
     def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
         """The file of a candidate, and notes on it. Raises InputError for a line that the control has no
         words for."""
@@ -199,14 +188,6 @@ def with_mode(text: bytes, mode: str) -> bytes:
     head = re.match(rb"\s*%[^\n]*\n", text)
     cut = head.end() if head else 0
     return text[:cut] + b"G21 " + mode.encode("ascii") + b"\n" + text[cut:]
-
-
-def standing(plan: Plan, line: Polyline) -> Array:
-    """(n+1,) the points of a polyline at which the program has the motion stand still."""
-    stands = np.zeros(len(line.points), dtype=bool)
-    still = np.flatnonzero(~np.isin(np.arange(len(plan.program)), plan.toolpath.block))
-    stands[np.searchsorted(line.block, still)] = True
-    return stands
 
 
 def _rapid_speed(line: Polyline, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
@@ -270,7 +251,7 @@ def _mode(p: float, q: float) -> str:
 def _time(job: Candidates, line: Polyline, p: float, q: float) -> float:
     """Predicted time, dwells included [s]."""
     plan = job.plan
-    stands = standing(plan, line)
+    stands = standing(plan.program, line.block, switches=True)
     feed: FloatArray = np.where(line.rapid, np.inf, line.feed)
     kept = joined_moves(line.points, feed, line.rapid, stands, q)
     moving = linuxcnc_time(

@@ -25,12 +25,12 @@ from planner.controls.export.candidates import (
     Candidates,
     best_first,
     linuxcnc_candidates,
-    standing,
 )
 from planner.controls.export.controls import CONTROLS, LINUXCNC
-from planner.controls.export.models import CONTROLS as MODELS
-from planner.controls.export.models import predicted_time
 from planner.controls.export.output import FIRST_RUN, assumptions
+from planner.controls.timing.models import CONTROLS as MODELS
+from planner.controls.timing.models import predicted_time
+from planner.controls.timing.times import feed_in_force, standing
 from planner.planning.job.plan import Plan
 
 # Of the room for chords: wider ones need fewer lines, narrower ones turn less at each.
@@ -123,8 +123,9 @@ def _predicted(job: Candidates, one: Candidate) -> float:
     plan, line = job.plan, one.line
     feed = np.where(line.rapid, np.inf, line.feed)
     if one.name == AS_IT_IS and job.control.rapid_feed:
-        feed = np.where(line.rapid, job.feed_in_force[line.block], feed)
+        feed = np.where(line.rapid, feed_in_force(plan.program, job.text or b"")[line.block], feed)
+    stands = standing(plan.program, line.block, switches=job.control.name != "klipper")
     moving = predicted_time(
-        line.points, feed, standing(plan, line), plan.machine, plan.toolpath.axes, MODELS[job.control.name]
+        line.points, feed, stands, plan.machine, plan.toolpath.axes, MODELS[job.control.name]
     )
     return moving + float(plan.toolpath.dwell.sum())

@@ -91,6 +91,12 @@ def import_machine(
     return Imported(written, machine, (*found.notes, *assumed))
 
 
+def is_settings(path: Path) -> bool:
+    """Whether a file holds settings of a control. Raises InputError if it cannot be read."""
+    text = read_settings(path)
+    return any(reader.recognised(text) for reader in CONTROLS.values())
+
+
 def _settings_of(text: str, source: str, control: str | None) -> ControlSettings:
     if control is not None:
         known_name("control", control, CONTROLS)

@@ -3,7 +3,7 @@
 
 Klipper limits velocity and acceleration along the path, a machine file those of each axis: an axis may use
 them alone. What it does at corners is in the table [control] of the machine file, for predictions of its
-times (controls/export/models.py).
+times (controls/timing/models.py).
 """
 
 import re

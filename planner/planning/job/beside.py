@@ -22,7 +22,7 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.machine import Machine, Times
-from planner.nc.program import EventTable, Program
+from planner.nc.program import Program, codes_of
 
 TOOL_CHANGE, SPINDLE_START, SPINDLE_STOP = 6, 3, 5  # M codes
 _TURNS = {3: 1, 4: -1, 5: 0, TOOL_CHANGE: 0}  # M codes, and how the spindle turns after them
@@ -50,7 +50,7 @@ class Beside:
 def beside_motion(program: Program, machine: Machine) -> tuple[Beside, ...]:
     """The events beside the motion of a program, and how long they take on a machine."""
     times = machine.times or Times()
-    code = _m_codes(program)
+    _, code = codes_of(program, "M")
     starts, stops = (0, 0) if program.pen else _of_spindle(code)
     counted = [
         ("tool change", int((code == TOOL_CHANGE).sum()), times.tool_change),
@@ -67,15 +67,6 @@ def beside_motion(program: Program, machine: Machine) -> tuple[Beside, ...]:
         why = f"waits for {_WAITS[number]}" if number in _WAITS else NO_TIME
         found.append(Beside(what=name, count=count, each=each, because=why))
     return tuple(found)
-
-
-def _m_codes(program: Program) -> Array:
-    """(E,) numbers of the M codes of a program, in their order, up to its end."""
-    events = program.events
-    if isinstance(events, EventTable):
-        found: Array = events.value[events.letter == ord("M")]
-        return found
-    return np.array([float(event.text[1:]) for event in events if event.text[0] == "M"])
 
 
 def _of_spindle(code: Array) -> tuple[int, int]:

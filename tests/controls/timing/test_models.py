@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import planner
-from planner.controls.export.models import CONTROLS, Control, predicted_time
+from planner.controls.timing.models import CONTROLS, Control, predicted_time
 from planner.machine import Machine
 
 SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[4] / "shared"))
@@ -69,9 +69,9 @@ def test_a_corner_is_passed_at_the_speed_of_its_law() -> None:
 
 
 def test_looking_ahead_bounds_the_speed_on_short_blocks() -> None:
-    """From any speed the motion can stand within 15 blocks of 0.01 mm: v^2 <= 2 a 15 l, ramps aside."""
+    """From any speed the motion can stand within 14 blocks of 0.01 mm: v^2 <= 2 a 14 l, ramps aside."""
     points = np.stack([np.linspace(0, 50.0, 5001), np.zeros(5001)], axis=1)
-    v = np.sqrt(2 * 2000.0 * 15 * 0.01)
+    v = np.sqrt(2 * 2000.0 * 14 * 0.01)
     assert time_of(points, unhurried("grbl")) == pytest.approx(50.0 / v, rel=0.01)
     assert time_of(points, CONTROLS["klipper"]) == pytest.approx(50 / 100 + 100 / 2000, rel=1e-6)
     slow = dataclasses.replace(CONTROLS["grbl"], block_time=0.01)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import planner
-from planner.controls.export.linuxcnc_model import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_time
 from planner.controls.export.program import write_program
+from planner.controls.timing.linuxcnc import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_time
 from planner.machine import Machine
 from planner.nc.program import Kind
 

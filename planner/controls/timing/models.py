@@ -8,6 +8,7 @@ bisector they pass it at
     grbl 1.1, Marlin 2   v^2 = a delta s / (1 - s)                       delta: junction deviation [mm]
     Marlin 2 besides     v^2 <= a l / theta                               on blocks shorter than 1 mm that turn by less than 45 degrees
     Marlin with jerk     v |u2 - u1| <= J for each axis                   J: the jump of velocity it may have (M205 X Y Z) [mm/s]
+                         v max(|u1|, |u2|) <= J                           where the axis turns back
     Klipper              v^2 <= a delta s / (1 - s),  delta = (2^(1/2) - 1) c^2 / A,   c: square corner velocity [mm/s]
                          v^2 <= a l / (2 tan(theta/2))                    of the blocks on both sides, with their lengths l
 
@@ -20,16 +21,16 @@ and the speeds along the path follow from a backward and a forward pass: with S 
 
     v_i^2 <= min over k >= i of (V_k^2 + S_k - S_i)        and the same from the left,
 
-V the junction's own bound. grbl and Marlin look `blocks` blocks ahead, at the end of which the motion must be
-able to stand: v_i^2 <= S_{i+blocks} - S_i. Klipper looks far ahead, and lets a move speed up only as far as
-it would with a share 1 - r of A for what it gains and loses at once (r: "minimum cruise ratio", 0.5): its
-speed in between is at most that of such a triangle.
+V the junction's own bound. grbl and Marlin look `blocks` blocks ahead, their buffer without the block under
+way, at the end of which the motion must be able to stand: v_i^2 <= S_{i+blocks} - S_i. Klipper looks far
+ahead, and lets a move speed up only as far as it would with a share 1 - r of A for what it gains and loses
+at once (r: "minimum cruise ratio", 0.5): its speed in between is at most that of such a triangle.
 
 A block takes at least `block_time`, the time to send and read its line. What [control] of the machine file
 says of the same control takes the place of the values here.
 
 Tested against these controls' own code on five programs where their times are at hand
-(tests/controls/export/test_models.py); Marlin's were not.
+(tests/controls/timing/test_models.py); benchmarks/results/control-time.md has the errors on real programs.
 """
 
 import dataclasses
@@ -47,6 +48,7 @@ from planner.machine import Machine
 STRAIGHT = 1e-6
 # A speed of nothing [mm/s], so that pieces without a length where the motion stands take no time.
 STANDING = 1e-12
+CHORD_MIN = 0.1  # of Marlin's chords, MIN_ARC_SEGMENT_MM [mm]
 SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [mm], and turning by less [rad]
 
 
@@ -64,16 +66,31 @@ class Control:
     corner_jump: Mapping[str, float] = field(default_factory=dict)
     blocks: int | None = None  # how many blocks it looks ahead; None for all
     block_time: float = 0.0  # least time of a block [s]
+    factor: float = 1.0  # by which it is slower than this model (timing/fit.py) [-]
+    # how it cuts arcs into chords: how far they may miss it [mm], or how long they may be [mm]
+    chord_miss: float | None = None
+    chord_length: float | None = None
+    chords_least: int = 1  # of a full turn
+    rapid_feed: bool = False  # G0 moves at the F in force
 
 
 # The values that these controls come with. grbl 1.1: config.h and defaults.h, BLOCK_BUFFER_SIZE 16, $11 =
-# 0.01; Marlin 2: Configuration.h, JUNCTION_DEVIATION_MM 0.013, BLOCK_BUFFER_SIZE 16; Klipper:
-# Config_Reference, square_corner_velocity 5, minimum_cruise_ratio 0.5. Lines of some 30 characters at 115,200
-# baud take 2.6 ms (grbl, Marlin); Klipper reads a file.
+# 0.01, $12 = 0.002; Marlin 2: Configuration.h, JUNCTION_DEVIATION_MM 0.013, BLOCK_BUFFER_SIZE 16,
+# MAX_ARC_SEGMENT_MM 1, MIN_CIRCLE_SEGMENTS 72; Klipper: Config_Reference, square_corner_velocity 5,
+# minimum_cruise_ratio 0.5, [gcode_arcs] resolution 1. Lines of some 30 characters at 115,200 baud take 2.6 ms
+# (grbl, Marlin); Klipper reads a file.
 CONTROLS: dict[str, Control] = {
-    "grbl": Control(name="grbl", junction_deviation=0.01, blocks=15, block_time=0.0026),
-    "klipper": Control(name="klipper", square_corner_velocity=5.0),
-    "marlin": Control(name="marlin", junction_deviation=0.013, blocks=15, block_time=0.0026),
+    "grbl": Control(name="grbl", junction_deviation=0.01, blocks=14, block_time=0.0026, chord_miss=0.002),
+    "klipper": Control(name="klipper", square_corner_velocity=5.0, chord_length=1.0, rapid_feed=True),
+    "marlin": Control(
+        name="marlin",
+        junction_deviation=0.013,
+        blocks=14,
+        block_time=0.0026,
+        chord_length=1.0,
+        chords_least=72,
+        rapid_feed=True,
+    ),
 }
 
 
@@ -85,9 +102,9 @@ def as_set(control: Control, machine: Machine) -> Control:
     return dataclasses.replace(control, **given.model_dump(exclude_defaults=True))
 
 
-def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array]:
-    """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing: a stop between these belongs to
-    the vertex before.
+def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array, Array]:
+    """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing, and which moves are left (n,): a
+    stop between these belongs to the vertex before.
 
     points, feed, stop : (n+1, A), (n,) and (n+1,), as of `predicted_time`
 
@@ -97,18 +114,18 @@ def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArra
     if not moves.any():
         raise InputError("the path moves nowhere")
     ends = np.append(0, np.flatnonzero(moves) + 1)
-    return points[ends], feed[moves], np.add.reduceat(stop, ends) > 0
+    return points[ends], feed[moves], np.add.reduceat(stop, ends) > 0, moves
 
 
-def predicted_time(
+def predicted_times(
     points: FloatArray,
     feed: FloatArray,
     stop: Array,
     machine: Machine,
     axes: tuple[str, ...],
     control: Control,
-) -> float:
-    """Time that a control takes for a polyline [s], from rest to rest.
+) -> FloatArray:
+    """(n,) times that a control takes for the moves of a polyline [s], from rest to rest.
 
     points : (n+1, A) vertices [mm]
     feed   : (n,) programmed feed of each block [mm/s]; inf for rapid moves
@@ -117,7 +134,7 @@ def predicted_time(
 
     Raises InputError for vertices without a move between them.
     """
-    points, feed, stands = moving(points, feed, stop)
+    points, feed, stands, moves = moving(points, feed, stop)
     step = np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
     way = step / length[:, None]
@@ -132,19 +149,50 @@ def predicted_time(
     corner = _corner_sq(way, length, accel, acceleration, accel_max, jump, control)
     bound = np.append(np.append(0.0, np.minimum(corner, np.minimum(top[1:], top[:-1]) ** 2)), 0.0)
     bound[stands] = 0.0
+    times = np.zeros(len(moves))
     if control.square_corner_velocity is not None:
         lost = 2.0 * length * np.minimum(accel, (1.0 - control.minimum_cruise_ratio) * accel_max)
         parts = [0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)]
-        return sum(
-            _smoothed_time(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
+        found = [
+            _smoothed_times(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
             for i, k in pairwise(parts)
-        )
+        ]
+        times[moves] = control.factor * np.concatenate(found)
+        return times
     gain = 2.0 * accel * length
     v_sq = reachable(bound, gain)
     if control.blocks is not None:
         v_sq = reachable(np.minimum(v_sq, stoppable(gain, control.blocks, np.ones(len(gain)))), gain)
     peak = np.minimum(top**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
-    return float(move_times(length, accel, v_sq[:-1], peak, v_sq[1:]).sum())
+    times[moves] = control.factor * move_times(length, accel, v_sq[:-1], peak, v_sq[1:])
+    return times
+
+
+def predicted_time(
+    points: FloatArray,
+    feed: FloatArray,
+    stop: Array,
+    machine: Machine,
+    axes: tuple[str, ...],
+    control: Control,
+) -> float:
+    """`predicted_times` in all [s]."""
+    return float(predicted_times(points, feed, stop, machine, axes, control).sum())
+
+
+def chords(control: Control, length: FloatArray, sweep: FloatArray, radius: FloatArray) -> Array:
+    """(n,) into how many chords a control cuts arcs.
+
+    length : (n,) [mm], rise included; sweep : (n,) [rad]; radius : (n,) [mm]
+    """
+    if control.chord_miss is not None:
+        miss = np.minimum(control.chord_miss, radius)
+        count = 0.5 * sweep * radius / np.sqrt(miss * (2.0 * radius - miss))
+    else:
+        least = np.minimum(control.chords_least * sweep / (2.0 * np.pi), length / CHORD_MIN)
+        count = np.maximum(length / (control.chord_length or np.inf), least)
+    found: Array = np.maximum(np.floor(count), 1.0).astype(np.int64)
+    return found
 
 
 def along(way: FloatArray, limit: FloatArray) -> FloatArray:
@@ -178,7 +226,9 @@ def _corner_sq(
     half_turn = np.arctan2(np.linalg.norm(bisector, axis=1), np.linalg.norm(way[1:] + way[:-1], axis=1))
     straight = 2.0 * half_turn < STRAIGHT
     if control.corner_jump:
-        return np.where(straight, np.inf, along(bisector, jump) ** 2)
+        back = way[1:] * way[:-1] < 0.0
+        change = np.where(back, np.maximum(np.abs(way[1:]), np.abs(way[:-1])), bisector)
+        return np.where(straight, np.inf, along(change, jump) ** 2)
     half_turn = np.where(straight, 1.0, half_turn)
     s = np.cos(half_turn)
     ratio = s / (1.0 - s)
@@ -233,10 +283,10 @@ def move_times(
     return times
 
 
-def _smoothed_time(
+def _smoothed_times(
     length: FloatArray, top: FloatArray, accel: FloatArray, bound: FloatArray, half: FloatArray
-) -> float:
-    """Time of a run of blocks with Klipper's lower acceleration for what is gained and lost at once, from
+) -> FloatArray:
+    """(n,) times of a run of blocks with Klipper's lower acceleration for what is gained and lost at once, from
     rest to rest [s].
 
     top (n,), bound (n+1,) and half (n,), what the lower acceleration gains on each block, are squares of
@@ -267,4 +317,4 @@ def _smoothed_time(
         else:
             braking.append((i, start, end))
         end, smooth_end = start, smooth_start
-    return float(move_times(length, accel, first, peak, last).sum())
+    return move_times(length, accel, first, peak, last)

@@ -1,0 +1,129 @@
+"""`planner time`: how long a control takes for a program as it is, and beside it the plan and what export would bring."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planner.base.names import known_name
+from planner.commands import options
+from planner.commands.machine import machine_named
+from planner.commands.progress import ProgressBar
+from planner.commands.terminal import guarded, say, say_json, show
+from planner.nc.reading import Reading
+
+if TYPE_CHECKING:
+    from planner.controls.timing.times import ControlTimes
+    from planner.machine import Machine
+    from planner.nc.program import Program
+
+ROWS = 20  # of a table at most, the longest ones; --json has all
+
+
+@guarded
+@options.takes_reading
+def time_command(
+    job: options.Job,
+    machine: options.MachineOption = None,
+    control: Annotated[
+        str | None,
+        typer.Option(
+            "--control",
+            metavar="NAME",
+            help="linuxcnc, grbl, klipper or marlin (default: that of the machine)",
+        ),
+    ] = None,
+    tolerance: options.ToleranceOption = None,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="plan the motion too, and predict what export would bring")
+    ] = False,
+    as_json: options.JsonOption = False,
+    quiet: options.QuietOption = False,
+    *,
+    reading: Reading,
+) -> None:
+    """Predict how long a control takes for a program as it is: per tool, operation and layer."""
+    from planner.controls.timing.times import TIMED, control_named, control_times
+    from planner.nc.reader import read_program
+    from planner.planning.job.beside import beside_motion
+
+    limits = machine_named(machine)
+    name = control_named(known_name("control", control, TIMED) if control else None, limits)
+    program = read_program(job, limits, reading)
+    found = control_times(program, limits, name, tolerance)
+    beside = beside_motion(program, limits)
+    said: dict[str, Any] = {"program": str(job), "machine": limits.name} | asdict(found)
+    said["beside_s"] = sum(one.seconds for one in beside)
+    if plan:
+        said["plan"] = _planned(program, limits, name, tolerance, quiet=quiet)
+    if as_json:
+        say_json(said | {"assumptions": list(program.assumptions)})
+        return
+    for text in (*program.assumptions, *found.assumed):
+        say(f"assumed: {text}", err=True)
+    _show(found, said)
+
+
+def _planned(
+    program: Program, machine: Machine, control: str, tolerance: float | None, *, quiet: bool
+) -> dict[str, Any]:
+    """The plan's time with nine tenths of the tolerance, and the predictions for what export would write with all of it."""
+    import numpy as np
+
+    from planner import plan
+    from planner.controls.export.candidates import LESS
+    from planner.controls.export.program import write_program
+    from planner.geometry.build import toolpath_from_program
+
+    allowed = float(toolpath_from_program(program, machine, tolerance).tolerance.min())
+    with ProgressBar(quiet=quiet) as progress:
+        made = plan(program, machine, tolerance=float(np.round(LESS * allowed, 9)), progress=progress)
+    with tempfile.TemporaryDirectory() as folder:
+        predicted = write_program(Path(folder), made, control, allowed).predicted
+    assert made.trajectory is not None
+    return {
+        "tolerance_mm": LESS * allowed,
+        "cycle_time_s": made.trajectory.cycle_time,
+        "exported_s": predicted,
+    }
+
+
+def _show(found: ControlTimes, said: dict[str, Any]) -> None:
+    """Print the table."""
+    from planner.report.tables import pairs_table
+
+    table = pairs_table()
+    table.add_row(
+        f"{found.control} takes", f"{found.seconds:.4g} s" if found.seconds < 1 else _clock(found.seconds)
+    )
+    if found.dwells:
+        table.add_row("of that standing still", f"{found.dwells:.4f} s")
+    if said["beside_s"]:
+        table.add_row("beside the motion", f"{said['beside_s']:.4f} s")
+    for title in ("tools", "operations", "layers"):
+        parts = getattr(found, title)
+        longest = {*sorted(parts, key=parts.__getitem__, reverse=True)[:ROWS]}
+        for name, seconds in parts.items():
+            if name in longest:
+                table.add_row(f"  {name or 'before'}", _clock(seconds))
+        if len(parts) > ROWS:
+            table.add_row(f"  {len(parts) - ROWS} more {title}", "see --json")
+    if made := said.get("plan"):
+        table.add_row(
+            f"planned within {made['tolerance_mm']:.4g} mm",
+            f"{made['cycle_time_s']:.4f} s, on drives that play setpoints",
+        )
+        for name, seconds in made["exported_s"].items():
+            table.add_row(f"exported, {name}", f"{seconds:.4f} s")
+    show(table)
+
+
+def _clock(seconds: float) -> str:
+    """Seconds, and hours and minutes beside them where there are some."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{seconds:.4f} s" + (f" ({hours}:{minutes:02d}:{rest:02d})" if seconds >= 60 else "")

@@ -1,0 +1,263 @@
+"""How long a control takes for a program as it is, by the models of the controls' planners, and for what of it: tools,
+operations, layers.
+
+A model gets the moves that the control's planner gets: lines as they are, arcs as the control cuts them (LinuxCNC has
+arcs), rapids of Klipper and Marlin at the F in force. Where the program dwells, stops, or switches spindle or
+coolant the motion stands.
+
+An operation is named by the last comment that stands alone on a line before its moves; what has the same name counts
+together. Where slicers have comments ;TYPE:, only these count. Layers are counted by ;LAYER: or ;LAYER_CHANGE.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.controls.timing import linuxcnc
+from planner.controls.timing.models import CONTROLS, Control, chords, predicted_times
+from planner.geometry.build import toolpath_from_program
+from planner.geometry.chords import polyline
+from planner.geometry.toolpath import Toolpath
+from planner.machine import Machine
+from planner.nc.points import own_text
+from planner.nc.program import FEED_MOVES, Kind, PathControl, Program, codes_of
+
+LINUXCNC = "linuxcnc"
+TIMED = (LINUXCNC, *CONTROLS)  # names of the controls that there are models of
+SWITCHES = (3, 4, 5, 7, 8, 9)  # M codes of spindle and coolant, at which the motion stands
+CHANGE = 6  # M code of a tool change
+FIRST_FEED = 25.0  # of rapids before the first F word, as Klipper begins [mm/s]
+_COMMENT = re.compile(rb"^[ \t]*(?:N\d+[ \t]*)?(?:\(([^)\n]*)\)|;([^\n]*?))[ \t]*\r?$", re.MULTILINE)
+_LAYER = re.compile(r"(?:LAYER|layer):?[ _]*(-?\d+)|LAYER_CHANGE|CHANGE_LAYER")
+_F_WORD = re.compile(rb"^[^(;\n]*?[Ff][ \t]*(\d*\.?\d+)", re.MULTILINE)
+_UNIT = re.compile(rb"^[^(;\n]*?[Gg](20|21)\b", re.MULTILINE)
+_JOINING = re.compile(rb"^[^(;\n]*?[Gg]64[^(;\n]*?[Qq][ \t]*(\d*\.?\d+)", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlTimes:
+    """What a control takes for a program.
+
+    control    : its name
+    seconds    : in all, dwells included [s]
+    dwells     : of that, standing still [s]
+    moves      : that its planner gets
+    tools, operations, layers : seconds by name, in the order of the program; empty where there are none
+    assumed    : sentences
+    """
+
+    control: str
+    seconds: float
+    dwells: float
+    moves: int
+    tools: dict[str, float] = field(default_factory=dict)
+    operations: dict[str, float] = field(default_factory=dict)
+    layers: dict[str, float] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
+
+
+def control_named(name: str | None, machine: Machine) -> str:
+    """The control to be timed: the one that is named, or that of the machine. Raises InputError where there is no model of
+    it."""
+    found = name or (machine.control.name if machine.control is not None else None)
+    if found not in TIMED:
+        what = "the machine names no control" if found is None else f"there is no model of {found}"
+        raise InputError(f"{what}; give one: --control {', '.join(TIMED)}")
+    return found
+
+
+def control_times(
+    program: Program, machine: Machine, control: str, tolerance: float | None = None
+) -> ControlTimes:
+    """What a control takes for a program as it is.
+
+    control   : "grbl", "klipper", "marlin" or "linuxcnc"
+    tolerance : G64 P [mm] in place of that of the program and the machine; None for those
+
+    Raises InputError for programs with the tool centre point on, and as `toolpath_from_program` does.
+    """
+    if program.tool_point is not None:
+        said = "with the tool centre point on the control's time is not known: its planner sees the joints"
+        raise InputError(said, source=program.source, line=program.tool_point.line)
+    toolpath = toolpath_from_program(program, machine, tolerance)
+    text = own_text(program) or b""
+    timed = _on_linuxcnc if control == LINUXCNC else _on_the_path
+    of_block, moves, assumed = timed(program, toolpath, machine, control, text)
+    dwells = float(toolpath.dwell.sum())
+    np.add.at(of_block, toolpath.block[np.maximum(np.arange(len(toolpath.dwell)) - 1, 0)], toolpath.dwell)
+    operations, layers = named_parts(program, text)
+    return ControlTimes(
+        control=control,
+        seconds=float(of_block.sum()),
+        dwells=dwells,
+        moves=moves,
+        tools=_by_name(of_block, tools_of(program)),
+        operations=_by_name(of_block, operations),
+        layers=_by_name(of_block, layers),
+        assumed=assumed,
+    )
+
+
+def standing(program: Program, block: Array, *, switches: bool) -> Array:
+    """(n+1,) where the motion stands of moves that belong to blocks `block` (n,), not decreasing; with the switches of
+    spindle and coolant, if these hold it up."""
+    still = np.flatnonzero(np.isin(program.kind, (Kind.DWELL, Kind.STOP)))
+    if switches:
+        at, code = codes_of(program, "M")
+        still = np.append(still, at[np.isin(code, SWITCHES)])
+    stands = np.zeros(len(block) + 1, dtype=bool)
+    stands[np.searchsorted(block, still)] = True
+    return stands
+
+
+def _on_the_path(
+    program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes
+) -> tuple[FloatArray, int, tuple[str, ...]]:
+    """(B,) seconds by block, moves, and what is assumed, of controls that stay on the path."""
+    control = CONTROLS[name]
+    points, segment = control_points(toolpath, control)
+    feed = toolpath.feed[segment]
+    if control.rapid_feed:
+        in_force = feed_in_force(program, text)
+        feed = np.where(toolpath.rapid[segment], in_force[toolpath.block[segment]], feed)
+    stands = standing(program, toolpath.block[segment], switches=name != "klipper")
+    found = predicted_times(points, feed, stands, machine, toolpath.axes, control)
+    times = np.bincount(toolpath.block[segment], weights=found, minlength=len(program)).astype(np.float64)
+    given = machine.control
+    own = given is not None and given.name == name
+    assumed = () if own else (f"{name}'s defaults: the machine says nothing of {name}'s planner",)
+    return times, len(segment), assumed
+
+
+def control_points(toolpath: Toolpath, control: Control) -> tuple[FloatArray, Array]:
+    """The path (n+1, A) as a control cuts it [mm], and the segment of each move (n,)."""
+    count, arc = np.ones(len(toolpath), np.int64), toolpath.arc >= 0
+    row, length = toolpath.arc[arc], toolpath.length[arc]
+    count[arc] = chords(control, length, np.abs(toolpath.arcs.rate[row]) * length, toolpath.arcs.radius[row])
+    curve = toolpath.curve >= 0
+    chord = np.sqrt(8.0 * toolpath.along[curve] / toolpath.curvature[curve])
+    count[curve] = np.ceil(toolpath.length[curve] / chord).astype(np.int64)
+    ends, segment = polyline(toolpath, count)
+    return np.vstack([toolpath.start[:1], ends]), segment
+
+
+def _on_linuxcnc(
+    program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes
+) -> tuple[FloatArray, int, tuple[str, ...]]:
+    """(B,) seconds by block, moves, and what is assumed, of LinuxCNC."""
+    stands = standing(program, toolpath.block, switches=True)
+    mode = program.path_control[toolpath.block]
+    stands[1:] |= mode == PathControl.EXACT_STOP
+    p = np.where(mode == PathControl.EXACT_PATH, 0.0, toolpath.tolerance[1:])
+    q = _joining(program, toolpath, text)
+    points = np.vstack([toolpath.start[:1], toolpath.end])
+    feed = np.where(toolpath.rapid, np.inf, toolpath.feed)
+    alone = toolpath.rapid | ~toolpath.straight | (mode != PathControl.BLEND)
+    kept = linuxcnc.joined_moves(points, feed, alone, stands, q)
+    last = kept[1:] - 1  # move that each kept one ends with
+    bends = _with_arcs(linuxcnc.lines(points[kept]), toolpath, last)
+    found = linuxcnc.linuxcnc_times(
+        points[kept], feed[last], stands[kept], machine, toolpath.axes, p[last[:-1]], bends
+    )
+    times = np.bincount(toolpath.block[last], weights=found, minlength=len(program)).astype(np.float64)
+    blends = mode == PathControl.BLEND
+    without = bool(blends.any() and np.isnan(program.tolerance[toolpath.block[blends]]).all())
+    said = f"G64 P{float(toolpath.tolerance[-1]):g}: the program says no P, LinuxCNC's own G64 without P blends further"
+    return times, len(kept) - 1, (said,) if without else ()
+
+
+def _with_arcs(lines: linuxcnc.Bends, toolpath: Toolpath, segment: Array) -> linuxcnc.Bends:
+    """Moves (n,) with what they are where the segments of the same number are arcs or curves."""
+    found = {name: column.copy() for name, column in vars(lines).items()}
+    on = np.flatnonzero(~toolpath.straight[segment])
+    of, arc = segment[on], toolpath.arc[segment]
+    found["first"][on], found["last"][on] = toolpath.tangent_start[of], toolpath.tangent_end[of]
+    found["length"][on], found["radius"][on] = toolpath.length[of], 1.0 / toolpath.curvature[of]
+    arcs = np.flatnonzero(arc >= 0)
+    found["radius"][arcs] = toolpath.arcs.radius[arc[arcs]]
+    found["radial"][arcs], found["across"][arcs] = toolpath.arcs.e1[arc[arcs]], toolpath.arcs.e2[arc[arcs]]
+    return linuxcnc.Bends(**found)
+
+
+def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:
+    """Q of G64 [mm], which is P where a program gives P alone; 0 without one."""
+    given = _JOINING.findall(text)
+    if given:
+        return float(given[-1]) * (MM_PER_INCH if _UNIT.findall(text)[:1] == [b"20"] else 1.0)
+    p = program.tolerance[np.isfinite(program.tolerance)]
+    return float(p[-1]) if len(p) and float(toolpath.tolerance[-1]) == float(p[-1]) else 0.0
+
+
+def feed_in_force(program: Program, text: bytes) -> FloatArray:
+    """(B,) the F in force on each block [mm/s]: of the last feed move or F word up to its line."""
+    number = _line_number(text)
+    scale = np.array([MM_PER_INCH if one[1] == b"20" else 1.0 for one in _UNIT.finditer(text)])
+    unit_at = np.array([number(one) for one in _UNIT.finditer(text)])
+    words = [(number(one), float(one[1])) for one in _F_WORD.finditer(text)]
+    line, value = np.array(words).reshape(-1, 2).T
+    unit = np.append(1.0, scale)[np.searchsorted(unit_at, line, side="right")]
+    value = np.append(FIRST_FEED, value * unit / SECONDS_PER_MINUTE)
+    if program.frames or not len(line):  # lines come more than once
+        feeds = np.isin(program.kind, FEED_MOVES) & np.isfinite(program.feed)
+        last = np.maximum.accumulate(np.where(feeds, np.arange(1, len(program) + 1), 0))
+        found: FloatArray = np.append(FIRST_FEED, program.feed)[last]
+        return found
+    in_force: FloatArray = value[np.searchsorted(line, program.line, side="right")]
+    return np.maximum(in_force, 1e-3)
+
+
+def _line_number(text: bytes) -> Callable[[re.Match[bytes]], int]:
+    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))
+    return lambda found: int(np.searchsorted(ends, found.start(found.lastindex or 0))) + 1
+
+
+def tools_of(program: Program) -> list[str] | None:
+    """(B,) the tool of each block, "T1"; None for programs without one. Without M6 a T word changes the tool at once."""
+    (m_at, code), (t_at, tool) = codes_of(program, "M"), codes_of(program, "T")
+    if not len(tool):
+        return None
+    changes = m_at[code == CHANGE]
+    at = changes if len(changes) else t_at
+    number = np.searchsorted(t_at, at, side="right")  # T words up to each change
+    names = [f"T{tool[k - 1]:g}" if k else "" for k in number.tolist()]
+    which = np.searchsorted(at, np.arange(len(program)), side="right")
+    return [names[k - 1] if k else "" for k in which.tolist()]
+
+
+def named_parts(program: Program, text: bytes) -> tuple[list[str] | None, list[str] | None]:
+    """(B,) the operation and the layer of each block; None where the text names none."""
+    number = _line_number(text)
+    said = [
+        (number(one), name)
+        for one in _COMMENT.finditer(text)
+        if (name := (one[1] or one[2] or b"").decode("utf-8", "replace").strip())
+    ]
+    types = [(line, name[5:]) for line, name in said if name.startswith("TYPE:")]
+    marked = [(line, found[1]) for line, name in said if (found := _LAYER.match(name))]
+    layers = [(line, f"layer {k if of is None else of}") for k, (line, of) in enumerate(marked, start=1)]
+    plain = [] if layers else said
+    return tuple(_at_blocks(program, found) for found in (types or plain, layers))  # type: ignore[return-value]
+
+
+def _at_blocks(program: Program, named: list[tuple[int, str]]) -> list[str] | None:
+    if not named:
+        return None
+    names = ["", *(name for _, name in named)]
+    found = np.searchsorted([line for line, _ in named], program.line, side="left")
+    return [names[k] for k in found.tolist()]
+
+
+def _by_name(seconds: FloatArray, names: list[str] | None) -> dict[str, float]:
+    """Seconds (B,) by the names of the blocks, in the order of the program; none of a single name."""
+    found: dict[str, float] = {}
+    for name, more in zip(names or (), seconds.tolist(), strict=False):
+        if more:
+            found[name] = found.get(name, 0.0) + more
+    return found if found.keys() - {""} else {}

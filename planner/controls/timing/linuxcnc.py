@@ -259,7 +259,7 @@ def _corners(
     change = (np.abs(after - before) / limits.acceleration).max(axis=1) * (slow / limits.dt + a)
     change = change / np.where(np.isfinite(np.minimum(bends.radius[1:], bends.radius[:-1])), TANGENTIAL, 1.0)
     kink = slow * np.minimum(1.0, KINK / np.maximum(change, 1e-12))
-    is_kink = kink >= speed
+    is_kink = (kink >= speed) | (change <= KINK)
     return (
         np.where(is_kink, 0.0, radius * np.tan(h)),
         np.where(is_kink, 0.0, arc),

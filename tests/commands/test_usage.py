@@ -103,7 +103,7 @@ def test_files_that_are_not_what_the_option_asks_for_are_recognised(
         ),
         (
             ["part.nc", "-m", "grbl.txt"],
-            "a machine file is made of a control's settings by: planner machine import",
+            "give them in mm and s: planner machine import, --set y.velocity=500",
         ),
         (["part.nc", "-m", "lathe.tml"], "did you mean 'lathe.toml'?"),
     ):

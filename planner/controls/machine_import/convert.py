@@ -146,7 +146,8 @@ def _axes(
             axes[letter] = own
     if missing:
         raise InputError(
-            f"{found.control}'s settings do not say {', '.join(missing)}; give them to planner machine import in mm and s, e.g. --set {missing[0]}=500",
+            f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s: planner machine import, "
+            f"--set {missing[0]}=500",
             source=source,
         )
     if not no_jerk:

@@ -177,7 +177,11 @@ def test_limits_can_be_given_and_replace_those_of_the_settings(tmp_path: Path) -
     ("text", "options", "said"),
     [
         ("G0 X1\n", {}, "no settings found"),
-        (GRBL.replace("$121=400.000", ""), {}, "do not say y.acceleration; give them in mm and s"),
+        (
+            GRBL.replace("$121=400.000", ""),
+            {},
+            "do not say y.acceleration; give them in mm and s: planner machine import, --set",
+        ),
         (GRBL.replace("400.000", "0"), {}, r"settings\.txt:8: \$121: must be above 0, found 0"),
         (GRBL.replace("400.000", "fast"), {}, r"settings\.txt:8: \$121: a number is needed, found 'fast'"),
         (LINUXCNC.replace("inch", "miles"), {}, "LINEAR_UNITS is 'miles'"),

@@ -341,17 +341,6 @@ class EventTable(MadeWhenAsked[Event]):
         return Event(block=int(self.block[index]), line=int(self.line[index]), text=text)
 
 
-def codes_of(program: Program, letter: str) -> tuple[Array, FloatArray]:
-    """Block (K,) and number (K,) of the events of a letter, "M" or "T", in their order."""
-    events = program.events
-    if isinstance(events, EventTable):
-        which = events.letter == ord(letter)
-        return events.block[which], events.value[which]
-    found = [(event.block, float(event.text[1:])) for event in events if event.text[0] == letter]
-    block, value = np.array(found, dtype=np.float64).reshape(-1, 2).T
-    return block.astype(np.int64), value
-
-
 def plain(value: float) -> str:
     """A number without exponent and without needless zeros: 12000.0 -> "12000", 0.5 -> "0.5"."""
     return np.format_float_positional(value, trim="-")

@@ -27,7 +27,8 @@ from planner.geometry.chords import polyline
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.nc.points import own_text
-from planner.nc.program import FEED_MOVES, Kind, PathControl, Program, codes_of
+from planner.nc.program import FEED_MOVES, Kind, PathControl, Program
+from planner.planning.job.beside import codes_of
 
 LINUXCNC = "linuxcnc"
 TIMED = (LINUXCNC, *CONTROLS)  # names of the controls that there are models of

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.base.arrays import Array
+from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine, Times
-from planner.nc.program import Program, codes_of
+from planner.nc.program import EventTable, Program
 
 TOOL_CHANGE, SPINDLE_START, SPINDLE_STOP = 6, 3, 5  # M codes
 _TURNS = {3: 1, 4: -1, 5: 0, TOOL_CHANGE: 0}  # M codes, and how the spindle turns after them
@@ -67,6 +67,17 @@ def beside_motion(program: Program, machine: Machine) -> tuple[Beside, ...]:
         why = f"waits for {_WAITS[number]}" if number in _WAITS else NO_TIME
         found.append(Beside(what=name, count=count, each=each, because=why))
     return tuple(found)
+
+
+def codes_of(program: Program, letter: str) -> tuple[Array, FloatArray]:
+    """Block (K,) and number (K,) of the events of a letter, "M" or "T", in their order."""
+    events = program.events
+    if isinstance(events, EventTable):
+        which = events.letter == ord(letter)
+        return events.block[which], events.value[which]
+    found = [(event.block, float(event.text[1:])) for event in events if event.text[0] == letter]
+    block, value = np.array(found, dtype=np.float64).reshape(-1, 2).T
+    return block.astype(np.int64), value
 
 
 def _of_spindle(code: Array) -> tuple[int, int]:

@@ -86,7 +86,7 @@ class Bends:
     across: FloatArray  # (n, A) and in its plane at a right angle to that
 
     def of(self, moves: Array | slice) -> "Bends":
-        """Some of the moves."""
+        """Some of the moves, by their numbers (k,), a mask (n,) or a slice."""
         return Bends(**{name: column[moves] for name, column in vars(self).items()})
 
 
@@ -141,7 +141,7 @@ def linuxcnc_time(
     axes: tuple[str, ...],
     tolerance: float,
 ) -> float:
-    """`linuxcnc_times` of straight moves in all [s]."""
+    """`linuxcnc_times` of straight moves in all [s]: points (n+1, A), feed (n,), stop (n+1,)."""
     return float(linuxcnc_times(points, feed, stop, machine, axes, tolerance).sum())
 
 

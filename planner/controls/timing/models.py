@@ -176,7 +176,7 @@ def predicted_time(
     axes: tuple[str, ...],
     control: Control,
 ) -> float:
-    """`predicted_times` in all [s]."""
+    """`predicted_times` of points (n+1, A), feed (n,) and stop (n+1,) in all [s]."""
     return float(predicted_times(points, feed, stop, machine, axes, control).sum())
 
 

@@ -12,7 +12,7 @@ from same_program import machine
 from planner.base.errors import InputError
 from planner.nc import codes, settings
 from planner.nc.hpgl import instructions
-from planner.nc.language.heidenhain import definitions
+from planner.nc.language.heidenhain import tables as conversational_tables
 from planner.nc.language.siemens import tables
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
@@ -179,7 +179,10 @@ HEIDENHAIN = Reading(dialect="heidenhain")
 M_NOTHING = {
     **dict.fromkeys((3, 4, 5, 13, 14, 19), "spindle: feeds are per minute"),
     **dict.fromkeys((7, 8, 9), "coolant"),
-    **dict.fromkeys(definitions.NOTHING, "heidenhain/definitions.py says of each what it does"),
+    137: "feeds per minute, which are in force",
+    **dict.fromkeys(conversational_tables.NOTHING, "heidenhain/tables.py says of each what it does"),
+    **dict.fromkeys(conversational_tables.OF_COMPENSATION, "of compensation, which is off"),
+    **dict.fromkeys((*conversational_tables.OF_ROTARY, 126), "of rotary axes, which the machine has not"),
 }
 
 
@@ -211,6 +214,10 @@ BLOCKS_NOTHING = {
     "CYCL DEF 32.1": "the machine's tolerance, which is in force",
     "CYCL DEF 9.0 DWELL TIME": "its line follows",
     "FN 0: Q1 = +5": "a parameter that nothing asks for",
+    **dict.fromkeys(
+        ("FN 15: PRINT Q1", "FN 16: F-PRINT A", "FN 19: PLC = +1", "FN 26: TABOPEN A"),
+        "texts, the PLC, tables of the control",
+    ),
     "Q2 = 3 + Q1": "a parameter that nothing asks for",
     "TOOL CALL S2000": "spindle: feeds are per minute",
     "CC X+1 Y+1": "a pole that is set again before it counts",

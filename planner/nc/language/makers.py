@@ -115,7 +115,13 @@ def _origin(making: Making) -> list[Row]:
     if making.travel.compensated:
         text = "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
         raise ValueError(text)
-    only = (matrix == np.eye(3)).all() and not making.travel.tilted
+    if making.travel.tilted:
+        if making.interpreter.state.g92.any():
+            raise ValueError(
+                "a shift in a tilted plane on top of one before the plane is not read; end the plane, or the shift, first"
+            )
+        return []
+    only = (matrix == np.eye(3)).all()
     values = shift / making.unit if only else np.zeros(3)
     return [[("G", 52.0), *zip(AXES, values.tolist(), strict=True)]]
 
@@ -247,6 +253,10 @@ def _back(making: Making, rows: list[Row]) -> list[Row]:
     return rows[1:] if absolute else [*rows, [("G", 91.0)]]
 
 
+def _alarm(making: Making, given: Mapping[str, float]) -> None:
+    raise ValueError("the program raises its error (FN 14) here; run it with values that do not lead there")
+
+
 def _dwell_turns(making: Making, given: Mapping[str, float]) -> list[Row]:
     """A dwell of so many turns of the spindle. Raises ValueError where it stands."""
     speed = making.interpreter.state.spindle.speed
@@ -297,6 +307,8 @@ MAKERS: dict[str, Maker] = {
     "dwell turns": _dwell_turns,
     "tap path": _tap_path,
     "swivel": swivel.siemens,
+    "plane": swivel.heidenhain,
+    "alarm": _alarm,
     "tangent arc": tangent_arc,
     "arc through": arc_through,
     "frame in force": in_force,

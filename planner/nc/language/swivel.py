@@ -54,6 +54,7 @@ def siemens(making: "Making", given: Mapping[str, float]) -> None:
         if angle:
             matrix = matrix @ turned(angle, (mode >> 2 * k & 3) - 1)
     shift = (before + matrix @ behind) * making.unit
+    _no_frame(making, matrix, shift)
     side = given.get("p13", -1.0)
     tilt(
         making,
@@ -62,7 +63,6 @@ def siemens(making: "Making", given: Mapping[str, float]) -> None:
         _NO_MOVE if not given else _TURN if side else _STAY,
         int(side) if any(angles) else 0,
     )
-    making.travel.programmed = np.eye(3), np.zeros(3)
 
 
 def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
@@ -73,11 +73,22 @@ def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
     else:
         parts = (turned(given.get(f"SP{'ABC'[k]}", 0.0), k) for k in (2, 1, 0))
         matrix = np.linalg.multi_dot(list(parts))
+    _no_frame(making, matrix, np.zeros(3), turned_only=True)
     if "relative" in given:
         matrix = making.travel.swivelled[0] @ matrix
     if given["way"] == _MOVE:
         making.assume(MOVED)
-    tilt(making, matrix, making.travel.parts.datum * 0.0, round(given["way"]), round(given.get("side", 0.0)))
+    tilt(making, matrix, np.zeros(3), round(given["way"]), round(given.get("side", 0.0)))
+
+
+def _no_frame(making: "Making", matrix: FloatArray, shift: FloatArray, *, turned_only: bool = False) -> None:
+    """A plane on top of a programmed frame (with `turned_only` of more than a shift). Raises ValueError."""
+    frame, moved = making.travel.programmed
+    framed = (frame != np.eye(3)).any() or (bool(moved.any()) and not turned_only)
+    if framed and (shift.any() or (matrix != np.eye(3)).any()):
+        raise ValueError(
+            "a tilted plane while a frame (shift, rotation, mirror image, scale) is in force is not read; end that first"
+        )
 
 
 def tilt(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:

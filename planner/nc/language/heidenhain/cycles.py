@@ -330,4 +330,11 @@ def _places(making: Making, given: Given) -> Iterator[Row]:
     return _pattern(making, _on_lines, q["Q242"] * q["Q243"])
 
 
-MAKERS: dict[str, Maker] = {"cycle in force": _called, "pattern": _places}
+def _raised(making: Making, given: Given) -> Iterator[Row]:
+    """Up to the height between places, with where the tool is now."""
+    _look(making)
+    yield from _up(making)
+    _look(making)
+
+
+MAKERS: dict[str, Maker] = {"cycle in force": _called, "pattern": _places, "pattern up": _raised}

@@ -9,21 +9,30 @@ import re
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
-from planner.nc.language.heidenhain import cycles, moves
+from planner.nc.language.heidenhain import cycles, moves, tables
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import Block, Items, Rows, items, looked_up, parameter, variable
+from planner.nc.language.heidenhain.text import (
+    POSITION,
+    Block,
+    Items,
+    Rows,
+    items,
+    looked_up,
+    parameter,
+    variable,
+)
 from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
 
-_VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q\d+))"
-_LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR)(?=[-+.\dQ\s])"
+_VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q[LR]?\d+))"
+_LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR):?(?=[-+.\dQ\s])"
 _TOOL_DEF = rf"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?((?:\s*[LR]{_VALUE})*)\s*$"
 _TOOL_CALL = (
-    r"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q\d+))?\s*(?:F\s*([\d.]+|Q\d+|MAX))?"
-    rf"((?:\s*(?:DL|DR2|DR){_VALUE})*)\s*$"
+    r"\s*(?:(\d+|Q[LR]?\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q[LR]?\d+))?"
+    rf"\s*(?:F\s*([\d.]+|Q[LR]?\d+|MAX))?((?:\s*(?:DL|DR2|DR):?{_VALUE})*)\s*$"
 )
 READ = (*cycles.CYCLES, *cycles.PATTERNS)
 _OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
@@ -32,33 +41,9 @@ _REFUSED = {
     365: "Q365 1, moves between the places on the circle, is not read; write 0",
     439: "Q439, another reference of the feed, is not read; write 0",
 }
+# Q of the feed out, and the largest feed that cycles take, as the control has it.
+_FEED_OUT, _FEED_MAX = 208, 99999.0
 REMEDY = "let the CAM system write the moves out as L, C and CC"
-AT_END = (2, 30)  # M codes that end the program
-# They move nothing and last nothing: constant speed at corners in lag operation (90), lag and servo gain (105
-# 106), messages about replacement tools (107 108), the end of what is refused below (102 111 113 117 127 129
-# 137 145), look-ahead of radius compensation (120; gouges are refused), the touch probe's monitoring (141),
-# modal information (142), what happens at an NC stop (148 149), messages of limit switches (150).
-NOTHING = frozenset(
-    (90, 102, 105, 106, 107, 108, 111, 113, 117, 120, 127, 129, 137, 141, 142, 145, 148, 149, 150)
-)
-OWN_LAST, OF_PATHS = 9, 89  # codes between them belong to the machine's builder, but for 13, 14, 19 and 30
-_ORIENTATION = 19  # of the spindle
-REFUSED = {
-    89: "it calls a cycle at every place",
-    92: "its coordinates refer to a point of the machine",
-    94: "it turns rotary axes by whole turns",
-    **dict.fromkeys((97, 98), "it changes the corners of contours"),
-    101: "it changes tools by itself",
-    **dict.fromkeys((103, 109, 110, 116, 136), "it changes feeds"),
-    104: "it brings an older datum back",
-    112: "it puts arcs between lines",
-    **dict.fromkeys((114, 115, 126, 128, 138, 144), "it changes how the axes move"),
-    118: "a handwheel moves the axes, too",
-    124: "it leaves points out",
-    130: "its coordinates are not those of the tilted plane",
-    140: "it retracts the tool",
-    143: "it changes the datum",
-}
 
 
 def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
@@ -75,15 +60,18 @@ def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Exp
 
 
 def _not_read(cycle: int) -> str:
-    read = sorted({*READ, 9, 32, *moves.TITLES})
-    return f"cycle {cycle} is not read; read are {', '.join(map(str, read))}"
+    read = sorted({*READ, *tables.SAID_CYCLES, 9, 12, 19, 32, *moves.TITLES})
+    why = tables.REFUSED_CYCLES.get(cycle, "what it does is not known here")
+    return f"cycle {cycle} is not read: {why}; {REMEDY}; read are {', '.join(map(str, read))}"
 
 
 def is_of_the_builder(code: int) -> bool:
     """True if an M code of the builder would be taken for one of RS274NGC or of a printer."""
     found = setting("M", 10 * code, "", "")
-    of_printers = code > OWN_LAST and found is not None and found.what is not UNKNOWN_M
-    return of_printers or (OWN_LAST < code < OF_PATHS and code != _ORIENTATION and 10 * code in M_GROUP)
+    of_printers = code > tables.OWN_LAST and found is not None and found.what is not UNKNOWN_M
+    return of_printers or (
+        tables.OWN_LAST < code < tables.OF_PATHS and code != tables.ORIENTATION and 10 * code in M_GROUP
+    )
 
 
 class Definitions(Flow):
@@ -96,6 +84,9 @@ class Definitions(Flow):
         self.moves = Moves(1.0)  # path functions, with the feed of the tool call
         self.unit = 1.0  # mm per unit of the program
         self.cycles: set[int] = set()  # numbers of those that the program defines
+        self.compensates = False  # a block of the program has RL, RR, APPR or DEP
+        self.modal = False  # M89: the cycle is called at every place
+        self.shortest = False  # M126: rotary axes go the shortest way
         self.oversizes = False  # a tool call of the program has DR
         self.tool_names: dict[str, int] = {}  # numbers of tools that have names
 
@@ -126,7 +117,10 @@ class Definitions(Flow):
             raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
         rows: Rows = []
         if tool is not None:
-            number = tree.Number(float(tool))
+            number: tree.Expression = tree.Number(float(tool))
+            if match.group(1) and not match.group(1).isdecimal():
+                block.column = match.start(1)
+                number = block.value()
             rows.append(tree.row(block.place, ("T", number), ("M", 6.0)))
             rows.append(tree.row(block.place, ("G", 43.0), ("H", number)))
             if more_of.get("DL", tree.ZERO) != tree.ZERO:
@@ -148,7 +142,7 @@ class Definitions(Flow):
     def _tool_number(self, number: str | None, name: str | None) -> int | None:
         """The number of a tool, and one above all others for a tool with a name."""
         if number:
-            return int(number)
+            return int(number) if number.isdecimal() else 0
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
     def _tool_data(self, block: Block) -> Rows:
@@ -172,23 +166,43 @@ class Definitions(Flow):
         cycle = int(match[1])
         if match[2] is not None:
             return self._old_cycle(block, cycle, int(match[2]))
+        if cycle in tables.SAID_CYCLES:
+            return [assumed_row(block.place, tables.SAID_CYCLES[cycle])]
         if cycle not in READ:
             raise block.wrong(_not_read(cycle))
+        self.modal = False
         given: list[tuple[tree.Parameter, tree.Expression]] = []
         for entry in list(re.compile(r"Q(\d+)\s*=\s*", re.IGNORECASE).finditer(block.text, block.column)):
             q, block.column = int(entry[1]), entry.end()
-            number = block.value()
+            number = self._feed_value(block, q)
             if q in _REFUSED and number != tree.ZERO:
                 raise block.fault(_REFUSED[q], entry.start())
-            given.append((self._q(block, q), number))
+            given.append((block.known(q, ""), number))
         if cycle in cycles.PATTERNS:
             self._call_cycle(block)
             return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
         return [tree.assign(block.place, *given, (variable("cycle"), tree.Number(float(cycle))))]
 
+    def _feed_value(self, block: Block, q: int) -> tree.Expression:
+        """A value of a cycle, a number or F AUTO, MAX, FMAX; Q208 0 is the rapid out."""
+        if block.take(r"\s*F\s*AUTO\b"):
+            if self.moves.automatic is None:
+                raise block.wrong("FAUTO, and the tool call before has no F")
+            return self.moves.automatic
+        if block.take(r"\s*F?\s*MAX\b"):
+            return tree.ZERO if q == _FEED_OUT else tree.Number(_FEED_MAX)
+        return block.value()
+
     def _old_cycle(self, block: Block, cycle: int, part: int) -> Rows:
-        if cycle in (9, 32, *moves.TITLES) and part == 0:
+        if cycle in (9, 12, 19, 32, *moves.TITLES) and part == 0:
             return []
+        if cycle in tables.SAID_CYCLES:
+            return [assumed_row(block.place, tables.SAID_CYCLES[cycle])] if part else []
+        if cycle == 12:
+            block.take(r"\s*PGM\b")
+            return self._call_program(block)
+        if cycle == 19:
+            return moves.working_plane(block)
         if cycle in moves.TITLES:
             return moves.transformed(block, cycle)
         if cycle == 32:
@@ -197,7 +211,7 @@ class Definitions(Flow):
             # 32.1 without T: the machine's tolerance again; 32.2: filter and rotary axes
             return [tree.row(block.place, ("G", 64.0))] if part == 1 else []
         if cycle == 9:
-            block.take(r"\s*(?:V\.ZEIT|DWELL|V\.TIME)\s*")
+            block.take(r"\s*(?:V\.?\s?ZEIT|DWELL|V\.TIME|DW\.TIME)\s*")
             return [tree.row(block.place, ("G", 4.0), ("P", block.value()))]
         if cycle == 1:
             return self._pecking(block, part)
@@ -225,8 +239,21 @@ class Definitions(Flow):
         for code, column in given.codes:
             at = block.byte(column)
             as_it_is = Line(block.place, (word("M", at, float(code)),))
-            if code == 99:
+            if code in (89, 99):
                 after += self._call_cycle(block)
+                self.modal = code == 89
+            elif code == 140 and (
+                given.back is not None or re.search(r"MB\s*MAX", block.text, re.IGNORECASE)
+            ):
+                before += self._retract(block, given)
+            elif code in (126, 127):
+                self.shortest = code == 126
+            elif code in (136, 137):
+                before.append(tree.row(block.place, ("G", 95.0 if code == 136 else 94.0)))
+            elif (code in tables.OF_COMPENSATION and not self.compensates) or (
+                code in tables.OF_ROTARY and not self.source.at_tip
+            ):
+                continue
             elif code == 91 and not straight:
                 raise block.fault("M91, machine coordinates, is read in L", column)
             elif code == 91:
@@ -236,13 +263,13 @@ class Definitions(Flow):
                 before.append(Line(block.place, (spindle, word("M", at, 8.0))))
             elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
                 before += [as_it_is, looked_up(block)]
-            elif code in REFUSED:
-                raise block.fault(f"M{code} is not read: {REFUSED[code]}; {REMEDY}", column)
-            elif code in NOTHING:
+            elif code in tables.REFUSED:
+                raise block.fault(f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}", column)
+            elif code in tables.NOTHING:
                 continue
-            elif code in AT_END and self.file:
+            elif code in tables.AT_END and self.file:
                 after.append(Return(block.place))
-            elif code in (0, 1, 5, 9, *AT_END):
+            elif code in (0, 1, 5, 9, *tables.AT_END):
                 after.append(as_it_is)
             else:
                 # planned and flat programs do not have it: whoever read them would take it for another
@@ -251,10 +278,27 @@ class Definitions(Flow):
                 )
         return before, after, machine
 
+    def _retract(self, block: Block, given: Items) -> Rows:
+        """M140: back along the tool's axis by MB, or to machine zero."""
+        if given.back is None:
+            rows: Rows = [
+                assumed_row(block.place, "retraction"),
+                tree.row(block.place, ("G", 53.0), ("G", ZERO), ("Z", ZERO)),
+            ]
+            return [*rows, looked_up(block)]
+        way = {"Z": POSITION["Z"] + given.back}
+        fast = given.feed is None
+        return self.moves.straight(block, Items(feed=None if given.axes else given.feed, fast=fast), way)
+
+    def _call_program(self, block: Block) -> Rows:
+        """CALL PGM. Raises ProgramFault without a name."""
+        raise NotImplementedError
+
     def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:
         column, given = block.column, items(block)
         # F of M128 is the largest feed of the axes that follow the tool: the joints' limits are for that
-        feed = given.feed is not None and not any(code in TOOL_POINT_ON for code, _ in given.codes)
+        own = (*TOOL_POINT_ON, 140)  # with a feed of their own
+        feed = given.feed is not None and not any(code in own for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
             raise block.fault("only M codes are read here; write the move and its feed with L", column)
         before, after, _ = self._codes(block, given)

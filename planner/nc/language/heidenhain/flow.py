@@ -3,13 +3,22 @@
 from collections.abc import Sequence
 
 from planner.nc.language import tree
-from planner.nc.language.heidenhain.text import PARAMETERS, Block, Formula, Rows, parameter, variable
+from planner.nc.language.heidenhain.text import Block, Formula, Rows, variable
+from planner.nc.language.making import assumed_row
 
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
 # FN functions by their numbers: comparisons, and operations on two values and on one.
 _FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
 _FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
 _FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
+# Functions that move nothing: printing, formatted output, the PLC, waiting for it, tables, texts.
+FN_NOTHING, _FN_WAIT, _FN_ERROR = (15, 16, 19, 20, 26, 27, 29, 37, 38), 20, 14
+_CONTROLS = "the value is known by the control only; assign what it has there: Q1 = 5"
+FN_REFUSED = {
+    18: _CONTROLS,
+    28: _CONTROLS,
+    17: "it writes data of the control; leave it out, if these move nothing",
+}
 NAMED = 100_000  # number of the first label, and of the first tool, with a name
 
 
@@ -42,7 +51,7 @@ class Flow:
         label = self._label(block)
         if label not in self.known:
             raise block.fault(f"there is no LBL {block.text[8:].split('REP')[0].strip()} to call")
-        repeat = block.take(r"\s*REP\s*(\d+)")
+        repeat = block.take(r"\s*REP\s*(\d+)(?:\s*/\s*\d+)?")
         if repeat is None:
             self.called.add(label)
             return [tree.Call(block.place, procedure_name(label, self.file), None, block.text)]
@@ -52,26 +61,30 @@ class Flow:
 
     def _parameter(self, block: Block) -> Rows:
         block.column = 0
-        match = block.take(r"Q(\d+)\s*=\s*")
+        if block.take(r"QS\d+\s*="):
+            return []  # a text moves nothing
+        match = block.take(r"Q([LR]?)(\d+)\s*=\s*")
         if match is None:
             raise block.fault("a parameter and a formula are expected, such as Q1 = Q2 + 3")
-        formula = Formula(block)
-        return [tree.assign(block.place, (self._q(block, int(match[1])), formula.read()))]
-
-    def _q(self, block: Block, number: int) -> tree.Parameter:
-        if number >= PARAMETERS:
-            raise block.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}")
-        return parameter(number)
+        target = block.known(int(match[2]), match[1].upper())
+        return [tree.assign(block.place, (target, Formula(block).read()))]
 
     def _fn(self, block: Block) -> Rows:
         match = block.take(r"\s*(\d+)\s*:\s*")
         number = int(match[1]) if match else -1
         if number in _FN_IF:
             return self._jump(block, number)
-        begin, target = block.column, block.take(r"Q(\d+)\s*=\s*")
+        if number in FN_NOTHING:
+            return [assumed_row(block.place, "waits")] if number == _FN_WAIT else []
+        if number == _FN_ERROR:
+            return [tree.MadeRows(block.place, "alarm")]
+        begin, target = block.column, block.take(r"Q([LR]?)(\d+)\s*=\s*")
         if target is None or number not in {**_FN_ONE, **_FN_TWO}:
-            raise block.fault(f"FN {number if match else ''} is not read; read are FN 0 to 13", begin)
-        q = self._q(block, int(target[1]))
+            why = FN_REFUSED.get(
+                number, "it is not known here; read are FN 0 to 16, 19, 20, 26, 27, 29, 37 and 38"
+            )
+            raise block.fault(f"FN {number if match else ''} is not read: {why}", begin)
+        q = block.known(int(target[2]), target[1].upper())
         if number in _FN_ONE:
             block.take(r"(?:SQRT|SIN|COS)\s*")
             given = block.value()
@@ -85,7 +98,7 @@ class Flow:
         return [tree.assign(block.place, (q, operation))]
 
     def _jump(self, block: Block, number: int) -> Rows:
-        block.take(r"\s*IF\s")
+        block.take(r"\s*IF\b\s*|\s*IF(?=[-+Q\d.])")
         left, begin = block.value(), block.column
         compare = block.take(r"\s*(EQU|NE|GT|LT)\b")
         if compare is None or compare[1].upper() != _FN_IF[number]:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from planner.nc.arcs import IN_PLANE
-from planner.nc.language import tree
+from planner.nc.language import swivel, tree
 from planner.nc.language.approach import KINDS
 from planner.nc.language.heidenhain import text
 
@@ -25,6 +25,16 @@ _FAST_ARC = "an arc at rapid (FMAX) is not read; write its F"
 _EXTRA = re.compile(r"\s*\b(LEN|CCA)\s*(?=[-+.\dQ])", re.IGNORECASE)
 COMPENSATES = re.compile(r"\bR[LR]\b|\bAPPR\b|\bDEP\b", re.IGNORECASE)
 TITLES = (7, 8, 10, 11, 26)  # cycles of the frame
+# Functions that set a part of the frame as a cycle does, with what ends it; and tilted planes with their angles.
+TRANSFORMED = {"TRANS MIRROR": (8, ""), "TRANS ROTATION": (10, "ROT"), "TRANS SCALE": (11, "SCL")}
+PLANES = {
+    "PLANE SPATIAL": ("SPA", "SPB", "SPC"),
+    "PLANE EULER": ("EULPR", "EULNU", "EULROT"),
+    "PLANE RELATIV": ("SPA", "SPB", "SPC"),
+    "PLANE RELATIVE": ("SPA", "SPB", "SPC"),
+    "PLANE RESET": (),
+}
+_ANGLE = r"\s*(SP[ABC]|EUL(?:PR|NU|ROT))\s*(?=[-+.\dQ])"
 
 
 class Moves:
@@ -191,15 +201,12 @@ def _assigned(ends: Ends) -> tree.Assignments:
     return tuple((text.POSITION[axis], end) for axis, end in ends.items() if axis in text.POSITION)
 
 
-def approach_rows(block: text.Block, feed: tree.Expression | None) -> tuple[text.Rows, text.Items]:
-    """APPR or DEP, with its M codes among the items; `feed` is what F AUTO means. Raises ProgramFault."""
+def approach_rows(block: text.Block, moves: Moves) -> tuple[text.Rows, text.Items]:
+    """APPR or DEP, with its M codes among the items. Raises ProgramFault."""
     departs, column = block.function == "DEP", block.column
     kind = block.take(r"\s*(P?)(LT|LN|CT|LCT)\b")
     if kind is None:
         raise block.wrong(f"{block.function} is followed by LT, LN, CT or LCT")
-    if kind[1]:
-        what = f"{kind[0].strip()}, with polar coordinates, is not read; write {kind[2]} with X and Y"
-        raise block.fault(what, column)
     given: dict[str, tree.Expression | float] = {"kind": KINDS.index(kind.group(2).upper())}
     rest = block.text
     for extra in _EXTRA.finditer(block.text, kind.end()):
@@ -208,20 +215,26 @@ def approach_rows(block: text.Block, feed: tree.Expression | None) -> tuple[text
         rest = rest[: extra.start()] + " " * (block.column - extra.start()) + rest[block.column :]
     found = text.items(replace(block, text=rest, column=kind.end()))
     ends = {axis: text.absolute(axis, number) for axis, number in found.axes.items()}
-    given |= ends
-    if found.polar or found.turn or found.fast:
+    before: text.Rows = []
+    if kind[1]:  # PLT and the others: polar coordinates
+        before, by_pole = moves.polar(block, found), moves.polar_ends(block, found)
+        if by_pole is None:
+            raise block.fault("polar coordinates stand instead of X and Y", column)
+        ends = by_pole
+    if (found.polar and not kind[1]) or found.turn or found.fast:
         raise block.fault("APPR and DEP take X Y Z, LEN, R, CCA, RL or RR, and F", column)
+    given |= ends
     if found.radius is not None:
         given["R"] = found.radius
-    fed = feed if found.automatic else found.feed
+    fed = moves.automatic if found.automatic else found.feed
     if fed is not None:
         given["F"] = fed
     if departs:
         if found.side:
             raise block.fault("DEP switches radius compensation off; RL and RR do not belong to it", column)
-        return [tree.made(block.place, "depart", **given), text.looked_up(block)], found
+        return [*before, tree.made(block.place, "depart", **given), text.looked_up(block)], found
     approach = tree.made(block.place, "approach", **given, side=found.side or 0)
-    return [approach, tree.assign(block.place, *_assigned(ends))], found
+    return [*before, approach, tree.assign(block.place, *_assigned(ends))], found
 
 
 def frame_rows(block: text.Block, given: dict[str, tree.Expression], cycle: int) -> text.Rows:
@@ -231,7 +244,14 @@ def frame_rows(block: text.Block, given: dict[str, tree.Expression], cycle: int)
 
 
 def datum_rows(block: text.Block) -> text.Rows:
-    """TRANS DATUM AXIS X Y Z, and TRANS DATUM RESET. Raises ProgramFault."""
+    """TRANS DATUM AXIS X Y Z, TRANS MIRROR AXIS X, TRANS ROTATION ROT, TRANS SCALE SCL, and RESET of each.
+    Raises ProgramFault."""
+    if block.function in TRANSFORMED:
+        cycle, none = TRANSFORMED[block.function]
+        if block.take(r"\s*RESET\b"):
+            return frame_rows(block, {none: tree.ONE if none == "SCL" else tree.ZERO} if none else {}, cycle)
+        block.take(r"\s*AXIS\b")
+        return transformed(block, cycle)
     match = block.take(r"\s*(AXIS|RESET)\b")
     if match is None:
         raise block.wrong("TRANS DATUM is followed by AXIS and coordinates, or by RESET")
@@ -263,6 +283,40 @@ def transformed(block: text.Block, cycle: int) -> text.Rows:
     number = block.value()
     block.end()
     return frame_rows(block, {word[1].upper(): number}, cycle)
+
+
+def plane_rows(block: text.Block) -> text.Rows:
+    """PLANE SPATIAL, EULER, RELATIV and RESET. Raises ProgramFault."""
+    given = {name[1].upper(): block.value() for name in iter(lambda: block.take(_ANGLE), None)}
+    needed = PLANES[block.function]
+    if set(given) - set(needed) or (needed and not given):
+        raise block.wrong(f"{block.function} takes {', '.join(needed) or 'no angles'}")
+    rest = block.rest.upper()
+    way = re.search(r"\b(STAY|TURN|MOVE)\b", rest)
+    if way is None:
+        raise block.wrong("TURN, MOVE or STAY says what the rotary axes do")
+    given |= {"way": tree.Number(float(swivel.WAYS[way[1]]))}
+    if side := re.search(r"\bSEQ\s*([-+])", rest):
+        given["side"] = tree.Number(1.0 if side[1] == "+" else -1.0)
+    if "RELATIV" in block.function:
+        given["relative"] = tree.ONE
+    if block.function == "PLANE EULER":
+        given |= {name: given.get(name, tree.ZERO) for name in needed}
+    return _tilted(block, given)
+
+
+def working_plane(block: text.Block) -> text.Rows:
+    """Cycle 19: A B C as spatial angles; the rotary axes stay."""
+    given = {
+        f"SP{name[1].upper()}": block.value()
+        for name in iter(lambda: block.take(r"\s*([ABC])\s*(?=[-+.\dQ])"), None)
+    }
+    return _tilted(block, {**given, "way": tree.Number(float(swivel.WAYS["STAY"]))})
+
+
+def _tilted(block: text.Block, given: dict[str, tree.Expression]) -> text.Rows:
+    plane = tree.made(block.place, "plane", **given)
+    return [plane, tree.made(block.place, "frame in force"), text.looked_up(block)]
 
 
 def _shifts(block: text.Block) -> dict[str, tree.Expression]:

@@ -9,11 +9,19 @@ from collections.abc import Callable
 
 from planner.nc.language import tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain import text
+from planner.nc.language.heidenhain import patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
-from planner.nc.language.heidenhain.moves import COMPENSATES, approach_rows, datum_rows
+from planner.nc.language.heidenhain.moves import (
+    COMPENSATES,
+    PLANES,
+    TRANSFORMED,
+    approach_rows,
+    datum_rows,
+    plane_rows,
+)
 from planner.nc.language.makers import with_makers
+from planner.nc.language.making import assumed_row
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import PositionVariables
@@ -21,7 +29,7 @@ from planner.nc.language.system_variables import PositionVariables
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
     r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
-    r"Q(?=\d+\s*=)|M(?=\s*\d)|\*|FUNCTION \w+|TRANS DATUM|PLANE \w+|\w+",
+    r"Q(?=[LRS]?\d+\s*=)|M(?=\s*\d)|\*|FUNCTION RESET|FUNCTION \w+|TRANS \w+|PLANE \w+|PATTERN DEF|DECLARE STRING|\w+",
     re.IGNORECASE,
 )
 _MOVES = ("L", "LP", "C", "CR", "CT", "CP", "CTP")  # that RND and CHF may follow
@@ -41,8 +49,8 @@ class HeidenhainParser(Definitions):
         super().__init__()
         self.source, self.file = source, source.file
         self.faults: list[tree.ProgramFault] = []
+        self.places: list[patterns.Place] = []  # of the pattern defined last
         self.skip = False  # the block was read with the one before
-        self.compensates = False  # a block of the program has RL, RR, APPR or DEP
         self.poles = False  # a block of it, or of a program beside it, may set a pole
 
     def parse(self) -> list[tree.Procedure]:
@@ -141,7 +149,11 @@ class HeidenhainParser(Definitions):
     def _ends(self, block: text.Block, given: text.Items) -> dict[str, tree.Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
-        return {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
+        ends = {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
+        for axis in ends.keys() & set("ABC") if self.shortest else ():
+            here = text.position(axis)
+            ends[axis] = here + tree.op("WRAPPED", ends[axis] - here)
+        return ends
 
     def _straight(self, block: text.Block) -> text.Rows:
         given, name = text.items(block, turning=self.source.at_tip), block.function
@@ -154,6 +166,12 @@ class HeidenhainParser(Definitions):
             lines += self.moves.to_polar(block, given)
         else:
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
+        if (
+            self.modal
+            and {"X", "Y"} & given.axes.keys()
+            and not any(code in (89, 99) for code, _ in given.codes)
+        ):
+            after = [*self._call_cycle(block), *after]
         return [*lines, *([text.looked_up(block)] if machine else []), *after]
 
     def _corner(self, k: int, last: int) -> text.Rows:
@@ -165,9 +183,13 @@ class HeidenhainParser(Definitions):
         if rounded:
             block.take(r"\s*R(?=\s*[-+.\dQ])")
         number = block.value()
-        block.end("nothing may follow the number of RND and CHF; write the feed into the next block")
+        feed = block.take(r"\s*F\s*(?=[-+.\dQA])")
+        if feed and not block.take(r"AUTO\b"):
+            block.value()
+        block.end("nothing but a feed may follow the number of RND and CHF")
         kind = CORNERS.index("RND" if rounded else "CHR")
-        return [tree.made(block.place, "corner", kind=kind, size=number)]
+        said = [assumed_row(block.place, "feed of corners")] if feed else []
+        return [*said, tree.made(block.place, "corner", kind=kind, size=number)]
 
     def _arc(self, block: text.Block) -> text.Rows:
         name, given = block.function, text.items(block)
@@ -198,7 +220,7 @@ class HeidenhainParser(Definitions):
         return [tree.made(block.place, "compensate", side=given.side)]
 
     def _approach(self, block: text.Block) -> text.Rows:
-        rows, given = approach_rows(block, self.moves.automatic)
+        rows, given = approach_rows(block, self.moves)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
 
@@ -213,6 +235,8 @@ class HeidenhainParser(Definitions):
         return [tree.assign(block.place, *named, (text.PLANE, tree.Number(float(normal))))]
 
     def _cycle_call(self, block: text.Block) -> text.Rows:
+        if block.take(r"\s*PAT\b"):
+            return self._at_pattern(block)
         if not block.take(r"\s*POS\b"):
             before, after = self._codes_alone(block)
             return [*before, *self._call_cycle(block), *after]
@@ -221,17 +245,52 @@ class HeidenhainParser(Definitions):
         ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
         return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
 
+    def _pattern(self, block: text.Block) -> text.Rows:
+        self.places = patterns.places(block)
+        return []
+
+    def _at_pattern(self, block: text.Block) -> text.Rows:
+        """CYCL CALL PAT: the cycle at each place of the PATTERN DEF before, at rapid between them."""
+        before, after, _ = self._codes(block, text.items(block))
+        if not self.places:
+            raise block.fault("CYCL CALL PAT, and no PATTERN DEF before it; tables of points are not read")
+        rows: text.Rows = [*before]
+        surface = text.parameter(203)
+        for place in self.places:
+            x, y, z = place
+            rows.append(tree.assign(block.place, (surface, surface + z)))
+            rows.append(tree.made(block.place, "pattern up"))
+            rows += self.moves.straight(block, text.Items(fast=True), {"X": x, "Y": y})
+            rows += [*self._call_cycle(block), tree.assign(block.place, (surface, surface - z))]
+        return [*rows, tree.made(block.place, "pattern up"), text.looked_up(block), *after]
+
+    def _tool_point(self, block: text.Block) -> text.Rows:
+        """FUNCTION TCPM and FUNCTION RESET TCPM, as M128 and M129."""
+        ends, code = block.function == "FUNCTION RESET", text.Items(codes=[(128, 0)])
+        if ends:
+            if not self.source.at_tip:
+                return []
+            code = text.Items(codes=[(129, 0)])
+        elif re.search(r"AXIS\s+SPAT|F\s+CONT|PATHCTRL\s+VECTOR", block.text, re.IGNORECASE):
+            raise block.fault(
+                "FUNCTION TCPM with AXIS SPAT, F CONT or PATHCTRL VECTOR is not read; write F TCP AXIS POS PATHCTRL AXIS"
+            )
+        return self._codes(block, code)[0]
+
 
 _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "BEGIN PGM": HeidenhainParser._begin,
     "END PGM": HeidenhainParser._end,
-    **dict.fromkeys(("BLK FORM", "*", "PLANE RESET", "FUNCTION RESET"), lambda parser, block: []),
+    **dict.fromkeys(("BLK FORM", "*", "FUNCTION MODE", "DECLARE STRING"), lambda parser, block: []),
+    **dict.fromkeys(("FUNCTION TCPM", "FUNCTION RESET"), HeidenhainParser._tool_point),
+    **dict.fromkeys(PLANES, lambda parser, block: plane_rows(block)),
+    "PATTERN DEF": HeidenhainParser._pattern,
     "TOOL DEF": HeidenhainParser._tool_data,
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
-    "TRANS DATUM": lambda parser, block: datum_rows(block),
+    **dict.fromkeys(("TRANS DATUM", *TRANSFORMED), lambda parser, block: datum_rows(block)),
     "CC": HeidenhainParser._pole,
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,

@@ -3,9 +3,9 @@
 A block begins with its number and a function word; `~` at its end, or the parameters of a cycle, continue it
 on the next line. What follows `;` is a comment, and a line that begins with `*` is a heading.
 
-    value   = [+|-] number | [+|-] Q number
+    value   = [+|-] number | [+|-] Q number (QL and QR, too)
     formula = values with + - * / ^ and brackets; SIN COS TAN ASIN ACOS ATAN SQRT SQ ABS INT FRAC NEG LN LOG
-    EXP; PI
+    EXP SGN; PI; % is the rest of a division
 """
 
 import math
@@ -21,25 +21,33 @@ from planner.nc.language.tokens import Token, TokenReader, names, ranked
 from planner.nc.language.tree import Expression
 
 PARAMETERS = 2000  # Q0 to Q1999; parameter n of the tree is Q(n-1)
+# First parameters of the tree of QL and QR, of which there are so many.
+_KINDS, _OF_KIND = {"": 1, "L": FIRST_POSITION + 10, "R": FIRST_POSITION + 1010}, 1000
 LANGUAGE = tree.Language(
-    operations=ARITHMETIC,
-    ranks=ranked("+ -", "* /", "^"),
+    operations=ARITHMETIC
+    | {
+        ("%", 2): "fmod({0},{1})",
+        ("SGN", 1): "(({0}>0)-({0}<0)+0.0)",
+        ("WRAPPED", 1): "remainder({0},360.0)",
+    },
+    ranks=ranked("+ -", "* / %", "^"),
     meant={"^": "**"},
-    functions=names("SIN COS TAN ASIN ACOS ATAN SQRT ABS INT FRAC LN LOG EXP"),
+    functions=names("SIN COS TAN ASIN ACOS ATAN SQRT ABS INT FRAC LN LOG EXP SGN"),
     constants={"PI": math.pi},
     conditions=COMPARISONS,
-    largest=FIRST_POSITION + 2,
+    largest=FIRST_POSITION + 2010,
     system_numbers=PositionVariables.numbers,
 )
 Rows = list[tree.Statement]
 _CONTINUED = re.compile(r"\s*Q\d+\s*=", re.IGNORECASE)
 _NUMBERED = re.compile(r"\s*(\d+)\s+(?=\S)")
 _ITEM = (
-    r"\s*(?:(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
+    r"\s*(?:MB\s*(?P<limit>MAX)|(?P<back>MB)(?=\s*[-+.\dQ])|(?P<axis>I?[XYZABCUVW])(?=\s*[-+.\dQ])|(?P<polar>I?P[AR])|DR(?P<turn>[-+])|(?P<comp>R[0LR])(?![\d.])|"
     r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
     r"(?P<ahead>LA)(?=\s*\d))"
 )
 _ROTARY = ("A", "B", "C")
+_WITH_AXES = (94, 138)  # M codes that may name rotary axes
 
 
 def variable(name: str) -> tree.Named:
@@ -47,9 +55,14 @@ def variable(name: str) -> tree.Named:
     return tree.Named(f"_{name}", True)
 
 
-def parameter(number: int) -> tree.Numbered:
-    """Q of that number."""
-    return tree.Numbered(tree.Number(float(number + 1)))
+def parameter(number: int, kind: str = "") -> tree.Numbered:
+    """Q of that number; QL and QR with their letter."""
+    return tree.Numbered(tree.Number(float(number + _KINDS[kind])))
+
+
+def position(axis: str) -> tree.Numbered:
+    """Where an axis is, as the interpreter knows it."""
+    return tree.Numbered(tree.Number(float(FIRST_POSITION + "XYZABC".index(axis))))
 
 
 @dataclass
@@ -95,16 +108,21 @@ class Block:
 
     def value(self) -> tree.Expression:
         """The number or parameter that comes next. Raises ProgramFault."""
-        match = self.take(r" *(?:([+-]?)\s*Q(\d+)(?!\d)|([+-]?(?:\d+(?:\.\d*)?|\.\d+)))")
+        match = self.take(r" *(?:([+-]?)\s*Q([LR]?)(\d+)(?!\d)|([+-]?(?:\d+(?:\.\d*)?|\.\d+)))")
         if match is None:
             self.take(" *")
             raise self.wrong("a number or a Q parameter is expected here, such as +12.5 or Q3")
-        if match[3]:
-            return tree.Number(float(match[3]))
-        number = int(match[2])
-        if number >= PARAMETERS:
-            raise self.fault(f"Q{number}: there are Q0 to Q{PARAMETERS - 1}", match.start(1))
-        return -parameter(number) if match[1] == "-" else parameter(number)
+        if match[4]:
+            return tree.Number(float(match[4]))
+        found = self.known(int(match[3]), match[2].upper(), match.start(1))
+        return -found if match[1] == "-" else found
+
+    def known(self, number: int, kind: str, column: int = 0) -> tree.Numbered:
+        """A parameter by its number. Raises ProgramFault for none."""
+        count = PARAMETERS if not kind else _OF_KIND
+        if number >= count:
+            raise self.fault(f"Q{kind}{number}: there are Q{kind}0 to Q{kind}{count - 1}", column)
+        return parameter(number, kind)
 
 
 @cache
@@ -177,8 +195,8 @@ class Formula(TokenReader):
 
     def operand(self, token: Token) -> tree.Expression | None:
         name = token.text
-        if re.fullmatch(r"Q\d+", name) and int(name[1:]) < PARAMETERS:
-            return parameter(int(name[1:]))
+        if given := re.fullmatch(r"Q([LR]?)(\d+)", name):
+            return self.block.known(int(given[2]), given[1], token.at)
         if name == "SQ":
             operand = self.value()
             return operand * operand
@@ -207,6 +225,7 @@ class Items:
     fast: bool = False
     automatic: bool = False
     codes: list[tuple[int, int]] = field(default_factory=list)  # M codes, each with its column
+    back: Expression | None = None  # MB of M140, or None for MB MAX
     side: int | None = None  # 1 for RL, -1 for RR, 0 for R0, None where none is given
 
 
@@ -222,12 +241,14 @@ def items(block: Block, turning: bool = False) -> Items:
         at = item.end() - len(item[0].lstrip())
         if item["axis"]:
             name = item["axis"].upper()
-            if name[-1] not in "XYZ" and not (turning and name in _ROTARY):
+            if name[-1] not in "XYZ" and not (turning and name[-1] in _ROTARY):
                 raise block.fault(f"axis {name[-1]} is not planned; X, Y and Z are", at)
             given = block.value()
             if name[-1] in found.axes:
                 raise block.fault(f"a second {name[-1]} in this block", at)
             found.axes[name[-1]] = (given, name[0] == "I")
+        elif item["limit"] or item["back"]:
+            found.back = None if item["limit"] else block.value()
         elif item["polar"]:
             found.polar[item["polar"].upper()] = block.value()
         elif item["turn"]:
@@ -247,12 +268,14 @@ def items(block: Block, turning: bool = False) -> Items:
             found.feed = block.value()
         else:
             found.codes.append((int(item["code"]), at))
+            if int(item["code"]) in _WITH_AXES:
+                block.take(r"(?:\s+[ABC](?![-+.\dQ]))*")
     return found
 
 
 def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
     """An absolute coordinate for a value and whether that is incremental (IX)."""
-    return POSITION[axis] + given[0] if given[1] else given[0]
+    return (POSITION.get(axis) or position(axis)) + given[0] if given[1] else given[0]
 
 
 def looked_up(block: Block) -> tree.Line:

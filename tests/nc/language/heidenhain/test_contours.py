@@ -81,7 +81,7 @@ def test_what_the_tool_cannot_follow_is_refused_with_its_line() -> None:
         ("CC X+5 Y+0\nC X+10 Y+0 DR+ RL F500\nL X+20", "begins with a straight move"),
         ("DEP LT LEN5", "DEP without a contour"),
         ("APPR CT X+1 Y+1 R5 RL", "APPR CT needs its angle"),
-        ("APPR PLT PR+1 PA+1 LEN5 RL", "with polar coordinates, is not read"),
+        ("APPR PLT X+1 PA+1 LEN5 RL", "polar coordinates stand instead"),
         ("L X+4 Y+20 FMAX\nAPPR LCT X+4 Y+5 R50 RL F100\nL X+9", "inside the arc"),
         ("APPR LT X+1 Y+1 LEN5 RL F100", "APPR is followed by no contour"),
     ):

@@ -197,6 +197,10 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
 
 def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G4: a dwell of P seconds, of S on printers. Raises WordFault without a time, or for a negative one."""
+    if "P" not in block.value and not state.strict:  # Fanuc's
+        for letter in block.value.keys() & set("XU"):
+            block.value["P"], block.at["P"] = block.value.pop(letter), block.at[letter]
+            ignored.used(letter)
     seconds = block.value.get("P")
     if seconds is not None and ignored.printer:
         seconds *= MILLISECOND

@@ -45,11 +45,20 @@ WORDS: dict[tuple[str, int], str] = {
     ("G", 960): "D",
     **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},
     ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
-    ("G", 730): "RLQ", ("G", 740): "RP", ("G", 810): "RL", ("G", 820): "RLP", ("G", 830): "RLQ", ("G", 840): "RLP",
-    ("G", 850): "RL", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
+    ("G", 730): "RLQPK", ("G", 740): "RPLQK", ("G", 810): "RLPK", ("G", 820): "RLPK", ("G", 830): "RLQPIJK", ("G", 840): "RLPQK",
+    ("G", 850): "RLPK", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
     **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
     ("M", 610): "Q",
 }  # fmt: skip
+FANUC_WORDS = {
+    730: "PK",
+    740: "LQK",
+    810: "PK",
+    820: "K",
+    830: "PIJK",
+    840: "QK",
+    850: "PK",
+}  # cycles of LinuxCNC have not
 MOTION_WORDS = "IJKRPQLH"  # that a motion code in force may use
 M_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),

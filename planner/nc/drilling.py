@@ -25,31 +25,32 @@ from planner.nc import auxiliary, codes
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import Block, WordFault, integer
+from planner.nc.moves import Block, WordFault, integer, unused
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 
 CLEARANCE = 0.01 * MM_PER_INCH  # between pecks [mm]: a hundredth of an inch, as LinuxCNC has it
 DWELLING = frozenset((820, 860, 880, 890))  # cycles that need P
 PECKING = frozenset((730, 830))  # cycles that need Q
+FANUC_DWELLS = PECKING | {810, 850}  # cycles that dwell where P says so, on Fanuc's controls alone
 TAPPING = {740: -1, 840: 1}  # how the spindle must turn
 STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which must turn
 # The steps of each cycle from above the hole at R on: moves at the feed (down to the depth, back to R, out to
 # where the cycle ends) and fast (up to where it ends; beside, deep, in and away, of the back bore, whose feed
 # leads to the counterbore), the dwell, the spindle (stop, other way, again as before), and a full stop.
 _STEPS = {
-    **dict.fromkeys(PECKING, "pecks down up"),
+    **dict.fromkeys(PECKING, "pecks down dwell up"),
     **dict.fromkeys(TAPPING, "down stop other dwell out stop again"),
-    810: "down up",
+    810: "down dwell up",
     820: "down dwell up",
-    850: "down back up",
+    850: "down dwell back up",
     860: "down dwell stop up again",
     870: "beside stop deep in again counterbore down stop deep away up again",
     880: "down dwell stop halt up again",
     890: "down dwell out",
 }
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
-_BY_HAND = 880  # G88
+_DEEP, _BACK_BORE, _BY_HAND = 830, 870, 880  # G83, G87, G88
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3  # down, out and back in
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
@@ -65,7 +66,9 @@ class Hole:
     bottom: float  # c of its depth
     clear: float  # c of R
     retract: float  # c after it
-    peck: float = 0.0  # Q;  dwell : P [s]
+    peck: float = 0.0  # Q, or I of G83, of which each is J (`less`) less, down to K (`least`);  dwell : P [s]
+    less: float = 0.0
+    least: float = 0.0
     dwell: float = 0.0
     beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87;  counterbore : c of its K
     counterbore: float = 0.0
@@ -105,18 +108,20 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
         "other": CycleStep(None, spindle=codes_as_before[1]),
     }
     for name in _STEPS[hole.code].split():
-        yield from _pecks(hole) if name == "pecks" else (step[name],)
+        if name != "dwell" or hole.dwell or hole.code not in FANUC_DWELLS:
+            yield from _pecks(hole) if name == "pecks" else (step[name],)
 
 
 def _pecks(hole: Hole) -> Iterator[CycleStep]:
     a, b = hole.place
-    depth = hole.clear - hole.peck
+    step, depth = hole.peck, hole.clear - hole.peck
     while depth > hole.bottom:
         yield CycleStep(Kind.LINE, (a, b, depth))
-        if hole.code == 830:
+        if hole.code == _DEEP:
             yield CycleStep(Kind.RAPID, (a, b, hole.clear))
         yield CycleStep(Kind.RAPID, (a, b, depth + CLEARANCE / hole.unit))
-        depth -= hole.peck
+        step = max(step - hole.less, hole.least)
+        depth -= step
 
 
 def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
@@ -124,15 +129,17 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
     a, b = IN_PLANE[state.normal]
     c = state.normal
     here = state.programmed() / state.unit
-    if state.series is None or state.series.code != state.motion:  # the words in force are those of a code
+    if state.series is None or state.series.code != state.motion:
         level = float(here[c]) if state.series is None else state.series.level
-        state.series = CycleSeries(state.motion, {}, level)
+        # the words in force are those of a code; on Fanuc's controls those of all cycles until G80
+        words = state.series.words if state.fanuc and state.series is not None else {}
+        state.series = CycleSeries(state.motion, words, level)
     series = state.series
     words = _words(state, block, series)
     _check_words(state, block, words, findings)
     hole = _hole(state, block, series, words)
-    repeats = _repeats(block, hole)
-    if series.level < hole.clear - _ROUNDING:
+    repeats = _repeats(state, block, hole)
+    if repeats and series.level < hole.clear - _ROUNDING:
         _to(state, table, block.line, CycleStep(Kind.RAPID, (here[a], here[b], hole.clear)))
         here[c] = hole.clear
     for _ in range(repeats):
@@ -154,7 +161,7 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
     """Raises WordFault for an impossible peck or dwell, and a spindle that does not turn as it must."""
     code, word = state.motion, block.motion_word()
     name = f"G{codes.number(code)}"
-    if code in PECKING and not words["Q"] > 0:
+    if code in PECKING and not min(_infeeds(words, state)[c] for c in ("peck", "least")) > 0:
         raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
     if code in DWELLING and words["P"] < 0:
         raise block.fault("a dwell must not be negative; write its seconds, such as P0.5", "P")
@@ -171,7 +178,7 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
 def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, float]) -> Hole:
     """The hole of the words in force, at no place yet. Raises WordFault if it would begin below its depth."""
     a, b = IN_PLANE[state.normal]
-    axis = state.normal
+    axis, to_level = state.normal, state.to_level or (state.fanuc and not state.retract_given)
     clear = words["R"] + (0.0 if state.absolute else series.level)
     bottom = words["XYZ"[axis]] + (0.0 if state.absolute else clear)
     if bottom > clear:
@@ -182,9 +189,9 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
         (0.0, 0.0),
         bottom,
         clear,
-        retract=series.level if state.to_level and series.level > clear else clear,
-        peck=words.get("Q", 0.0),
-        dwell=words.get("P", state.cycle_dwell),
+        retract=series.level if to_level and series.level > clear else clear,
+        **_infeeds(words, state),
+        dwell=words.get("P", 0.0 if state.motion in FANUC_DWELLS else state.cycle_dwell),
         beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
         counterbore=words.get("IJK"[axis], 0.0) + (0.0 if state.absolute else bottom),
         turning=state.spindle.turning,
@@ -192,20 +199,38 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     )
 
 
-def _repeats(block: Block, hole: Hole) -> int:
+def _infeeds(words: dict[str, float], state: State) -> dict[str, float]:
+    if state.motion == _DEEP and state.fanuc and "I" in words:
+        return {"peck": words["I"], "less": words.get("J", 0.0), "least": words.get("K", 0.0) or words["I"]}
+    peck = words.get("Q", 0.0)
+    return {"peck": peck, "least": peck}
+
+
+def _repeats(state: State, block: Block, hole: Hole) -> int:
     """L. Raises WordFault for more moves than a line may make."""
-    repeats = integer(block, "L", 1) if "L" in block.value else 1
-    pecks = (hole.clear - hole.bottom) / hole.peck if hole.code in PECKING else 0.0
+    count = next((c for c in "LK" if c in block.value and (c == "L" or _counts(state, block))), "")
+    repeats = integer(block, count, 0 if state.fanuc else 1) if count else 1
+    pecks = (hole.clear - hole.bottom) / hole.least if hole.code in PECKING else 0.0
     if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
         wrong = "Q" if pecks else "L"
         raise block.fault(f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {wrong}")
     return repeats
 
 
+def _counts(state: State, block: Block) -> bool:
+    """True if K is how many holes, as Fanuc has it."""
+    return state.fanuc and state.motion != _BACK_BORE and not ("I" in block.value or "J" in block.value)
+
+
 def _say(state: State, block: Block, findings: Findings) -> None:
     name, word = f"G{codes.number(state.motion)}", block.motion_word()
     if not state.retract_given:
-        text = "holes end at R (G99), as LinuxCNC has it; some controls start with G98"
+        at = (
+            "the level before them (G98), as Fanuc and Haas have it"
+            if state.fanuc
+            else "R (G99), as LinuxCNC has it"
+        )
+        text = f"holes end at {at}; some controls start with G9{9 if state.fanuc else 8}"
         findings.assume(f"{name} before any G98 or G99: {text}", block.line, word)
     if state.motion == _BY_HAND:
         text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
@@ -219,10 +244,16 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
     """The words in force. Raises WordFault for one that is missing."""
     code, axis = series.code, "XYZ"[state.normal]
     for letter in f"{axis}RPQIJK":
-        if letter in block.value:
-            series.words[letter] = block.value[letter]
+        if letter not in block.value:
+            continue
+        if not state.fanuc and letter in codes.FANUC_WORDS.get(code, ""):
+            raise block.fault(unused(letter), letter)
+        series.words[letter] = block.value[letter]
+    if state.fanuc:
+        series.words = {"P": 0.0} | series.words
     needed = f"{axis}R" + {870: "IJK"}.get(code, "")
-    needed += "Q" * (code in PECKING) + "P" * (code in DWELLING)
+    own = state.fanuc and code == _DEEP and "I" in series.words  # infeeds of its own
+    needed += "Q" * (code in PECKING and not own) + "P" * (code in DWELLING)
     for letter in needed:
         if letter not in series.words:
             raise block.fault(f"G{codes.number(code)} needs {_meaning(letter)}")

@@ -21,6 +21,7 @@ from planner.nc import codes
 from planner.nc.lexer import Words
 
 _DWELL = 4.0
+_LONG = 100.0  # X or U of a dwell without a point from here on is in ms: in seconds it would be minutes
 _MOTIONS = np.array([code / 10 for code, group in codes.G_GROUP.items() if group in ("motion", "cycle end")])
 _CYCLES = np.array(sorted(codes.CYCLES)) / 10
 # Codes whose line has a P of their own: those of `codes.WORDS` that are no cycles, and calls.
@@ -46,19 +47,25 @@ class DwellWords:
         motion = words.find("G", *_MOTIONS)
         cycle = np.append(self._in_cycle, np.isin(words.value[motion], _CYCLES))
         found = []
-        for word in np.flatnonzero(words.letter == ord("P")).tolist():
+        for word in np.flatnonzero(np.isin(words.letter, list(b"PXU"))).tolist():
             row = words.row(word)
             letter, value = words.of_rows(row)
             in_cycle = cycle[np.searchsorted(motion, words.first[row + 1])]
             other = any(np.isin(value[letter == ord(of)], codes).any() for of, codes in _OTHERS.items())
-            if _DWELL in value[letter == ord("G")] or (in_cycle and not other):
+            dwells = words.letter[word] == ord("P") and in_cycle and not other
+            if _DWELL in value[letter == ord("G")] or dwells:
                 found.append(word)
         self._in_cycle = bool(cycle[-1])
         return found
 
     def in_seconds(self, words: Words) -> Words:
         """The words of a chunk of Fanuc's with dwells in seconds, which numbers with a point are already."""
-        times = [w for w in self.find(words) if words.text(w)[:1] in ("P", "p") and "." not in words.text(w)]
+        texts = ((w, words.text(w).upper()) for w in self.find(words))
+        times = [
+            w
+            for w, text in texts
+            if "." not in text and (text[:1] == "P" or (text[:1] in ("X", "U") and words.value[w] >= _LONG))
+        ]
         if not times:
             return words
         value = words.value.copy()

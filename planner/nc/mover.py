@@ -75,7 +75,7 @@ def switch(
     if "L" in block.value:
         text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
         raise block.fault(text, "L")
-    diameter = _diameter(state, block, code, findings)
+    diameter = 0.0 if state.uncompensated else _diameter(state, block, code, findings)
     if diameter == 0.0:
         return None
     left = (code in _LEFT) == (diameter > 0)
@@ -215,6 +215,9 @@ class Mover:
             threads.cut_thread(state, self.table, block, self.findings)
         elif state.motion in codes.CYCLES:
             auxiliary.check_feed(state, block)
+            if auxiliary.on_surface(state):
+                radius = float(moves.target(state, block)[0] - state.position[0]) + state.programmed()[0]
+                state.feed = auxiliary.surface_feed(state, radius, block.motion_word())
             drilling.drill(state, self.table, block, self.findings)
         elif state.motion in (2, 3):
             self._arc(block)

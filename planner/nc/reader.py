@@ -140,7 +140,7 @@ def execute(
     elif dialect != SIEMENS and not reading.strict:
         interpreter.two_axes = detect.has_two_axes(words)
     interpreter.state.fanuc = (
-        reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.has_further_systems(words)
+        reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.is_fanuc(words, dialect, reading)
     )
     interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
     interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc

@@ -136,6 +136,7 @@ class State:
     # (A,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     actual: FloatArray | None = None
     change_timed: bool = False  # how long a tool change takes is known
+    uncompensated: bool = False  # a profile is read for its passes, which G41 and G42 do not move
     in_thread: bool = False  # the last block was cut in step with the spindle
     strict: bool = False  # nothing is assumed (`Reading.strict`)
     fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds

@@ -3,11 +3,12 @@ have them.
 
 Points are complex numbers, z + i x in radii [mm]. The profile leads from A, where the tool stands, to its
 first point and along lines and arcs. Moved by the finishing allowance w + i u / 2 it is the last pass of
-every cycle; all cycles end at A.
+every cycle; all cycles end at A. Rapid moves at its end only leave it: the last pass makes them.
 
     G71    passes along z at the levels x = C - n d, n = 1, 2 ..., while they lie outside of the profile's first point; C is A moved
            by the allowance. Each runs to where the moved profile crosses its level, leaves by (e, e) at 45
-           degrees and goes back fast
+           degrees and goes back fast. Where x turns back (a pocket, type II) the passes below one level are
+           those of one pocket after the other, each begun along the wall that leads down to it
     G72    the same with x and z exchanged
     G73    the profile itself, n times, moved by the allowance + (i, k) (n - pass) / (n - 1): from the full (i, k) to nothing
 
@@ -21,7 +22,6 @@ import cmath
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 PASSES_MAX = 10_000  # of a cycle: more are a mistake in its depth
@@ -78,45 +78,137 @@ def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: com
 def stock_removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
     """The moves of G71, whose levels are imaginary parts; those of G72 with x and z exchanged. Raises
     ValueError."""
-    _require_one_way(contour)
-    moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
-    first, last = moved[0].end, moved[-1].end
-    top = contour.start + given.allowance
-    height = top.imag - first.imag
-    if not given.depth > 0 or abs(height) / given.depth > PASSES_MAX:
-        raise ValueError(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
-    out = math.copysign(1.0, height)
-    ahead = math.copysign(1.0, last.real - first.real)
+    count = max((k + 1 for k, leg in enumerate(contour.legs) if k and not leg.fast), default=0)
+    if count < 2:
+        raise ValueError("the profile has no move at its feed behind its first one")
+    cut = replace(contour, legs=contour.legs[:count])  # without the rapid moves that leave it
+    removal = _Removal(cut, given)
+    top = removal.top
     yield Leg(top, fast=True)
-    n = 1
-    while (level := top.imag - out * n * given.depth) * out - first.imag * out > SAME:
-        end = _reached(moved, level, out)
-        away = complex(-ahead, out) * given.retract
-        yield Leg(complex(top.real, level), fast=contour.fast)
-        if (end - top.real) * ahead > SAME:
-            yield Leg(complex(end, level))
-            yield Leg(complex(end, level) + away, fast=True)
-            yield Leg(complex(top.real, level + away.imag), fast=True)
-        n += 1
-    yield Leg(complex(top.real, first.imag), fast=contour.fast)
+    yield from removal.below(1, removal.whole)
+    if removal.at.real != top.real:
+        yield Leg(complex(removal.at.real, top.imag), fast=True)
+        yield Leg(top, fast=True)
+    yield Leg(complex(top.real, removal.first.imag), fast=contour.fast)
     yield from _along(contour, given.allowance)
     yield Leg(complex(contour.legs[-1].end.real + given.allowance.real, top.imag), fast=True)
     yield Leg(contour.start, fast=True)
 
 
+def has_pocket(contour: Contour) -> bool:
+    """True if x turns back along a profile."""
+    rises = [leg.end.imag - start.imag for start, leg in _monotone(list(contour.legs)) if not leg.fast]
+    return min(rises, default=0.0) < -SAME and max(rises, default=0.0) > SAME
+
+
+class _Removal:
+    """The passes of G71 above a profile along which z does not turn back.
+
+    top   : C, A moved by the allowance
+    whole : the first and the last z of a pass that nothing stops
+    at    : where the tool is
+    """
+
+    def __init__(self, contour: Contour, given: Roughing):
+        moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
+        self.given, self.fast = given, contour.fast
+        self.first, self.top = moved[0].end, contour.start + given.allowance
+        self.at, self.pieces = self.top, list(_monotone(moved))
+        ends = [self.first, *(leg.end for _, leg in self.pieces)]
+        height = self.top.imag - self.first.imag
+        if abs(height) <= SAME:
+            height = max((self.top.imag - end.imag for end in ends), key=abs)
+        self.out = math.copysign(1.0, height)
+        self.lowest = min(self.out * end.imag for end in ends)
+        self.ahead = math.copysign(1.0, ends[-1].real - self.first.real)
+        if any((leg.end - start).real * self.ahead < -SAME for start, leg in self.pieces):
+            raise ValueError(
+                "z turns back along the profile of G71, or x along that of G72: which passes a control makes is not "
+                "known; write these passes out"
+            )
+        depths = (self.out * self.top.imag - self.lowest) / given.depth if given.depth > 0 else math.inf
+        if depths > PASSES_MAX:
+            raise ValueError(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
+        self.whole = self.top.real, ends[-1].real
+
+    def _level(self, n: int) -> float:
+        return self.top.imag - self.out * n * self.given.depth
+
+    def _go(self, end: complex, *, fast: bool = True) -> Iterator[Leg]:
+        self.at = end
+        yield Leg(end, fast=fast)
+
+    def below(self, n: int, span: tuple[float, float]) -> Iterator[Leg]:
+        """The passes from the level n on that lie below a pass of the level before, a pocket to its ground
+        before the next one."""
+        level = self._level(n)
+        if self.out * level - self.lowest <= SAME:
+            return
+        for begin, end, wall in self._free(n):
+            if (begin - span[0]) * self.ahead < -SAME or (end - span[1]) * self.ahead > SAME:
+                continue
+            yield from self._pass(n, begin, end, wall)
+            yield from self.below(n + 1, (begin, end))
+
+    def _pass(self, n: int, begin: float, end: float, wall: list[Leg]) -> Iterator[Leg]:
+        retract, level = self.given.retract, self._level(n)
+        if wall:  # a pocket: over to its wall, and down along that
+            above = self._level(n - 1)
+            foot = wall[0].end
+            for real in (self.at.real, foot.real):
+                yield from self._go(complex(real, above + self.out * retract))
+            yield from wall
+        else:
+            yield from self._go(complex(begin, level), fast=self.fast)
+        if (end - begin) * self.ahead <= SAME:
+            return
+        back = min(retract, abs(end - begin)) if wall else retract
+        yield from self._go(complex(end, level), fast=False)
+        yield from self._go(self.at + complex(-self.ahead * back, self.out * retract))
+        yield from self._go(complex(begin, level + self.out * retract))
+
+    def _free(self, n: int) -> Iterator[tuple[float, float, list[Leg]]]:
+        """Where the passes at a level begin and end, and the wall that leads down to each from the level
+        before, if that is higher: nothing for a pass that begins beside the part."""
+        level, walls = self._level(n), list[tuple[complex, Leg]]()
+        begin = self.top.real if self.out * (self.first.imag - level) < -SAME else None
+        down: list[Leg] = []
+        for start, leg in self.pieces:
+            low, high = (self.out * (point.imag - level) for point in (start, leg.end))
+            if begin is None and high < -SAME:
+                begin = _crossing(start, leg, level)
+                down = self._wall(
+                    [*walls, (start, replace(leg, end=complex(begin, level)))], self._level(n - 1)
+                )
+            elif begin is not None and high >= -SAME:
+                yield begin, _crossing(start, leg, level), down
+                begin = None
+            walls = [*walls, (start, leg)] if begin is None and high < low else []
+        if begin is not None:
+            yield begin, self.pieces[-1][1].end.real, down
+
+    def _wall(self, pieces: list[tuple[complex, Leg]], above: float) -> list[Leg]:
+        """The way down along pieces of the profile, from where they are below a level."""
+        inside = [(start, leg) for start, leg in pieces if self.out * (leg.end.imag - above) < -SAME]
+        start, leg = inside[0]
+        if self.out * (start.imag - above) > SAME:
+            start = complex(_crossing(start, leg, above), above)
+        return [Leg(start), *(leg for _, leg in inside)]
+
+
+def _monotone(legs: list[Leg]) -> Iterator[tuple[complex, Leg]]:
+    """The legs behind the first one and where they start, arcs in parts along which neither z nor x turns
+    back."""
+    at = legs[0].end
+    for leg in legs[1:]:
+        for end in (*_quadrants(at, leg), leg.end):
+            yield at, replace(leg, end=end)
+            at = end
+
+
 def _along(contour: Contour, by: complex) -> Iterator[Leg]:
     yield replace(contour.legs[0].moved(by), fast=contour.fast)
     yield from (leg.moved(by) for leg in contour.legs[1:])
-
-
-def _reached(legs: list[Leg], level: float, out: float) -> float:
-    """The real part where a profile first reaches a level, behind its first point; else its end."""
-    start = legs[0].end
-    for leg in legs[1:]:
-        if (leg.end.imag - level) * out >= 0.0:
-            return _crossing(start, leg, level)
-        start = leg.end
-    return start.real
 
 
 def _crossing(start: complex, leg: Leg, level: float) -> float:
@@ -132,43 +224,20 @@ def _crossing(start: complex, leg: Leg, level: float) -> float:
     return min(max(min(both, key=lambda v: max(low - v, v - high)), low), high)
 
 
-def _require_one_way(contour: Contour) -> None:
-    """See that neither x nor z turns back along the profile. Raises ValueError."""
-    if len(contour.legs) < 2:
-        raise ValueError("the profile has no move behind its first one")
-    at = contour.legs[0].end
-    ways = {"z": {0.0}, "x": {0.0}}
-    for leg in contour.legs[1:]:
-        for direction in _directions(at, leg):
-            for axis, part in (("z", direction.real), ("x", direction.imag)):
-                if abs(part) > SAME:
-                    ways[axis].add(math.copysign(1.0, part))
-        at = leg.end
-    for axis, found in ways.items():
-        if len(found) > 2:
-            raise ValueError(
-                f"{axis} turns back along the profile: only profiles without pockets (type I) are read; write these passes out"
-            )
-    if len(ways["x"]) < 2 and len(ways["z"]) < 2:
-        raise ValueError("the profile has no move behind its first one")
-
-
-def _directions(start: complex, leg: Leg) -> list[complex]:
-    """Directions of a leg at its ends, and of an arc in the middle of its part of each quadrant."""
+def _quadrants(start: complex, leg: Leg) -> list[complex]:
+    """The points of an arc, between its ends, straight beside, above and below its centre."""
     if not leg.turning:
-        return [leg.end - start]
+        return []
     from_centre = start - leg.centre
     sweep = cmath.phase((leg.end - leg.centre) / from_centre) * leg.turning % (2.0 * math.pi)
-    begin = cmath.phase(from_centre)
-    quarter = math.pi / 2.0
-    cuts = [0.0, sweep]
-    for n in range(-8, 9):
-        turned = (n * quarter - begin) * leg.turning
-        if 0.0 < turned < sweep:
-            cuts.append(turned)
-    cuts.sort()
-    middles = [(a + b) / 2.0 for a, b in pairwise(cuts) if b - a > SAME]
-    return [1j * leg.turning * from_centre * cmath.exp(1j * leg.turning * m) for m in middles]
+    quarter, begin = math.pi / 2.0, cmath.phase(from_centre)
+    turns = sorted((n * quarter - begin) * leg.turning for n in range(-8, 9))
+    within = SAME / abs(from_centre)
+    return [
+        leg.centre + from_centre * cmath.exp(1j * leg.turning * turn)
+        for turn in turns
+        if within < turn < sweep - within
+    ]
 
 
 def facing(cycle: Callable[..., Iterator[Leg]], *given: Any) -> Iterator[Leg]:

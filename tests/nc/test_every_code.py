@@ -77,6 +77,7 @@ G_NOTHING = {
     **dict.fromkeys(
         ["G0", "G1", "G17", "G21", "G40", "G49", "G54", "G80", "G90", "G91.1", "G94", "G99"], IN_FORCE
     ),
+    "G51": "a scale of 1",
     **dict.fromkeys(["G92.1", "G92.2", "G92.3"], "there is no G92 offset to end or to bring back"),
     **dict.fromkeys(["G28.1", "G30.1"], "keeps a position; a later G28 goes there"),
     "G8": "the end of G7, which is not in force",

@@ -97,7 +97,7 @@ def test_events_of_what_is_not_known_are_kept() -> None:
         ("$TPW", "2:1: $"),
         ("G1 X2 E5 F60", "2:7: E5"),
         ("G1 X2 R5 F60", "2:7: R5"),
-        ("G1 X2 F60 ,R5", "2:11: ,: corner roundings"),
+        ("G1 X2 F60 ,Q5", "2:11: ,: corner roundings"),
         ("G28 X1 Y", "2:8: Y"),
     ],
 )

@@ -173,9 +173,8 @@ def test_g73_is_the_profile_again_and_again() -> None:
 @pytest.mark.parametrize(
     ("legs", "said"),
     [
-        ((Leg(2 + 8j), Leg(-5 + 8j), Leg(-5 + 6j), Leg(-9 + 10j)), "x turns back"),
         ((Leg(2 + 8j), Leg(-5 + 8j), Leg(-4 + 10j)), "z turns back"),
-        ((Leg(2 + 8j), Leg(-10 + 8j, 1, -4 + 8j)), "x turns back"),  # a half circle
+        ((Leg(2 + 8j), Leg(-4 + 14j, -1, -4 + 8j)), "z turns back"),  # more than a half circle
         ((Leg(2 + 8j),), "no move"),
     ],
 )

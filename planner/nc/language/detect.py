@@ -93,6 +93,9 @@ LATHE_NOTE = (
 )
 # Codes that call and return, save and restore modes.
 _CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
+# Codes of Fanuc's and Haas' mills that begin something: frames, patterns and pockets; and those that end it.
+_FRAMES = (12, 13, 16, 51, 51.1, 68, 70, 71, 72, 101)
+_FRAME_ENDS = (15, 50, 50.1, 69, 100)
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
 _LINUXCNC = re.compile(
@@ -102,6 +105,10 @@ _FANUC = re.compile(
     r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
     r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
 )
+_FRAME = re.compile(
+    r",[ACR](?=[-+.\d#\[])|G0*(?:16|51(?:\.1)?|68)(?![\d.])|G1[23](?![\d.]).*I|G101(?![\d.]).*[XYZ]|G7[012](?![\d.])(?=.*I)(?=.*L)"
+)
+_ENDS_FRAME = re.compile(r"G0*(?:15|50(?:\.1)?|69|100)(?![\d.])")
 # Signs of lathes, and of others (`_has_signs`).
 _TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
 _SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0
@@ -109,6 +116,7 @@ _RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
 _OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
 _CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
 _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
+_STATEMENTS = (_EITHER, _LINUXCNC, _FANUC)
 _SHOWN = 30  # characters of the text in the note
 _FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
 _LANGUAGE = re.compile(rb"[#\[<=]")
@@ -173,6 +181,8 @@ def may_compute(words: Words) -> list[int]:
     """Rows, ascending, that may be of a language: not split by the lexer, with an O word or a call."""
     found = [np.flatnonzero((words.letter == FAULT) | (words.letter == ord("O")))]
     found += [words.find(letter, *numbers) for letter, numbers in _CALLS.items()]
+    begun = words.find("G", *_FRAMES)
+    found += [begun, *([words.find("G", *_FRAME_ENDS)] if len(begun) else [])]
     return words.rows_with(np.concatenate(found))
 
 
@@ -183,7 +193,12 @@ def bare(text: str) -> str:
 
 def computes(text: str) -> bool:
     """True if a bare line is a statement of a language rather than words."""
-    return bool(_EITHER.search(text) or _LINUXCNC.search(text) or _FANUC.search(text))
+    return any(sign.search(text) for sign in (*_STATEMENTS, _FRAME))
+
+
+def ends_frame(text: str) -> bool:
+    """True if a bare line ends a frame of Fanuc's, which is a statement where frames begin."""
+    return bool(_ENDS_FRAME.search(text))
 
 
 def dialect_of(words: Words, reading: Reading) -> str | None:
@@ -194,16 +209,24 @@ def dialect_of(words: Words, reading: Reading) -> str | None:
         if row > end and found is None:
             return None  # what follows the end of a program that computes nothing is not read
         text = bare(row_text(words, row))
-        if not computes(text):
+        frame = _FRAME.search(text)
+        only = frame is not None and not any(sign.search(text) for sign in _STATEMENTS)
+        if not computes(text) or (only and _not_read(frame, reading)):
             continue
         if reading.dialect != AUTO:
             return reading.dialect
         if _LINUXCNC.search(text):
             return LINUXCNC
-        if _FANUC.search(text):
+        if _FANUC.search(text) or only:
             found = FANUC
         found = found or LINUXCNC
     return found
+
+
+def _not_read(frame: re.Match[str] | None, reading: Reading) -> bool:
+    """True if a frame is a word that RS274NGC has not, or that the user leaves out."""
+    left_out = frame is not None and frame[0].replace("G0", "G") in reading.ignore
+    return left_out or reading.strict or reading.dialect not in (AUTO, FANUC)
 
 
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
@@ -269,9 +292,16 @@ def _has(words: Words, letter: str) -> bool:
     return bool((words.letter == ord(letter)).any())
 
 
-def has_further_systems(words: Words) -> bool:
-    """True if a program with L words has G54.1, which only Fanuc's and Haas' controls know."""
-    return _has(words, "L") and len(words.find("G", 54.1)) > 0
+def is_fanuc(words: Words, dialect: str | None, reading: Reading) -> bool:
+    """True if a program that computes nothing has a mark of Fanuc's and Haas' controls: G54.1 beside L words, or
+    before its first move the number of a program (O1000), which LinuxCNC, grbl and printers do not have."""
+    if _has(words, "L") and len(words.find("G", 54.1)) > 0:
+        return True
+    if dialect is not None or reading.dialect != AUTO or reading.strict:
+        return False
+    numbers = np.flatnonzero((words.letter == ord("O")) & (words.value >= 0.0))
+    moves = np.flatnonzero(np.isin(words.letter, list(b"XYZ")))
+    return len(numbers) > 0 and (not len(moves) or bool(numbers[0] < moves[0]))
 
 
 def row_text(words: Words, row: int) -> str:

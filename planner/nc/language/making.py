@@ -17,6 +17,7 @@ from planner.nc.language.tree import ZERO, MadeRows, SourcePlace, made
 
 ASSUMED = {
     "acceleration": "BRISK and DRIVE are not followed: acceleration and jerk are those of the machine file",
+    "drilling level": "R of a lathe's drilling cycle is a place, as Haas has it (Fanuc counts it from where the tool stands)",
     "corner feed": "G621, slower feeds at corners, is not followed",
     "machine code": "an M code that the machine's builder defines is assumed not to move anything",
     "orientation": "the angles of rotary axes change evenly on a block (ORIAXES), not as the tool's direction turns",

@@ -14,18 +14,18 @@ from planner.nc.arcs import IN_PLANE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import Approach
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
+from planner.nc.language.places import CYCLES, Places
 from planner.nc.language.travel_rows import (
     AXES,
     CENTRES,
     RADIUS,
     ROTARY,
     TURNS,
-    Coordinates,
     G,
     M,
     Move,
     TravelRow,
-    tilted_rows,
+    rows_from,
     travel_rows_of,
     words_of,
 )
@@ -38,29 +38,40 @@ _PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
 _ENDS = (2.0, 30.0)
 _SWITCHES = (*TOOL_POINT_ON, *TOOL_POINT_OFF)  # M codes behind which x, y, z are others
 # G codes behind which the position is asked of the interpreter.
-_PLACING = frozenset(
-    (10.0, 43.0, 43.1, 43.2, 49.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3)
-)
+_PLACING = frozenset((10.0, 28.0, 30.0, 43.0, 43.1, 43.2, 49.0, 52.0, 53.0, 59.1, 59.2, 59.3, *range(54, 60)))
+_HOMES = frozenset((28.0, 30.0))
+_SIDES = {41.0: 42.0, 42.0: 41.0, 41.1: 42.1, 42.1: 41.1}  # of compensation, in a mirror image
 # G codes that leave the position and the coordinates as they are.
-_NEUTRAL = frozenset((4.0, 40.0, 61.0, 61.1, 64.0, 80.0, 91.1, 93.0, 94.0, 95.0, 96.0, 97.0))
+_NEUTRAL = frozenset(
+    (
+        4.0,
+        40.0,
+        41.0,
+        42.0,
+        41.1,
+        42.1,
+        61.0,
+        61.1,
+        64.0,
+        80.0,
+        91.1,
+        *(float(code) for code in range(93, 100)),
+    )
+)
 
 
-class RowsThrough(Coordinates):
+class RowsThrough(Places):
     """The frame and the compensation in force.
 
-    active : rows are looked at
-    place  : (3,) the programmed position [mm], while active
+    active : rows are looked at; `place`, `absolute` and `motion`, the motion code, hold while they are
     moves  : how many moves have been taken
-    absolute, motion : G90 is in force, and the motion code, while active
     last   : the last move in the plane since rows are looked at, or None
     lost   : an approach or departure came behind it: its direction is not that of the path
     """
 
     def __init__(self, interpreter: Interpreter):
-        super().__init__()
-        self.interpreter = interpreter
+        super().__init__(interpreter)
         self.active = False
-        self.place = np.zeros(3)
         self.moves = 0
         self._mapped = np.zeros(3)  # `place` in the work system
         self._beside = False  # the tool is not at `place`: compensation has just ended
@@ -69,19 +80,11 @@ class RowsThrough(Coordinates):
         self._coming: CornerMove | None = None  # of the next move
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[TravelRow] = []  # rows without a move behind it
-        self.absolute, self.motion = True, 0
+        self.motion = 0
         self.last: Move | None = None
         self.lost = False
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
-        # the tilted plane in force, and with it frames that tilt; where rows have come to in it
-        self.swivelled = self._tilt = np.eye(3), np.zeros(3)
-        self._flat = np.zeros(3)
         self.waiting = False  # for a move of the rotary axes, behind which the tool centre point is on
-
-    @property
-    def tilted(self) -> bool:
-        """True if a plane is tilted or moved beside the frame."""
-        return bool(self._tilt[1].any() or (self._tilt[0] != np.eye(3)).any())
 
     @property
     def compensated(self) -> bool:
@@ -95,24 +98,24 @@ class RowsThrough(Coordinates):
             yield words
             return
         out = self._taken()
-        if self._idle():
-            out += self._restored(words)
-            if out:
-                yield self._words(out, words)
-            self.active = self.lost = False
-            yield words
-            return
-        for one in travel_rows_of(words):
-            try:
-                foreign = self._take(one, out)
-            except ProgramFault:
-                raise
-            except ValueError as fault:
-                raise self._fault(one, str(fault)) from fault
-            if foreign:
-                yield self._words(out, words)
-                out = []
-                self._look()
+        for row, one in enumerate(travel_rows_of(words)):
+            if self._idle():
+                rest = rows_from(words, row)
+                out += self._restored(rest)
+                if out:
+                    yield self._words(out, words)
+                self.active = self.lost = False
+                yield rest
+                return
+            for part in self._parts(one):
+                try:
+                    foreign = self._take(part, out)
+                except ValueError as fault:
+                    raise self._fault(one, str(fault)) from fault
+                if foreign:
+                    yield self._words(out, words)
+                    out = []
+                    self._look()
         if out:
             yield self._words(out, words)
 
@@ -127,16 +130,6 @@ class RowsThrough(Coordinates):
 
     def _words(self, rows: list[TravelRow], words: Words) -> Words:
         return words_of(self._through_tilt(rows), words.data, words.files)
-
-    def _through_tilt(self, rows: list[TravelRow]) -> list[TravelRow]:
-        """Rows of the tilted plane in the work system."""
-        if not self.tilted:
-            return rows
-        out: list[TravelRow] = []
-        for row in rows:
-            moves, self._flat = tilted_rows(row, self._flat, self._tilt, self._unit, self.normal)
-            out += moves
-        return out
 
     def _taken(self) -> list[TravelRow]:
         out, self._ahead = self._ahead, []
@@ -153,7 +146,9 @@ class RowsThrough(Coordinates):
         for code in codes & {90.0, 91.0}:
             self.absolute = code == 90.0
         for code in codes & {0.0, 1.0, 2.0, 3.0}:
-            self.motion = int(code)
+            self.motion, self._level = int(code), None
+        if 80.0 in others:
+            self._level = None
         for code in others & _PLANES.keys():
             if _PLANES[code] != self.normal:
                 if self.compensated:
@@ -165,6 +160,12 @@ class RowsThrough(Coordinates):
         moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
         distance = [(G, 90.0), (G, 91.0)]
         words = [word for word in row.words if word[:2] not in distance]
+        if self.mirrored:
+            words = [(c, _SIDES.get(v, v) if c == G else v, at) for c, v, at in words]
+        if others & CYCLES or (self._level is not None and moved):
+            self._no_corner(out)
+            self._hole(TravelRow(words, row.line, row.frame), others & CYCLES, out)
+            return True
         foreign = others - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
         ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
@@ -173,6 +174,8 @@ class RowsThrough(Coordinates):
         if (foreign or changes) and self.compensated:
             what = "a tool change" if changes else f"G{min(foreign):g}"
             raise ValueError(f"{what} while cutter radius compensation is on; switch it off before (R0, G40)")
+        if foreign & _HOMES:
+            words = self._through(words)
         if foreign - _PLACING:
             raise ValueError(f"G{min(foreign - _PLACING):g} while a frame is in force is not read")
         if foreign:
@@ -213,20 +216,16 @@ class RowsThrough(Coordinates):
         out += [self._in_units(one) for one in self._offset.pass_row(row)]
 
     def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
-        given = {
-            letter: value * (1.0 if letter == TURNS else self._unit)
-            for letter, value, _ in row.words
-            if letter != G
-        }
-        target = self.place.copy()
-        for axis, letter in enumerate(AXES):
-            if letter in given:
-                target[axis] = given[letter] + (0.0 if self.absolute else self.place[axis])
+        if self.motion < 0:
+            raise ValueError(
+                "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
+            )
+        given = self._lengths(row.words)
+        target = self._target(given)
         mapped, arc = self.mapped(target), None
         if self.motion in (2, 3):
             arc = self.arc(self.place, target, given, self.motion == 2, self._unit)
-        named = [b for b in range(3) if AXES[b] in given]
-        axes = [a for a in range(3) if (self.matrix[a, named] != 0.0).any()]
+        axes = self._moved(given)
         if arc is not None or (self._beside and set(axes) & set(IN_PLANE[self.normal])):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):
@@ -282,17 +281,14 @@ class RowsThrough(Coordinates):
             self._pass(row, rows, last=False)
         (self._ahead if out is None else out).extend(rows)
 
-    @property
-    def _unit(self) -> float:
-        return self.interpreter.state.unit
-
     def _begin(self) -> None:
         if self.active:
             return
         state = self.interpreter.state
         self.active, self.absolute, self.normal = True, state.absolute, state.normal
         self.last = None
-        self.motion = max(state.motion, 0) if state.motion <= 3 else 0
+        self.motion = max(state.motion, -1 if state.fanuc else 0) if state.motion <= 3 else 0
+        self._level = None if state.series is None else state.series.level * state.unit
         if state.absolute_centre:
             raise ValueError("frames and compensation with absolute arc centres are not read")
         self._look()
@@ -305,6 +301,12 @@ class RowsThrough(Coordinates):
         self._flat = self._mapped.copy()
         self.place = self.unmapped(self._mapped)
         self._beside = False
+
+    def look_again(self) -> None:
+        """The interpreter is elsewhere than the rows so far have led to. Raises ValueError for a corner."""
+        self._no_corner()
+        if self.active:
+            self._look()
 
     def _leave(self) -> None:
         """Compensation ends: its moves come, and the next move in the plane leads to its programmed end."""
@@ -328,11 +330,3 @@ class RowsThrough(Coordinates):
         if self.motion in (0, 1) and self.motion != self.interpreter.state.motion:
             codes.append(float(self.motion))
         return [TravelRow([(G, code, at)], line, frame) for code in codes]
-
-    def _in_units(self, row: TravelRow) -> TravelRow:
-        if self._unit == 1.0:
-            return row
-        lengths = {*AXES, *CENTRES}
-        return TravelRow(
-            [(c, v / self._unit if c in lengths else v, at) for c, v, at in row.words], row.line, row.frame
-        )

@@ -149,6 +149,9 @@ class LineReader(TokenReader):
                 at = self.column()
                 self.tokens[self.next :] = [Token("letter", self.peek()[0], at), *self.split(at + 1)]
             at, letter = self.column(), self.peek()
+            if letter == "," and self.peek(1) in self.language.behind_commas:  # a rounding, chamfer or angle
+                self.pop()
+                letter, kind = "," + self.peek(), "letter"
             if letter == "#":
                 target = self.parameter()
                 self.expect("=", "the parameter")
@@ -156,7 +159,9 @@ class LineReader(TokenReader):
             elif kind in ("letter", "name"):
                 self.pop()
                 value = self.value()
-                is_length = ord(letter) in LENGTHS and "." not in self.text[at : self.column()]
+                is_length = (
+                    ord(letter[-1]) in LENGTHS and letter != ",A" and "." not in self.text[at : self.column()]
+                )
                 if scale != 1.0 and is_length and isinstance(value, tree.Number):
                     value = tree.Number(value.value * scale)
                 words.append(tree.Word(letter, self.line.start + self.place(at), value))

@@ -55,7 +55,9 @@ class SystemVariables:
 
     def here(self, axis: int) -> float:
         """The position in the program's coordinates and unit."""
-        state = self.interpreter.state
+        state, travel = self.interpreter.state, self.travel
+        if travel is not None and travel.active and axis < 3:
+            return float(travel.place[axis]) / state.unit
         return float(state.programmed()[axis] / state.unit) if axis < 3 else 0.0
 
     def machine(self, axis: int) -> float:
@@ -207,8 +209,6 @@ class PositionVariables(SystemVariables):
         if axis >= 3:
             state, letter = self.interpreter.state, "ABC"[axis - 3]
             return float(state.programmed()[state.letters.index(letter)]) if letter in state.letters else 0.0
-        if self.travel is not None and self.travel.active:
-            return float(self.travel.place[axis]) / self.interpreter.state.unit
         return self.here(axis)
 
 

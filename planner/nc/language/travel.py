@@ -53,6 +53,12 @@ class Travel(RowsThrough):
         self.swivelled, self.waiting = (matrix, shift), waiting
         self.set_frame(np.eye(3), np.zeros(3))
 
+    def set_polar(self, pole: complex | None) -> None:
+        """Coordinates are a radius and an angle about a pole in the plane [mm] from now on; None ends it."""
+        if pole is not None:
+            self._begin()
+        self.polar = pole
+
     def compensate(self, side: int, assume: Callable[[str], None]) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what
         is assumed. Raises ValueError."""

@@ -4,7 +4,7 @@ these and their arcs."""
 import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,6 +58,20 @@ def words_of(rows: Sequence[TravelRow], data: bytes, files: tuple[tuple[int, str
         data=data,
         frame=np.array([row.frame for row in rows], dtype=np.int32),
         files=files,
+    )
+
+
+def rows_from(words: Words, row: int) -> Words:
+    """The words without those of the rows before `row`."""
+    first = int(words.first[row])
+    return replace(
+        words,
+        letter=words.letter[first:],
+        value=words.value[first:],
+        at=words.at[first:],
+        line=words.line[row:],
+        first=words.first[row:] - first,
+        frame=words.frame[row:],
     )
 
 
@@ -179,13 +193,17 @@ def travel_rows_of(words: Words) -> Iterator[TravelRow]:
 
 @dataclass
 class FrameParts:
-    """Heidenhain's: datum, mirror (1 or -1), rotation [degrees], scale and its centre; all (3,) [mm]."""
+    """Heidenhain's: datum, mirror (1 or -1), rotation [degrees], scale and its centre; all (3,) [mm].
+    Fanuc's have centres of the mirror image and of the rotation, and the axis of the latter, too."""
 
     datum: FloatArray = field(default_factory=lambda: np.zeros(3))
     mirror: FloatArray = field(default_factory=lambda: np.ones(3))
     rotation: float = 0.0
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     centre: FloatArray = field(default_factory=lambda: np.zeros(3))
+    mirrored_at: FloatArray = field(default_factory=lambda: np.zeros(3))
+    about: FloatArray = field(default_factory=lambda: np.zeros(3))
+    normal: int = 2
 
     def affine(self) -> tuple[FloatArray, FloatArray]:
         """Matrix (3, 3) and shift (3,). Raises ValueError for what depends on an order that is not known."""
@@ -217,6 +235,7 @@ class Coordinates:
     programmed    : the frame as the program has it; a shift alone is a G52 and not in `matrix` and `shift`
     parts         : of a conversational program's frame
     normal        : axis normal to the plane
+    polar         : pole in the plane about which coordinates are a radius and an angle (G16), or None
     """
 
     def __init__(self) -> None:
@@ -224,11 +243,12 @@ class Coordinates:
         self.programmed = np.eye(3), np.zeros(3)
         self.parts = FrameParts()
         self.normal = 2
+        self.polar: complex | None = None
 
     @property
     def is_plain(self) -> bool:
         """True if the program's points are those of the work system."""
-        return not self.shift.any() and bool((self.matrix == np.eye(3)).all())
+        return self.polar is None and not self.shift.any() and bool((self.matrix == np.eye(3)).all())
 
     @property
     def mirrored(self) -> bool:

@@ -306,6 +306,7 @@ class Language:
     meant: Mapping[str, str] = field(default_factory=dict)
     long_values: bool = False  # an assignment takes an expression without brackets
     keywords: frozenset[str] = frozenset()  # that statements begin with, or have in them
+    behind_commas: frozenset[str] = frozenset()  # letters of words that begin with a comma
     constants: Mapping[str, float] = field(default_factory=dict)  # names of numbers
 
 

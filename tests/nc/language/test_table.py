@@ -117,6 +117,17 @@ READ: dict[str, list[tuple[str, dict]]] = {
         (FIRST + "G1 X0 F600\nG6.2 P4 K0 X0 Y0\nK0 X5 Y9\nK0 X9 Y9\nK0 X15 Y0\nK1\nK1\nK1\nK1", MILL)
     ],
     "lathe: G7 G8": [("G21 G18 G7 G0 X9 Y0 Z0\nG1 X5 F600\nG8 X9", MILL)],
+    "lathe: drilling": [(TURN + "G83 Z-20. Q3000 F0.1\nG80", LATHE)],
+    "G68 G69": [
+        (
+            "O1\n"
+            + FIRST
+            + "G68 X1. Y2. R30.\nG1 X5. F600\nG69\nG51 X0 P2000\nX9.\nG50\nG51.1 X0\nX8.\nG50.1\nG16 X9. Y30.\nG15",
+            MILL,
+        )
+    ],
+    "G12 G13": [("O1\n" + FIRST + "G13 I5. Z-1. F600\nG81 X0 Z-2. R1. L0\nG70 I9. L4", MILL)],
+    "`,R`, `,C`": [("O1\n" + FIRST + "G1 X9. F600 ,R2.\nY9. ,C1.\nX0\nY5. ,A30.", MILL)],
     "lathe: U W": [
         (
             TURN + "G1 X40.\nU2. W-3.\nG98 F200 X30.\nG50 S3000\nG96 S150\nT0203\nG97 S300\nG32 Z-20. F1.5",
@@ -141,7 +152,7 @@ REFUSED: dict[str, list[tuple[str, dict]]] = {
         (FIRST + "G1 X#<_ini[A]B> F600", MILL),
     ],
     "state of the control": [(FIRST + "#5420=1\nG1 X5 F600", MILL)],
-    "lathe: drilling": [(TURN + "G83 Z-20. Q3000 F0.1", LATHE)],
+    "lathe: G12.1, G87": [(TURN + "G12.1\nG1 X20. C5.", LATHE), (TURN + "G87 Z-20. Q3000 F0.1", LATHE)],
     "G43.4, M428": [(FIRST + "G43.4 H1\nG1 X5 A3 F600\nG49", MILL)],
     "G38.2 to G38.5": [(FIRST + "G38.2 Z-5 F60", MILL), (FIRST + "M66 P0 L3 Q5\nG1 X5 F600", MILL)],
 }

@@ -27,6 +27,7 @@ LANGUAGE = Language(
     functions=names("ABS ACOS ADP ASIN ATAN BCD BIN COS EXP FIX FUP LN ROUND SIN SQR SQRT TAN"),
     keywords=names("IF THEN WHILE GOTO DO END POPEN PCLOS DPRNT BPRNT"),
     long_values=True,
+    behind_commas=frozenset("ACR"),
     conditions=COMPARISONS,
     locals=LOCALS,
     largest=9999,

@@ -20,7 +20,7 @@ _CALL = re.compile(r"G7[0-3](?![\d.]).*?P(\d+).*?Q(\d+)|G7[0-3](?![\d.]).*?Q(\d+
 _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
 _AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
 # Words of cycles that are in least increments where they have no point; of others D is.
-_INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK"}
+_INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK", "G83": "Q"}
 # The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
 _INCREMENT = tree.Number(1e-4) + (tree.Numbered(tree.Number(4006.0)) - tree.Number(20.0)) * tree.Number(
     1e-3 - 1e-4

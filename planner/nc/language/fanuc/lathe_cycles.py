@@ -15,6 +15,8 @@ import numpy as np
 from planner.nc import lathe_cuts, turning
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Notes
+from planner.nc.language.fanuc.lathe_words import PECKS
+from planner.nc.language.makers import MAKERS
 from planner.nc.language.making import Maker, Making, Row
 from planner.nc.language.run import ProgramRun
 from planner.nc.language.tree import SourcePlace
@@ -37,7 +39,7 @@ class LatheCycles:
         self._start = np.zeros(3)
         self._aside: tuple[State, BlockTable, Callable[[Words], None]] | None = None
         self._place = SourcePlace(0, 0, 0)  # of the cycle whose profile is read
-        run.makers, run.leave_profile = self._makers(), self.leave
+        run.makers, run.leave_profile = {**MAKERS, **self._makers()}, self.leave
 
     def _makers(self) -> dict[str, Maker]:
         return {
@@ -69,7 +71,7 @@ class LatheCycles:
         interpreter.go_on_with(state, BlockTable(len(state.letters)))
         self.run.tee = lambda words: None
         # any feed does: moves whose feed depends on the diameter are divided
-        state.feed_mode, state.feed = "per minute", 1.0
+        state.feed_mode, state.feed, state.uncompensated = "per minute", 1.0, True
 
     def leave(self) -> SourcePlace | None:
         """Take back what a profile without an end set aside; returns where its cycle stands, or None."""
@@ -77,6 +79,7 @@ class LatheCycles:
             return None
         state, table, self.run.tee = self._aside
         self.run.interpreter.go_on_with(state, table)
+        self.run.travel.look_again()
         self._aside = None
         return self._place
 
@@ -101,6 +104,9 @@ class LatheCycles:
             allowance=self._allowance(given),
             more=complex(given.get("K", 0.0), given.get("I", 0.0)) * unit,
         )
+        if turning.has_pocket(turning.exchanged(contour) if cycle == "G72" else contour):
+            text = f"{cycle} with a pocket in its profile (type II): the order of its passes is this reader's"
+            making.interpreter.findings.assume(text, making.place.line)
         if cycle == "G72":
             return self._rows(turning.facing(turning.stock_removal, contour, roughing))
         return self._rows(turning.stock_removal(contour, roughing))
@@ -108,9 +114,10 @@ class LatheCycles:
     def _retract(self, making: Making, given: Given, cycle: str) -> float:
         if "R" in given:
             return abs(given["R"]) * self._unit
-        text = f"the retract of {cycle} is not given: {RETRACT:g} mm"
+        retract = min(RETRACT, self._unit * abs(given.get("K", math.inf) if cycle in PECKS else math.inf))
+        text = f"the retract of {cycle} is not given: {retract:g} mm"
         making.interpreter.findings.assume(text, making.place.line)
-        return RETRACT
+        return retract
 
     def _pattern(self, making: Making, given: Given) -> Iterable[Row]:
         contour = self._contour()
@@ -227,9 +234,9 @@ def _contour_of(program: Program, offset: np.ndarray, start: complex) -> turning
             middle = complex(centre[2] - offset[2], centre[0] - offset[0])
             legs.append(Leg(point, 1 if sweep > 0 else -1, middle))
         else:
-            legs.append(Leg(point))
+            legs.append(Leg(point, fast=kind == Kind.RAPID))
     if not legs:
         raise ValueError("the profile of the cycle has no moves")
     if legs[0].turning:
         raise ValueError("the first move of a profile is straight: G0 or G1 to its first point")
-    return turning.Contour(start, int(program.kind[0]) == Kind.RAPID, tuple(legs))
+    return turning.Contour(start, legs[0].fast, tuple(legs))

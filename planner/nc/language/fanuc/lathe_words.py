@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 from planner.nc.language import tree
 from planner.nc.language.fanuc.parser import FanucParser
+from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.system_variables import FanucVariables
 
@@ -17,13 +18,23 @@ CYCLES = ("G70", "G71", "G72", "G73", "G76")
 # Parameters that hold the end of the last block.
 X_HERE, Z_HERE = tree.Numbered(tree.Number(5001.0)), tree.Numbered(tree.Number(5002.0))
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
-# Codes that are not read, and why.
-_REFUSED = {**dict.fromkeys((f"G{n}" for n in range(81, 90)), "drilling cycles of lathes are")}
+# Drilling cycles along z, and which they are on mills.
+DRILLS = {f"G{n}": float(n) for n in (81, 82, 83, 84, 85, 86, 89)} | {"G184": 74.0}
+_TURNING = {"G84": 3.0, "G184": 4.0}  # the spindle, which these cycles start themselves
+# Codes that are not read, and what they are.
+_LIVE = "turns or drills with a driven tool, for which the spindle is an axis"
+_REFUSED = {
+    **dict.fromkeys(("G12.1", "G112", "G7.1", "G107"), "milling in x and the spindle's angle, which is no axis here,"),
+    **dict.fromkeys(("G87", "G88"), "a cycle that drills from the side (Fanuc), or ends in a retract by hand (Haas),"),
+    **dict.fromkeys(("G95", "G186", "G195", "G196", *(f"G{n}" for n in range(241, 250))), f"a cycle that {_LIVE}"),
+    **dict.fromkeys(("G68", "G51.2", "G14", "G68.1"), "a second turret or spindle, or a part turned as a polygon,"),
+    "G34": "a thread whose lead grows",
+}  # fmt: skip
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")
 # Codes behind which a cut is not repeated: other motions and cycles.
 _MOTIONS = {
-    *(f"G{n}" for n in (0, 1, 2, 3, 32, 33, 34, *range(70, 77), *range(80, 90))),
+    *(f"G{n}" for n in (0, 1, 2, 3, 32, 33, 34, *range(70, 77), *range(80, 90), 184)),
     *(f"G0{n}" for n in range(4)),
 }
 # Codes whose coordinates are their own.
@@ -52,6 +63,11 @@ class LatheWords(FanucParser):
         self.tool = -1
         self.cut = ""  # G90, G92 or G94 while it is in force
         self.cut_given: set[str] = set()  # its words so far
+        self.drill = ""  # the drilling cycle in force
+        self.feeding = False  # G1 is in force
+        rapids = source.words.rows_with(source.words.find("G", 0.0, 28.0))
+        # C is an axis, not a chamfer
+        self.turns_c = any(ord("C") in source.words.of_rows(row)[0] for row in rapids)
         self.retract: dict[str, tree.Expression] = {}  # R of the first blocks of G74 and G75
 
     def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
@@ -60,11 +76,17 @@ class LatheWords(FanucParser):
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = {word.code for word in words}
         for code in sorted(codes & set(_REFUSED)):
-            raise line.fault(f"{_REFUSED[code]} not read; write the moves out")
+            raise line.fault(
+                f"{code}, {_REFUSED[code]} is not read; write the moves out in X and Z, or leave this part out"
+            )
         given = {word.letter: word.value for word in words if word.letter not in "GM"}
         self.feed = given.get("F", self.feed)
-        if self._single(words, codes, line):
+        if self._single(words, codes, line) or self._drilling(words, codes, line):
             return
+        if codes & {"G0", "G00", "G1", "G01", "G2", "G02", "G3", "G03"} or "G32" in codes:
+            self.feeding = bool(codes & {"G1", "G01"})
+        if self.feeding and not codes & _OWN_COORDINATES:
+            words = self._corner_words(words)
         cycle = next((code for code in CYCLES if code in codes), "")
         if cycle:
             self._cycle(cycle, words, line)
@@ -79,6 +101,49 @@ class LatheWords(FanucParser):
         words = tuple(changed for word in words if (changed := self._changed(word, line)) is not None)
         super()._words(self._threads(words, codes), assignments, line)
 
+    def _corner_words(self, words: tree.Words) -> tree.Words:
+        """C, R, A and a lone I or K of a G1 as ,C ,R and ,A: a chamfer, a rounding and an angle."""
+        meant = {"R": ",R", "A": ",A", "I": ",C", "K": ",C"} | ({} if self.turns_c else {"C": ",C"})
+        changed = tuple(word._replace(letter=meant.get(word.letter, word.letter)) for word in words)
+        return tuple(
+            word._replace(value=tree.op("ABS", word.value)) if old.letter in "IK" else word
+            for word, old in zip(changed, words, strict=True)
+        )
+
+    across, axes, of_diameter = ("Z", "X"), "XZY", 2.0
+
+    def _drilling(self, words: tree.Words, codes: set[str], line: SourceLine) -> bool:
+        """Read a line with a drilling cycle, or one more hole of it; False if it is none. They lie along z, as
+        in G17, and end where they began (G98)."""
+        named = next((code for code in DRILLS if code in codes), "")
+        if codes & (_MOTIONS - DRILLS.keys()):
+            self.drill = ""
+        if not named and (
+            not self.drill or codes & _OWN_COORDINATES or not {w.letter for w in words} & set(_PLACE)
+        ):
+            return False
+        self.drill = named or self.drill
+        own = {word.letter: word for word in words if word.letter in _PLACE + "RQPKL"}
+        self._rest(tuple(word for word in words if word.code != named), set(own), line)
+        given = {letter: self._length(word, "G83", line) for letter, word in own.items()}
+        level = given.get("R", Z_HERE)
+        if "W" in given:
+            given["Z"] = level + given.pop("W")
+        values = absolute(given) | ({"R": level} if named or "R" in given else {})
+        turning = [("M", _TURNING[self.drill])] if self.drill in _TURNING and named else []
+        at = {letter: word.at for letter, word in own.items()}
+        start = [
+            tree.word(letter, line.place.at, value) for letter, value in (("G", 17.0), ("G", 98.0), *turning)
+        ]
+        cycle = tree.word("G", line.place.at, DRILLS[self.drill])
+        holes = (
+            tree.Word("L" if c == "K" else c, at.get(c, line.place.at), value) for c, value in values.items()
+        )
+        if "R" in own:
+            self.body.append(assumed_row(line.place, "drilling level"))
+        self.body += [tree.Line(line.place, (*start, cycle, *holes)), tree.row(line.place, ("G", 18.0))]
+        return True
+
     def _changed(self, word: tree.Word, line: SourceLine) -> tree.Word | None:
         """The word as LinuxCNC's lathes have it; None for one that says nothing."""
         letter, code = word.letter, word.code
@@ -87,7 +152,9 @@ class LatheWords(FanucParser):
             return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
             if word.value != tree.Number(0.0):
-                raise line.fault("H moves the axis C, which is not planned; X and Z are", word.at)
+                raise line.fault(
+                    "H turns the spindle as the axis C, which is not planned; X and Z are", word.at
+                )
             return None
         if code in ("G98", "G99"):
             return word._replace(value=tree.Number(94.0 if code == "G98" else 95.0))

@@ -9,15 +9,18 @@ no brackets. AND binds as * does, OR and XOR as + does.
 import re
 
 from planner.nc.language import tree
-from planner.nc.language.fanuc import calls
+from planner.nc.language.corner_moves import KINDS
+from planner.nc.language.fanuc import calls, frames
 from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
-from planner.nc.language.run import Dialect
+from planner.nc.language.makers import MAKERS
+from planner.nc.language.run import Dialect, ProgramRun
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
 
 _PROGRAM = re.compile(r"[O:](\d+)")
 _GOTO = re.compile(r"GOTO(\d+)?")
+_BEFORE = ("G17", "G18", "G19", "G90", "G91")
 _STOP = 3006.0  # parameter: stop with a message
 _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
@@ -167,10 +170,59 @@ class FanucParser(FanucControl):
             if target == tree.Numbered(tree.Number(0.0)):
                 raise line.fault("#0 has no value and cannot be given one")
         assignments = tuple(pair for pair in assignments if pair[0] != tree.Numbered(tree.Number(_STOP)))
+        words = self._frames(words, line)
+        before, words = self._corner(words, line)
+        self.body += before
         if words or assignments:
             self.body.append(tree.Line(line.place, words, assignments))
         if self.modal is not None and any(word.letter in "XYZ" for word in words):
             self.body.append(self.modal)
+
+    def _frames(self, words: tree.Words, line: SourceLine) -> tree.Words:
+        """Codes that set a frame or make a pattern, behind or before the rest of their line, which is left."""
+        behind: list[tree.Statement] = []
+        for code in [word.code for word in words if word.code in frames.WORDS]:
+            if code in frames.PATTERNS and not {"I", "L"} <= {word.letter for word in words}:
+                continue
+            made, words = frames.statements(code, words, line)
+            if frames.WORDS[code] or code == "G16":
+                behind += made
+            else:
+                self.body += made
+        if behind:  # planes and G90, G91 hold for the frame; polar coordinates of the line for what it moves
+            first = tuple(word for word in words if word.code in _BEFORE or code != "G16")
+            words = tuple(word for word in words if word not in first)
+            self.body += [tree.Line(line.place, first)] if first else []
+        self.body += behind
+        return words
+
+    def _corner(self, words: tree.Words, line: SourceLine) -> tuple[list[tree.Statement], tree.Words]:
+        """,R and ,C, a rounding or chamfer at the end of the move, and ,A, its angle to the first axis."""
+        given = {word.letter: word.value for word in words}
+        before: list[tree.Statement] = []
+        for letter, kind in ((",R", "RND"), (",C", "CHR")):
+            if letter in given:
+                before.append(tree.made(line.place, "corner", kind=KINDS.index(kind), size=given[letter]))
+        if ",A" in given:
+            words = (*words, self._at_angle(given, line))
+        return before, tuple(word for word in words if word.letter[0] != ",")
+
+    across = ("X", "Y")  # the axes of the plane that ,A is an angle in
+    of_diameter = 1.0  # words of the axis beside the angle per its length
+
+    def _at_angle(self, given: dict[str, tree.Expression], line: SourceLine) -> tree.Word:
+        """The coordinate that a move at an angle has not. Raises ProgramFault for two or none."""
+        first, second = self.across
+        if (first in given) == (second in given):
+            text = f",A needs one of {first} and {second}; a move whose end follows from the next line is not read"
+            raise line.fault(text)
+        here = {c: tree.Numbered(tree.Number(5001.0 + k)) for k, c in enumerate(self.axes)}
+        slope = tree.op("TAN", given[",A"]) * tree.Number(self.of_diameter)
+        if first in given:
+            return tree.Word(second, line.place.at, here[second] + (given[first] - here[first]) * slope)
+        return tree.Word(first, line.place.at, here[first] + (given[second] - here[second]) / slope)
+
+    axes = "XYZ"  # of #5001, #5002 ...
 
     def _call(self, code: str, words: tree.Words, line: SourceLine) -> None:
         program = self.procedures[-1]
@@ -212,4 +264,8 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
     return frozenset(used)
 
 
-DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files)
+def _set_up(run: ProgramRun) -> None:
+    run.makers = {**MAKERS, **frames.MAKERS}
+
+
+DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files, _set_up)

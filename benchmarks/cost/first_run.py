@@ -1,14 +1,11 @@
-"""What the first run on a machine takes: a ten-line program with no kernel compiled yet.
+"""What the installation, the first run and the next ones take, and what becomes of kernels on the disk that are changed, damaged or not
+to be trusted, in four ways to compile and keep them:
 
-    python -m benchmarks.cost.first_run [--methods optimal,second-order,...] [--ways ...]     into results/first-run.json and .md
+    python -m benchmarks.cost.first_run [--ways planner,numba,lean,files]     into results/first-run.json and .md
 
-Every run is `planner plan` in a new process with an empty NUMBA_CACHE_DIR, in one of two ways:
-
-    numba       every kernel as numba compiles it by itself
-    planner     as planner/base/compiling.py has it: what a user gets
-
-CPU seconds are those of all its processes. Kernels are counted by what lies in the cache afterwards: a kernel for arguments of two
-kinds counts twice.
+`planner` is planner/base/compiling.py and kernel_files.py: what a user gets. The others are in numba_cache.py. Each begins with an empty
+NUMBA_CACHE_DIR, which setup.py's two programs fill side by side (planner/commands/ahead.py); then come a first run of the bracket and
+next ones, on one thread. CPU seconds are those of all processes. Faults are those of cache_faults.py.
 """
 
 from __future__ import annotations
@@ -17,6 +14,7 @@ import argparse
 import json
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -24,43 +22,63 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.record import markdown, write_results
+from benchmarks.cost.cache_faults import FAULTS, after_faults
+from benchmarks.record import ROOT, markdown, write_results
 
-PROGRAM = "G21 G90 G17\nG64 P0.02\nG1 X20 F3000\nX40 Y10\nX60\nX70 Y30\nX50 Y50\nX20 Y40\nX0 Y20\nM2\n"
-METHODS = ("optimal", "second-order", "kinematic", "fir", "stop")
-WAYS = {
-    "numba": "import planner.base.kernels as kernels; kernels.Kernel.part = property(lambda own: own.whole); ",
-    "planner": "",
+WAYS = {"planner": "", "numba": "plain", "lean": "lean", "files": "files"}  # functions of numba_cache.py
+PLAN = ("plan", "planner/examples/bracket.ngc", "--threads", "1", "--quiet", "--json")
+NEXT = 5  # runs; the median counts
+ROWS = {
+    "install_wall": "installation, both programs side by side: wall s",
+    "install_cpu": "CPU s",
+    "kernels": "kernels (files of machine code)",
+    "megabytes": "MB",
+    "first_cpu": "first run of the bracket: CPU s",
+    "further": "kernels that it adds",
+    "next_cpu": "next run: CPU s",
+    "version_cpu": "planner --version: CPU s",
+    "cycle_time": "cycle time of the bracket s",
 }
-COMMAND = "from planner.cli import main; main()"
 
 
-def first_run(method: str, way: str) -> dict[str, Any]:
-    """One run with an empty cache: seconds, kernels, the exit code, and seconds of the next run."""
+def prepared(way: str) -> str:
+    """Python statements that make a process use this way."""
+    return f"from benchmarks.cost import numba_cache; numba_cache.{WAYS[way]}(); " if WAYS[way] else ""
+
+
+def measured(way: str) -> dict[str, Any]:
+    """The values of `ROWS`."""
     with tempfile.TemporaryDirectory() as folder:
-        job = Path(folder) / "ten.ngc"
-        job.write_text(PROGRAM, encoding="utf-8")
-        env = {**os.environ, "NUMBA_CACHE_DIR": str(Path(folder) / "cache")}
-        command = [
-            sys.executable,
-            "-c",
-            WAYS[way] + COMMAND,
-            "plan",
-            str(job),
-            "--method",
-            method,
-            "--quiet",
-            "--json",
-        ]
-        row: dict[str, Any] = {"method": method, "way": way}
-        for run in ("first", "next"):
-            before, began = cpu_of_children(), time.perf_counter()
-            done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
-            row[f"{run}_wall"], row[f"{run}_cpu"] = time.perf_counter() - began, cpu_of_children() - before
-            if run == "first":
-                row["kernels"] = len([*Path(folder).rglob("*.kernel"), *Path(folder).rglob("*.nbc")])
-                row["exit"] = done.returncode
-                row["cycle_time"] = json.loads(done.stdout)["cycle_time_s"]
+        cache = Path(folder) / "cache"
+
+        def started(module: str, *words: str) -> subprocess.Popen[str]:
+            code = f"import runpy, sys; {prepared(way)}sys.argv = {['', *words]}; runpy.run_module({module!r}, run_name='__main__')"
+            env = os.environ | {"NUMBA_CACHE_DIR": str(cache), "OMP_NUM_THREADS": "1"}
+            return subprocess.Popen(
+                [sys.executable, "-c", code], cwd=ROOT, env=env, text=True, stdout=subprocess.PIPE
+            )
+
+        def run(*words: str) -> tuple[float, str]:
+            before = cpu_of_children()
+            text, _ = started("planner", *words).communicate()
+            return cpu_of_children() - before, text
+
+        def files() -> list[Path]:
+            return [*cache.rglob("*.kernel"), *cache.rglob("*.nbc")]
+
+        begun, before = time.perf_counter(), cpu_of_children()
+        both = [started("planner.commands.ahead", *words) for words in ((), ("corners",))]
+        failed = [one.returncode for one in both if one.communicate() and one.returncode]
+        if failed:
+            raise RuntimeError(f"{way}: the installation ended with {failed}")
+        row = {"install_wall": time.perf_counter() - begun, "install_cpu": cpu_of_children() - before}
+        row["kernels"], row["megabytes"] = len(files()), sum(of.stat().st_size for of in files()) / 1e6
+        row["first_cpu"], _ = run(*PLAN)
+        row["further"] = len(files()) - row["kernels"]
+        further = [run(*PLAN) for _ in range(NEXT)]
+        row["next_cpu"] = statistics.median(cpu for cpu, _ in further)
+        row["version_cpu"] = statistics.median(run("--version")[0] for _ in range(NEXT))
+        row["cycle_time"] = json.loads(further[-1][1])["cycle_time_s"]
     return row
 
 
@@ -74,26 +92,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--ways", default=",".join(WAYS))
-    asked = parser.parse_args()
-    rows = []
-    for method in asked.methods.split(","):
-        for way in asked.ways.split(","):
-            rows.append(row := first_run(method, way))
-            print(row, flush=True)
-    columns = ["method", "way", "kernels", "wall s", "CPU s", "next run: wall s", "CPU s", "cycle time s"]
+    ways = parser.parse_args().ways.split(",")
+    columns: dict[str, dict[str, Any]] = {}
+    for way in ways:
+        columns[way] = {"faults": after_faults(prepared(way))}
+        print(way, columns[way], flush=True)
+    for way in ways:
+        columns[way] |= measured(way)
+        print(way, columns[way], flush=True)
     table = [
-        [
-            row["method"],
-            row["way"],
-            str(row["kernels"]),
-            *(f"{row[key]:.1f}" for key in ("first_wall", "first_cpu", "next_wall", "next_cpu")),
-            f"{row['cycle_time']:.6f}",
-        ]
-        for row in rows
+        [title, *(_text(columns[way][key], 6 if key == "cycle_time" else 2) for way in ways)]
+        for key, title in ROWS.items()
     ]
-    write_results("first-run", {"program": PROGRAM, "rows": rows}, markdown(columns, table))
+    table += [[title, *(columns[way]["faults"][key] for way in ways)] for key, title in FAULTS.items()]
+    write_results("first-run", {"ways": columns}, markdown(["", *ways], table))
+
+
+def _text(value: float, digits: int) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.{digits}f}"
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ from benchmarks.campaign.rows import Row, about, outcome
 from benchmarks.campaign.table import write_summary
 from benchmarks.campaign.tally import CRASH, TOO_LONG, Tally, wrongs
 from benchmarks.record import RESULTS, planner_state
-from planner.base import kernels, sizes
+from planner.base import kernel_files, sizes
 from planner.base.threads import use_threads
 
 KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"
@@ -106,7 +106,7 @@ class Worker:
         return row | {"outcome": TOO_LONG, "said": f"more than {limit:g} CPU s", "cpu": limit}
 
 
-class Compiling(kernels.Compilation):
+class Compiling(kernel_files.Compilation):
     """Tells through a pipe that a kernel is being compiled, by None, and what that took [CPU s]."""
 
     def __init__(self, ends: Connection):
@@ -127,7 +127,7 @@ class Compiling(kernels.Compilation):
 def _serve(ends: Connection) -> None:
     use_threads(1)
     compiling = Compiling(ends)
-    kernels.at_compilation(compiling)
+    kernel_files.at_compilation(compiling)
     while True:
         try:
             seed = ends.recv()

@@ -26,7 +26,7 @@ from benchmarks.campaign import Compiling, Worker
 from benchmarks.campaign.jobs import job
 from benchmarks.campaign.tally import CRASH, FAILED, PASSED, REFUSED, TOO_LONG, UNSOLVED
 from benchmarks.record import RESULTS, provenance
-from planner.base import kernels
+from planner.base import kernel_files
 from planner.base.errors import InputError
 from planner.base.sizes import PARTS, ROUTES, SMALL, VARIABLE
 from planner.planning.methods.registry import plan
@@ -45,7 +45,7 @@ Row = dict[str, Any]
 def served(ends: Connection) -> None:
     """Plan jobs by their seeds, and send what came out of each."""
     compiling = Compiling(ends)
-    kernels.at_compilation(compiling)
+    kernel_files.at_compilation(compiling)
     while True:
         try:
             seed = ends.recv()

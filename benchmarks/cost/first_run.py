@@ -3,7 +3,7 @@ to be trusted, in four ways to compile and keep them:
 
     python -m benchmarks.cost.first_run [--ways planner,numba,lean,files]     into results/first-run.json and .md
 
-`planner` is planner/base/compiling.py and kernel_files.py: what a user gets. The others are in numba_cache.py. Each begins with an empty
+`planner` is planner/base/compiling.py: what a user gets. The others are in numba_cache.py. Each begins with an empty
 NUMBA_CACHE_DIR, which setup.py's two programs fill side by side (planner/commands/ahead.py); then come a first run of the bracket and
 next ones, on one thread. CPU seconds are those of all processes. Faults are those of cache_faults.py.
 """

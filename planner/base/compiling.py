@@ -112,21 +112,10 @@ class KernelCache(caching.NullCache):
 
     function : of Python
     content  : `content_of` it; None for one that is not kept
-    begins   : called before the kernel is compiled
-    ends     : called when it is
-    fails    : called with the fault when it cannot be kept
     """
 
-    def __init__(
-        self,
-        function: Any,
-        content: bytes | None,
-        begins: Callable[[bool], None],
-        ends: Callable[[], None],
-        fails: Callable[[OSError], None],
-    ):
+    def __init__(self, function: Any, content: bytes | None):
         self._function, self._content = function, content
-        self._begins, self._ends, self._fails = begins, ends, fails
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The code that was compiled for these types; None if there is nothing, or nothing of use."""
@@ -139,19 +128,19 @@ class KernelCache(caching.NullCache):
                     return made
             except Exception:  # whatever it is, the kernel can be compiled
                 pass
-        self._begins(self._content is not None)
+        kernel_files.compilation().begins(self._content is not None and kernel_files.can_be_kept())
         return None
 
     def save_overload(self, sig: Any, made: Any) -> None:
         """Keep what was compiled for these types."""
         for environment in made._find_referenced_environments():
             made.codegen.set_env(environment.env_name, environment)
-        self._ends()
+        kernel_files.compilation().ends()
         if self._content is not None:
             try:
                 kernel_files.write(self._file(sig, made.codegen), serialize.dumps(_to_keep(made)))
             except OSError as fault:
-                self._fails(fault)
+                kernel_files.warn_once(fault)
 
     def _file(self, sig: Any, generator: Any) -> KernelFile:
         settings = sorted(

@@ -94,6 +94,50 @@ class KernelCacheWarning(UserWarning):
     """Compiled kernels cannot be kept, or not where they were to be."""
 
 
+class Compilation:
+    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and
+    `ends`."""
+
+    def begins(self, is_kept: bool) -> None:
+        """A kernel is about to be compiled."""
+
+    def ends(self) -> None:
+        """It is compiled."""
+
+
+_listener = Compilation()
+_fails = False
+
+
+def at_compilation(listener: Compilation | None) -> None:
+    """Tell the listener of kernels that are compiled from now on; None for nobody."""
+    global _listener
+    _listener = listener or Compilation()
+
+
+def compilation() -> Compilation:
+    """Who is told."""
+    return _listener
+
+
+def can_be_kept() -> bool:
+    """Whether no kernel has failed to be written."""
+    return not _fails
+
+
+def warn_once(fault: OSError) -> None:
+    """Say that kernels cannot be written, the first time."""
+    global _fails
+    if not _fails:
+        _fails = True
+        warnings.warn(
+            f"compiled kernels cannot be kept ({fault.strerror or fault}): they are compiled again by every run, which takes a minute; "
+            "set NUMBA_CACHE_DIR to a directory that can be written",
+            KernelCacheWarning,
+            stacklevel=3,
+        )
+
+
 class KernelFile(NamedTuple):
     """The name of a kernel's file without its folder, and the digest of what the kernel computes."""
 

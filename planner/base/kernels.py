@@ -14,14 +14,11 @@ import hashlib
 import inspect
 import os
 import threading
-import warnings
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
-
-from planner.base.kernel_files import KernelCacheWarning
 
 # What a compiler may do to the arithmetic of a kernel that says so: multiply and add in one instruction.
 CONTRACT = {"contract"}
@@ -89,31 +86,6 @@ def _names_in(code: CodeType) -> set[str]:
 _one_at_a_time = threading.RLock()
 
 
-class Compilation:
-    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and
-    `ends`."""
-
-    def begins(self, is_kept: bool) -> None:
-        """A kernel is about to be compiled."""
-
-    def ends(self) -> None:
-        """It is compiled."""
-
-
-_listener = Compilation()
-
-
-def at_compilation(listener: Compilation | None) -> None:
-    """Tell the listener of kernels that are compiled from now on; None for nobody."""
-    global _listener
-    _listener = listener or Compilation()
-
-
-def compilation() -> Compilation:
-    """Who is told."""
-    return _listener
-
-
 def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is
     possible."""
@@ -152,9 +124,7 @@ class Kernel:
 
         with _one_at_a_time:  # or threads that call it first would each compile it
             if "whole" not in vars(self):
-                cache = KernelCache(
-                    self.py_func, self.content if self._cache else None, _begins, _ends, _warn
-                )
+                cache = KernelCache(self.py_func, self.content if self._cache else None)
                 vars(self)["whole"] = whole(self.py_func, self._settings, cache)
             return vars(self)["whole"]
 
@@ -169,26 +139,3 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """numba's type of it, when another kernel calls it."""
         return self.part._numba_type_
-
-
-_warned = False
-
-
-def _begins(is_kept: bool) -> None:
-    _listener.begins(is_kept and not _warned)
-
-
-def _ends() -> None:
-    _listener.ends()
-
-
-def _warn(fault: OSError) -> None:
-    global _warned
-    if not _warned:
-        _warned = True
-        warnings.warn(
-            f"compiled kernels cannot be kept ({fault.strerror or fault}): they are compiled again by every run, which takes a minute; "
-            "set NUMBA_CACHE_DIR to a directory that can be written",
-            KernelCacheWarning,
-            stacklevel=3,
-        )

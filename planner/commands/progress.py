@@ -11,7 +11,7 @@ import sys
 import time
 from typing import Any
 
-from planner.base import kernels
+from planner.base import kernel_files
 from planner.commands.terminal import printable, say
 
 PROGRESS_AFTER = 1.0  # [s]: a shorter job needs no bar
@@ -29,7 +29,7 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
 
 
-class ProgressBar(kernels.Compilation):
+class ProgressBar(kernel_files.Compilation):
     """The bar: clock, share of the stage, time left of it, stage. Elsewhere clock and stage as text.
 
     quiet : print nothing
@@ -47,11 +47,11 @@ class ProgressBar(kernels.Compilation):
     def __enter__(self) -> ProgressBar:
         self._start = time.monotonic()
         self._next_line = self._start + LINE_EVERY
-        kernels.at_compilation(self)
+        kernel_files.at_compilation(self)
         return self
 
     def __exit__(self, *_: object) -> None:
-        kernels.at_compilation(None)
+        kernel_files.at_compilation(None)
         if self._bar is not None:
             self._bar.stop()
             self._bar = None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.campaign import Compiling, Worker, rows_of
-from planner.base import kernels
+from planner.base import kernel_files, kernels
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_what_compiling_a_kernel_takes_is_not_counted() -> None:
 def test_a_worker_tells_of_kernels_that_it_compiles() -> None:
     here, there = multiprocessing.Pipe()
     compiling = Compiling(there)
-    kernels.at_compilation(compiling)
+    kernel_files.at_compilation(compiling)
     try:
 
         @kernels.njit(cache=False)
@@ -59,6 +59,6 @@ def test_a_worker_tells_of_kernels_that_it_compiles() -> None:
 
         assert twice(3.0) == 6.0
     finally:
-        kernels.at_compilation(None)
+        kernel_files.at_compilation(None)
     assert here.recv() is None
     assert here.recv() == compiling.took

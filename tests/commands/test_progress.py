@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import rich.progress
 
-from planner.base import kernels
+from planner.base import kernel_files
 from planner.commands import progress
 from planner.commands.progress import ProgressBar, duration_text
 
@@ -64,7 +64,7 @@ def test_plans_that_are_there_are_a_share_of_all(bars: list[rich.progress.Progre
 def test_compiling_is_told_once(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     monkeypatch.setattr(progress, "PROGRESS_AFTER", 0.0)
     with ProgressBar():
-        compiler = kernels.compilation()
+        compiler = kernel_files.compilation()
         for _ in range(2):
             compiler.begins(True)
             compiler.ends()

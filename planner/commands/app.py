@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 from planner.commands.compare import compare_command
 from planner.commands.control_time import time_command
 from planner.commands.export import export_command, pulses_command, report_command
+from planner.commands.fit import fit_command
 from planner.commands.info import expand_command, info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
@@ -122,7 +123,7 @@ for name, (command, line) in {
 
 machine_app = typer.Typer(
     cls=PlainGroup,
-    help="Machine files: list, show, init, import.",
+    help="Machine files: list, show, init, import, fit.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -130,4 +131,5 @@ machine_app.command("list", cls=PlainCommand)(list_machines)
 machine_app.command("show", cls=PlainCommand)(show_machine)
 machine_app.command("init", cls=PlainCommand)(init_file)
 machine_app.command("import", cls=PlainCommand)(import_file)
+machine_app.command("fit", cls=PlainCommand)(fit_command)
 app.add_typer(machine_app, name="machine")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.base.errors import InputError
 from planner.base.names import known_name
 from planner.commands import options
 from planner.commands.machine import machine_named
@@ -82,8 +83,12 @@ def _planned(
     allowed = float(toolpath_from_program(program, machine, tolerance).tolerance.min())
     with ProgressBar(quiet=quiet) as progress:
         made = plan(program, machine, tolerance=float(np.round(LESS * allowed, 9)), progress=progress)
+    predicted: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
-        predicted = write_program(Path(folder), made, control, allowed).predicted
+        try:
+            predicted = write_program(Path(folder), made, control, allowed).predicted
+        except InputError as fault:  # what it has no words for
+            say(f"note: nothing to export: {fault}", err=True)
     assert made.trajectory is not None
     return {
         "tolerance_mm": LESS * allowed,

@@ -71,6 +71,17 @@ def test_the_table_and_the_plan_beside_it(job: Path) -> None:
     assert "exported, program as it is" in out
 
 
+def test_what_cannot_be_exported_is_timed_and_planned(tmp_path: Path) -> None:
+    """Klipper knows no M3."""
+    file = tmp_path / "part.nc"
+    file.write_text(JOB.replace("(POCKET)", "S1000 M3"))
+    code, out, said = run("time", file, "-m", "voron", "--plan", "-q")
+    assert code == 0, said
+    assert "planned within" in out
+    assert "exported" not in out
+    assert "note: nothing to export" in said
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

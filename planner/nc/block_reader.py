@@ -209,7 +209,7 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
         block.settings.append(Setting(name, {}, word))
     else:
         ignored.count(found.what, words.text(word), block.line)
-    ignored.printer |= found.what is None or (letter == "M" and code // 10 in EXTRUDER_MODES)
+    ignored.printer |= letter == "M" and (found.what is None or code // 10 in EXTRUDER_MODES)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
     return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.letters

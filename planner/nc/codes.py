@@ -18,6 +18,7 @@ G_GROUP: dict[int, str] = {
     **dict.fromkeys((200, 210), "units"),
     **dict.fromkeys((900, 910), "distance mode"),
     **dict.fromkeys((901, 911), "arc centre mode"),
+    **dict.fromkeys((1540, *range(1100, 1300, 10)), "work offset"),  # Haas' G154 P and G110 to G129
     **dict.fromkeys((540, 541, 550, 560, 570, 580, 590, 591, 592, 593), "work offset"),
     **dict.fromkeys((610, 611, 640), "path control"),
     **dict.fromkeys((430, 431, 432, 434, 490), "tool length"),
@@ -41,6 +42,7 @@ CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # G73, G74, G81 ... G89
 WORDS: dict[tuple[str, int], str] = {
     **{("G", code): "IJKRP" for code in ARCS},
     ("G", 50): "IJPQ", ("G", 51): "IJ", ("G", 52): "PL", ("G", 62): "PKR",
+    ("G", 1540): "P",
     ("G", 541): "P", ("G", 40): "P", ("G", 100): "LPRQIJ", ("G", 640): "PQ", **{("G", code): "H" for code in (430, 432, 434)},
     ("G", 960): "D",
     **{("G", code): "D" for code in (410, 420)}, **{("G", code): "DL" for code in (411, 421)},

@@ -41,6 +41,7 @@ STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which mus
 _STEPS = {
     **dict.fromkeys(PECKING, "pecks down dwell up"),
     **dict.fromkeys(TAPPING, "down stop other dwell out stop again"),
+    codes.THREADING: "down dwell stop up again",  # Fanuc's G76, fine boring
     810: "down dwell up",
     820: "down dwell up",
     850: "down dwell back up",
@@ -165,6 +166,8 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
         raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
     if code in DWELLING and words["P"] < 0:
         raise block.fault("a dwell must not be negative; write its seconds, such as P0.5", "P")
+    if state.fanuc and code in TAPPING.keys() | STOPPING and (code in TAPPING or not state.spindle.turning):
+        state.spindle.turning = TAPPING.get(code, 1)  # the cycle starts it
     turning, needed = state.spindle.turning, TAPPING.get(code)
     if needed is not None and turning != needed:
         raise WordFault(word, f"{name} needs the spindle turning {'M3' if needed > 0 else 'M4'} before it")
@@ -234,6 +237,11 @@ def _say(state: State, block: Block, findings: Findings) -> None:
         findings.assume(f"{name} before any G98 or G99: {text}", block.line, word)
     if state.motion == _BY_HAND:
         text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
+        findings.assume(f"{name}: {text}", block.line, word)
+    if state.motion == codes.THREADING:
+        text = (
+            "the spindle stops in its place at the bottom, and the tool's way off the wall by Q is left out"
+        )
         findings.assume(f"{name}: {text}", block.line, word)
     if state.motion in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"

@@ -199,7 +199,8 @@ class Mover:
         if state.motion < 0:
             raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
         auxiliary.take_default(state, self.feed_default, block, self.findings)
-        if state.motion not in codes.CYCLES:
+        drills = state.motion in codes.CYCLES or (state.fanuc and state.motion == codes.THREADING)
+        if not drills:
             state.series = None
         if state.in_thread and state.motion not in codes.THREADS:
             threads.stop(state, self.table, block.line)
@@ -211,9 +212,9 @@ class Mover:
             offsets.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
             threads.thread(state, self.table, block, self.findings)
-        elif state.motion == codes.THREADING:
+        elif state.motion == codes.THREADING and not drills:
             threads.cut_thread(state, self.table, block, self.findings)
-        elif state.motion in codes.CYCLES:
+        elif drills:
             auxiliary.check_feed(state, block)
             if auxiliary.on_surface(state):
                 radius = float(moves.target(state, block)[0] - state.position[0]) + state.programmed()[0]

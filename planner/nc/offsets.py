@@ -33,6 +33,8 @@ from planner.nc.state import (
     system_name,
 )
 
+_OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 P1 to P20; and G154
+_FANUC_TOOLS = (10, 11, 12, 13)
 _FIXTURE = 593  # the system of G10 L11
 
 
@@ -80,12 +82,16 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
 def take_system(state: State, block: Block, findings: Findings) -> None:
     """G54 to G59.3 and G54.1: the work system from here on. Raises WordFault for G54.1 without a valid P."""
     code = block.g["work offset"]
-    if code == 541:
+    if code >= _OF_HAAS and state.strict:
+        raise block.fault(str(codes.unknown("G", code, strict=True)), "work offset")
+    if code in (541, _G154):
         number = integer(block, "P", 1) if "P" in block.value else 0
         if not 1 <= number <= FURTHER_MAX:
             at = "P" if "P" in block.at else "work offset"
-            raise block.fault(f"G54.1 needs its work system as P1 to P{FURTHER_MAX}", at)
+            raise block.fault(f"G{codes.number(code)} needs its work system as P1 to P{FURTHER_MAX}", at)
         code = FURTHER_SYSTEMS + number
+    elif code >= _OF_HAAS:
+        code = FURTHER_SYSTEMS + (code - _OF_HAAS) // 10 + 1
     state.system = code
     if state.system not in state.systems and state.system != 540:
         text = f"{system_name(state.system)} has no offset in the machine file: 0"
@@ -125,6 +131,8 @@ def set_data(state: State, block: Block, findings: Findings) -> None:
     if kind in (2, 20):
         _set_system(state, block, kind)
         state.apply_offsets()
+    elif state.fanuc and kind in _FANUC_TOOLS:
+        _set_fanuc_tool(state, block, kind, findings)
     elif kind in (1, 10, 11):
         _set_tool(state, block, kind, findings)
     else:
@@ -188,6 +196,22 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
     offset = _given(state, block, tool.offset) if kind == 1 else _offset_from_place(state, block, tool, kind)
     diameter = 2.0 * block.value["R"] * state.unit if "R" in block.value else tool.diameter
     state.tools[number] = Tool(offset, diameter)
+
+
+def _set_fanuc_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
+    """G10 L10 to L13 P R of Fanuc and Haas: a length, its wear, a radius, its wear."""
+    if "P" not in block.value or "R" not in block.value:
+        raise block.fault(f"G10 L{kind} needs its tool as a P word, and a length or radius as R", "one-shot")
+    number, size = integer(block, "P", 1), block.value["R"] * state.unit
+    tool = state.tools.get(number) or Tool(state.zeros())
+    if kind in (10, 11):
+        offset = tool.offset.copy()
+        offset[2] = size + (offset[2] if kind == 11 else 0.0)
+        state.tools[number] = Tool(offset, tool.diameter)
+    else:
+        text = f"R of G10 L{kind} is a radius, as Fanuc has it; Haas has a setting for diameters"
+        findings.assume(text, block.line, block.at["R"])
+        state.tools[number] = Tool(tool.offset, 2.0 * size + (tool.diameter if kind == 13 else 0.0))
 
 
 def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> FloatArray:

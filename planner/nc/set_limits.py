@@ -22,11 +22,12 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, ROTARY_AXES, Machine
+from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.program import MOVES, SetLimit
-from planner.nc.settings import CORNERS, GRBL, VELOCITY_LIMIT, Setting
+from planner.nc.settings import CORNERS, GRBL, SMOOTHNESS, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
 
 SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", ("M201", "M202"), "M204"
@@ -60,6 +61,10 @@ class LimitsInForce:
                 if not value > 0.0:
                     text = f"{setting.name} {key.upper()} must be positive, found {value:g}"
                     raise WordFault(setting.word, text)
+            if setting.name == SMOOTHNESS:
+                state.tolerance = max(given["e"] * state.unit, TOLERANCE_MIN)
+                findings.note("E of G187 is the tolerance of what follows", line)
+                continue
             if setting.name == SPEED_FACTOR:
                 given = setting.values
                 if "b" in given:

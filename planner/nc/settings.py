@@ -22,6 +22,7 @@ EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 # what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
+SMOOTHNESS = "G187"  # of Haas: its E is a tolerance
 _GRBL_AXES = "xyzabc"  # grblHAL has six
 GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate(_GRBL_AXES)} | {
     f"$12{k}": ("acceleration", axis) for k, axis in enumerate(_GRBL_AXES)
@@ -128,6 +129,8 @@ def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
         return None
     if code in (500, 920) and "S" in behind:
         return CodeSetting(SPINDLE_LIMIT, "SPQR")
+    if code == 1870 and "E" in behind:
+        return CodeSetting(None, "EP")
     if code == 500 or code in _G_SETTINGS:
         return CodeSetting(G_SETTING, "DEHLPQRS")
     if code in (100, 110) and "L" not in behind:

@@ -38,7 +38,7 @@ HARMLESS = [
     ("G5.1 Q1", "1 G code that sets the control"),
     ("G10\nG11", "2 retractions of an extruder (G10, G11): they take no time in this plan; first G10 line 2"),
     ("M21", "1 M code that this reader does not know"),
-    ("G187 P3 E0.01", "1 G code that sets the control"),
+    ("G187 P3", "1 G code that sets the control"),
     ("G8 P1", "1 G code that sets the control"),
     ("$X", "1 command to the control ($): assumed not to move anything; first $X line 2"),
     ("$$\n$G", "2 commands to the control ($)"),

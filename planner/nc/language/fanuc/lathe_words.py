@@ -28,6 +28,7 @@ _REFUSED = {
     **dict.fromkeys(("G87", "G88"), "a cycle that drills from the side (Fanuc), or ends in a retract by hand (Haas),"),
     **dict.fromkeys(("G95", "G186", "G195", "G196", *(f"G{n}" for n in range(241, 250))), f"a cycle that {_LIVE}"),
     **dict.fromkeys(("G68", "G51.2", "G14", "G68.1"), "a second turret or spindle, or a part turned as a polygon,"),
+    "G105": "the push of a bar feeder, which moves the part,",
     "G34": "a thread whose lead grows",
 }  # fmt: skip
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}

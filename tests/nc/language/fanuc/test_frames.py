@@ -78,6 +78,15 @@ CASES = {
         "G1 Z-1 F300\nG2 X2 Y0 I1\nG2 X2 Y0 I-2\nG1 X4\nG2 X4 Y0 I-4\nG1 X5\nG2 X5 Y0 I-5\nG2 X0 Y0 I-2.5\nG0 Z5",
     ),
     "dwells": ("G4 X1.5\nG4 U2.\nG4 P500\nG4 X1000", "G4 P1.5\nG4 P2\nG4 P.5\nG4 P1"),
+    "a tolerance of Haas": ("G187 P2 E0.03\nG1 X5. Y5.", "G64 P0.03\nG1 X5 Y5"),
+    "work systems of Haas": (
+        "G10 L20 P3 X7. Y0 Z0\nG154 P3\nG0 X1.\nG54 X2.\nG112 X3.",
+        "G10 L2 P2 X7 Y0 Z0\nG55\nG0 X1\nG54 X2\nG55 X3",
+    ),
+    "the spindle starts": ("G84 X5. Z-5. R2.\nG80", "M3\nG84 X5 Z-5 R2 P0\nG80"),
+    "fine boring": ("M3\nG76 X5. Z-5. R2. Q.2 P100\nX9.\nG80", "M3\nG86 X5 Z-5 R2 P.1\nX9\nG80"),
+    "tools": ("G10 L12 P1 R3.\nG10 L10 P1 R5.\nG43 H1 Z20.\nG41 D1 G1 X20. Y0\nX20. Y20.\nG40 X0 Y20.",
+              "G10 L1 P1 Z5 R3\nG43 H1 G0 Z20\nG41 D1 G1 X20 Y0\nX20 Y20\nG40 X0 Y20"),
     "P of cycles": (
         "G81 X5. Z-5. R2. P500\nG82 X9.\nG83 X12. Q4. P0\nG80",
         "G0 X5\nZ2\nG1 Z-5\nG4 P.5\nG0 Z10\nX9\nZ2\nG1 Z-5\nG4 P.5\nG0 Z10\nX12\nZ2\nG1 Z-2\nG0 Z2\nZ-1.746\nG1 Z-5\nG0 Z10",
@@ -110,6 +119,7 @@ def test_as_written_out(name: str, unit: str) -> None:
     expected = parse_program(head.replace("O1000\n", "") + written + "\nM30", TOOLED)
     assert not [note for note in found.assumptions if "G9" in note]
     same(found, expected, apart=1e-9)
+    np.testing.assert_array_equal(found.tolerance, expected.tolerance)
 
 
 @pytest.mark.parametrize(

@@ -22,14 +22,14 @@ from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, Reading
 _LOOKED_AT = 20_000  # bytes at the start of a file that tell its language, and hold the first %
 _CONVERSATIONAL = re.compile(
     rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b|"
-    rb"^[ \t]*\d+[ \t]+(?:L[ \t]+I?[XYZM]|CC[ \t]|LBL[ \t]+\d)",
+    rb"^[ \t]*\d+[ \t]+(?:L[ \t]+I?[XYZ][-+]|CC[ \t]+I?[XYZ][-+]|LBL[ \t]+\d)",
     re.MULTILINE | re.IGNORECASE,
 )
 # Marks of a Sinumerik's program, behind words of its line that all dialects have; texts of messages are none.
 _SIEMENS = re.compile(
     r"\s*(?:/\d?\s*)?(?!N?\d*\s*M(?:11[78]|2[38]|3[023])\b)(?:[A-NP-Z][-+]?(?:\d+\.?\d*|\.\d+)(?![\d.]*\s*=)\s*)*+(?:"
     r"[A-Z_]{2}\w*:\s*(?:N\d+|[GXYZ][\d=]|[A-Z]\d+=)|(?:CR|AP|RP|RNDM?|CHF|CHR|ADIS(?:POS)?|TURN|[IJK]1|ANG|SPOSA?|FRCM?|FB|T|[SMH]\d+|R\d+|OFFN|OVR|[XYZABC]1|DISR|DISC|LIMS|[ABC]3|"
-    r"[XYZABCUVWIJKF])\s*=(?!=)|R\d+\s*=|(?:ACC|VELOLIM|FA|FL|SPOSA?|POSA?|R)\[|"
+    r"[XYZABCUVWIJKF])\s*=(?!=)|R\d+\s*=|(?:ACC|VELOLIM|FA|FL|SPOSA?|POSA?)\[|R\[[^\]#]*\]\s*=|"
     r"(?:MSG|CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|WORKPIECE|SETMS|FGROUP|TRAORI|TRACYL|CASE|SETAL)\s*\(|"
     r"DEF\s+(?:CHAN\s+|NCK\s+)?(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|\$(?:AA|AC|P|TC|MN|MC|MA|SN|SC|A)_|%_N_|"
     r"(?:GOTO[FBC]|EXTCALL|PROC|EXTERN|CASE)\s|IF\b[^[#]*\bGOTO[FBC]\b|(?:FOR\s+\w+\s*=|CALL\s*\")|"

@@ -24,10 +24,11 @@ _DWELL = 4.0
 _LONG = 100.0  # X or U of a dwell without a point from here on is in ms: in seconds it would be minutes
 _MOTIONS = np.array([code / 10 for code, group in codes.G_GROUP.items() if group in ("motion", "cycle end")])
 _CYCLES = np.array(sorted({*codes.CYCLES, codes.THREADING})) / 10  # G76 of mills bores
+_DWELLING = {*codes.CYCLES, codes.THREADING, 40}
 # Codes whose line has a P of their own: those of `codes.WORDS` that are no cycles, and calls.
 _OTHERS = {
     letter: np.array([
-        *(code / 10 for (of, code), used in codes.WORDS.items() if of == letter and "P" in used and code not in codes.CYCLES | {40, codes.THREADING}),
+        *(code / 10 for (of, code), used in codes.WORDS.items() if of == letter and "P" in used and code not in _DWELLING),
         *calls,
     ])
     for letter, calls in (("G", (65.0, 66.0)), ("M", (97.0, 98.0, 99.0)))

@@ -8,9 +8,9 @@ may move ($J jogs) and is refused.
 
 import re
 
-from planner.nc import codes
+from planner.nc import codes, printer
 from planner.nc.codes import Assumption
-from planner.nc.faults import LEFT_OUT, LEFT_OUT_BY_USER, REFUSED, IgnoredWords
+from planner.nc.faults import LEFT_OUT, REFUSED, IgnoredWords
 from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
 from planner.nc.moves import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
 from planner.nc.settings import (
@@ -18,10 +18,10 @@ from planner.nc.settings import (
     EVERYTHING,
     EXTRUDER_MODES,
     GRBL,
+    LEFT_OUT_BY_USER,
     TEXTS,
     TOOL_POINT_OFF,
     TOOL_POINT_ON,
-    VELOCITY_LIMIT,
     Setting,
     setting,
 )
@@ -36,7 +36,6 @@ _HARMLESS = re.compile(
 )
 _OTHER_SETTING = Assumption("setting{|s} of grbl", "assumed not to change the motion", changes=True)
 _SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
-_VALUE = re.compile(r"(\w+)=([-+]?\d+\.?\d*)")
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
 _LONGEST = 80  # characters of bare axis letters that are looked at
 # Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in
@@ -59,11 +58,11 @@ _NO_WORD = "this character starts no word; a word is a letter and a number"
 
 
 def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
-    """Execute `$` or Klipper's limit at the start of a line into `block`; False for none, or a refusal."""
+    """Execute `$` at the start of a line into `block`; False for none, or a refusal."""
     if block.g or block.m or block.value or ignored.strict:
         return False
     if words.text(word) != "$":
-        return _velocity_limit(words, word, block)
+        return False
     text = "$" + words.rest(word).split(";")[0].split("(")[0].strip()
     if ignored.ignores("$") or ignored.ignores(text.upper()[:2]):
         ignored.count(_IGNORED, text, block.line)
@@ -78,16 +77,6 @@ def command(words: Words, word: int, block: Block, report: Report, ignored: Igno
         ignored.count(_OTHER_SETTING if setting else COMMAND, text, block.line)
     else:
         return False
-    return True
-
-
-def _velocity_limit(words: Words, word: int, block: Block) -> bool:
-    text = (chr(words.data[int(words.at[word])]) + words.rest(word)).partition(";")[0].upper()
-    name, _, rest = text.partition(" ")
-    values = _VALUE.findall(rest)
-    if name.strip() != VELOCITY_LIMIT or [f"{key}={value}" for key, value in values] != rest.split():
-        return False
-    block.settings.append(Setting(VELOCITY_LIMIT, {key.lower(): float(value) for key, value in values}, word))
     return True
 
 
@@ -109,6 +98,8 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
     """A row as a block, faults to `report(word, message)`; None if it cannot be read, or holds nothing."""
     block = Block(line=int(words.line[row]))
     first, last = int(words.first[row]), int(words.first[row + 1])
+    if ignored.printer and not ignored.strict and printer.take(words, row, block, ignored):
+        return block
     owned = ""  # letters that belong to a setting
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])

@@ -15,12 +15,11 @@ from planner.base.errors import InputError
 from planner.nc.codes import LETTERS_REFUSED, PARKABLE, Assumption
 from planner.nc.lexer import Words
 from planner.nc.program import MadeWhenAsked, plain
-from planner.nc.reading import IGNORE, Reading
+from planner.nc.reading import AUTO, IGNORE, Reading
 from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, TOOL_POINT_M
 
 # How a letter is treated whatever stands beside it, in `IgnoredWords.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
-LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +150,7 @@ class IgnoredWords:
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
     moved     : letters of axes that are not planned and were refused, because they move
-    printer   : the program is one for a 3-D printer: it has M82, M83 or another code that only those have
+    printer   : the program is one for a 3-D printer (printer.py), or has a code that only those have
     follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
     at_tip    : the machine has kinematics: the switch of the tool centre point is read (tool_point.py)
     """
@@ -161,6 +160,7 @@ class IgnoredWords:
         self.follows = extruder and reading.extruder != IGNORE
         self.strict = reading.strict
         self.printer = False
+        self.extruder = ""  # the last T word of a printer
         self.parked = np.full(256, np.nan)
         self.treatment = np.full(256, READ, dtype=np.uint8)
         for letter in LETTERS_REFUSED:
@@ -170,10 +170,16 @@ class IgnoredWords:
         self._used: dict[str, int] = {}
 
     def _treatment(self, letter: str) -> int:
-        no_axis = letter == "E" and (self.follows or self.reading.extruder == IGNORE)
-        if letter in self.reading.ignore or no_axis:
+        left_out = self.follows or self.reading.extruder == IGNORE
+        of_extruder = left_out or (self.printer and self.reading.extruder == AUTO)
+        if letter in self.reading.ignore or (letter == "E" and of_extruder):
             return LEFT_OUT
         return PARKED if letter in PARKABLE and not self.strict else REFUSED
+
+    def read_printer(self) -> None:
+        """The program is one for a 3-D printer."""
+        self.printer = True
+        self.treatment[ord("E")] = self._treatment("E")
 
     def refuse_extruder(self) -> None:
         """E is no axis here: a program that computes may use the letter otherwise."""
@@ -214,7 +220,8 @@ class IgnoredWords:
         letter = words.letter[: words.first[rows]]
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
             times = int(np.count_nonzero(letter == code)) - self._used.pop(chr(code), 0)
-            if chr(code) == "E" and self.follows:
+            of_commands = self.printer and self.treatment[code] == PARKED and np.isnan(self.parked[code])
+            if of_commands or (chr(code) == "E" and self.follows):
                 continue
             if times > 0 and chr(code) not in self.moved:
                 word = int(np.argmax(letter == code))
@@ -228,9 +235,10 @@ class IgnoredWords:
             where = "" if np.isnan(at) else f" at {plain(float(at))}"
             meaning = f"axis {letter} is assumed to stand still{where}"
         elif letter == "E":
-            meaning = (
-                "left out (--extruder ignore); what the extruder does by itself takes no time in this plan"
-            )
+            asked = self.reading.extruder == IGNORE
+            why = "--extruder ignore" if asked else "the machine file has no table [axes.e]"
+            text = f"left out ({why}); what the extruder does by itself takes no time in this plan"
+            return Assumption("E word{|s}", text, changes=not asked)
         else:
             meaning = "left out, as --ignore says: the plan knows nothing of this axis"
         return Assumption(f"{letter} word{{|s}}", meaning, changes=parked)

@@ -26,8 +26,10 @@ from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
 from planner.nc.moves import Block, WordFault
 from planner.nc.plain import run_plain
+from planner.nc.printer import OF_STATE
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.saved_states import SavedStates
 from planner.nc.set_limits import LimitsInForce
 from planner.nc.state import REFUSED_MOTION, State, begins_in_inches, state_of
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
@@ -74,6 +76,7 @@ class Interpreter:
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
         self.limits = LimitsInForce()
+        self.saved = SavedStates()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
         self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
         self.by_word = 0  # rows that were executed word by word, not by the compiled loop
@@ -213,7 +216,11 @@ class Interpreter:
         """Execute one block; True if it ends the program."""
         if self.mover.cutter is not None:
             mover.check_unchanged(self.state, block)
-        self.limits.take(block.settings, self.state, self.table, block.line, self.findings)
+        for setting in block.settings:
+            if setting.name in OF_STATE:
+                self.saved.take(setting, self.state, self.table, block.line)
+            else:
+                self.limits.take(setting, self.state, self.table, block.line, self.findings)
         auxiliary.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.table, block, self.findings)

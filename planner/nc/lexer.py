@@ -4,8 +4,8 @@
     comment = ( anything but a parenthesis )   or   ; to the end of the line
 
 Beyond RS274NGC a % at the start of a line may have a name after it, :1000 is O1000, $ inside a line is a
-letter (M3 $1), and a number may have an exponent with its sign: -8.775e-05; E needs two digits or more, since
-X1E-2 is a coordinate and an extruder's word.
+letter (M3 $1), *71 at the end of a line is a checksum, and a number may have an exponent with its sign: -8.775e-05;
+E needs two digits or more, since X1E-2 is a coordinate and an extruder's word.
 
 A word takes 13 bytes: letter, value and place in the source. What cannot be read becomes a word too, with the
 letter `FAULT` and a code as its value, and the rest of its line is left out. Numbers are rounded as
@@ -33,7 +33,7 @@ _WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
 # Characters by their codes: what a compiled loop compares bytes with.
 _NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
-_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR = 79, 69, 101, 58, 36
+_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR, _STAR = 79, 69, 101, 58, 36, 42
 _POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
 _MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
 
@@ -84,12 +84,18 @@ class Words:
 
     def find(self, letter: str, *numbers: float) -> Array:
         """(n,) the words of a letter with one of the numbers, ascending."""
-        return np.flatnonzero((self.letter == ord(letter)) & np.isin(self.value, numbers))
+        of_letter = np.flatnonzero(self.letter == ord(letter))
+        return of_letter[np.isin(self.value[of_letter], numbers)]
 
     def line_at(self, at: int) -> tuple[int, int]:
         """Where the source line of a byte begins and ends in `data`, without its end of line."""
         end = self.data.find(b"\n", at)
         return self.data.rfind(b"\n", 0, at) + 1, end if end >= 0 else len(self.data)
+
+    def row_text(self, row: int) -> str:
+        """The source line of a row."""
+        start, end = self.line_at(int(self.at[self.first[row]]))
+        return self.data[start:end].removeprefix(BOM).decode("utf-8", "replace")
 
     def column_at(self, at: int) -> int:
         """1-based column of a byte, in characters."""
@@ -171,6 +177,18 @@ def _digit_follows(source, i):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
+def _ends_in_digits(source, i):  # pragma: no cover - compiled
+    """True if digits, blanks and comments alone follow up to the end of the line: a checksum."""
+    first = i
+    while i < len(source) and 48 <= source[i] <= 57:
+        i += 1
+    digits = i > first
+    while i < len(source) and source[i] in (_SPACE, _TAB, _RETURN):
+        i += 1
+    return digits and (i == len(source) or source[i] in (_NEWLINE, _SEMICOLON))
+
+
+@njit(cache=True)
 def _exponent(source, i):  # pragma: no cover - compiled
     """The number of characters of an exponent at i, behind a digit or a point; 0 if there is none."""
     if not (48 <= source[i - 1] <= 57 or source[i - 1] == _POINT):
@@ -202,7 +220,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 i += 1
                 continue
             blank, starts = False, words == row_first
-            if c == _SEMICOLON:
+            if c == _SEMICOLON or (c == _STAR and not starts and _ends_in_digits(source, i + 1)):
                 comments -= i
                 while i < end and source[i] != _NEWLINE:
                     i += 1

@@ -19,6 +19,7 @@ from planner.nc.interpreter import Interpreter
 from planner.nc.language import detect
 from planner.nc.lexer import Words, split_words, text_alone
 from planner.nc.points import are_points, read_points
+from planner.nc.printer import is_printer
 from planner.nc.program import Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, LATHE, SIEMENS, Reading
 
@@ -133,8 +134,11 @@ def execute(
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     if reading.dialect == AUTO and detect.is_siemens(words, source):
         language = SIEMENS
-    dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading)
-    if detect.is_turned(words, dialect, reading, machine):
+    prints = language != SIEMENS and not reading.strict and is_printer(words)
+    if prints:
+        interpreter.ignored.read_printer()
+    dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
+    if not prints and detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE
         interpreter.findings.assume(detect.LATHE_NOTE, int(words.line[0]))
     elif dialect != SIEMENS and not reading.strict:

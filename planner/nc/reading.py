@@ -19,7 +19,7 @@ from planner.nc.settings import may_be_ignored
 AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
 ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
-EXTRUDERS = (REFUSE, IGNORE)
+EXTRUDERS = (AUTO, REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
 LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
 DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
@@ -39,7 +39,8 @@ class Reading:
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute",
                    or "auto", which is incremental unless arcs on more than one line close with absolute
                    centres only, as all of the program do
-    extruder     : "refuse" or "ignore": what is done with the E words of 3-D printers
+    extruder     : what is done with the E words of 3-D printers: "auto" follows them on a machine with an axis
+                   e, and else leaves them out and says so; "refuse" or "ignore"
     dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells:
                    "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", or "auto", by what the program
                    holds
@@ -49,7 +50,7 @@ class Reading:
     strict: bool = False
     ignore: tuple[str, ...] = ()
     arc_centres: str = AUTO
-    extruder: str = REFUSE
+    extruder: str = AUTO
     dialect: str = AUTO
     block_delete: bool = True
 

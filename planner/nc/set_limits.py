@@ -36,6 +36,7 @@ SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", ("M201", "M202
 PER_MINUTE = 1000.0
 EVERY_AXIS = "xyzabcuvw"
 _AXES = EVERY_AXIS + EXTRUDER
+_LIMITING = ("velocity", "accel")
 FEED = "feed"  # what VELOCITY bounds beside the axes
 
 
@@ -50,33 +51,32 @@ class LimitsInForce:
         self._line = self._along = 0  # of the first that is set, of the first acceleration along the path
         self._kept_factor = 1.0  # factor that M220 B keeps
 
-    def take(
-        self, settings: Sequence[Setting], state: State, table: BlockTable, line: int, findings: Findings
-    ) -> None:
-        """Execute the commands of a line. Raises WordFault for a value that is not positive."""
-        for setting in settings:
-            self._look(table)
-            given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
-            for key, value in given.items():
-                if not value > 0.0:
-                    text = f"{setting.name} {key.upper()} must be positive, found {value:g}"
-                    raise WordFault(setting.word, text)
-            if setting.name == SMOOTHNESS:
-                state.tolerance = max(given["e"] * state.unit, TOLERANCE_MIN)
-                findings.note("E of G187 is the tolerance of what follows", line)
-                continue
-            if setting.name == SPEED_FACTOR:
-                given = setting.values
-                if "b" in given:
-                    self._kept_factor = state.feed_factor
-                factor = self._kept_factor if "r" in given else state.feed_factor
-                factor = given["s"] / 100.0 if "s" in given else factor
-                state.feed *= factor / state.feed_factor
-                state.feed_factor = factor
-                self.factors.append((line, factor))
-                continue
-            self._line = self._line or line
-            self._take_limits(setting.name, given, state.unit, line, findings)
+    def take(self, setting: Setting, state: State, table: BlockTable, line: int, findings: Findings) -> None:
+        """Execute a command. Raises WordFault for a value that is not positive."""
+        self._look(table)
+        if setting.name == VELOCITY_LIMIT and any(map(math.isnan, setting.values.values())):
+            raise WordFault(setting.word, f"{VELOCITY_LIMIT} needs numbers, such as ACCEL=5000")
+        given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
+        for key, value in given.items():
+            if not (value > 0.0 or (setting.name == VELOCITY_LIMIT and key not in _LIMITING)):
+                text = f"{setting.name} {key.upper()} must be positive, found {value:g}"
+                raise WordFault(setting.word, text)
+        if setting.name == SMOOTHNESS:
+            state.tolerance = max(given["e"] * state.unit, TOLERANCE_MIN)
+            findings.note("E of G187 is the tolerance of what follows", line)
+            return
+        if setting.name == SPEED_FACTOR:
+            given = setting.values
+            if "b" in given:
+                self._kept_factor = state.feed_factor
+            factor = self._kept_factor if "r" in given else state.feed_factor
+            factor = given["s"] / 100.0 if given.get("s", 0.0) > 0.0 else factor
+            state.feed *= factor / state.feed_factor
+            state.feed_factor = factor
+            self.factors.append((line, factor))
+            return
+        self._line = self._line or line
+        self._take_limits(setting.name, given, state.unit, line, findings)
 
     def throughout(
         self, table: BlockTable, machine: Machine | None, findings: Findings
@@ -147,7 +147,7 @@ class LimitsInForce:
         if "velocity" in given:
             self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]))
             self._set(FEED, {"": given["velocity"]})
-        rest = sorted(given.keys() - {"accel", "velocity"})
+        rest = sorted(given.keys() - {*_LIMITING})
         if rest:
             findings.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
 

@@ -53,6 +53,7 @@ SCALE_M = Assumption(
     changes=True,
 )
 SPINDLE_LIMIT = Assumption("largest spindle speed{|s}", "they change nothing in the path")
+LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 EXTRUDER_ZERO = Assumption("zero{|s} of the extruder", "left out with its words")
 RETRACTION = Assumption(
     "retraction{|s} of an extruder (G10, G11)", "they take no time in this plan", changes=True
@@ -67,27 +68,43 @@ PARKS = Assumption(
     "a full stop; what it moves is not planned, and the head is assumed to come back",
     changes=True,
 )
+MACRO = Assumption(
+    "macro{|s} of the printer",
+    "a full stop; what it moves is not planned, and the head is assumed to come back",
+    changes=True,
+)
+LEVELLING = Assumption(
+    "code{|s} of a 3-D printer that level{s|}, wipe{s|} or probe{s|}",
+    "a full stop; what it moves is not planned, and the head is assumed to come back",
+    changes=True,
+)
+TOOLS = Assumption(
+    "change{|s} of the extruder (T)", "a full stop; what it moves and lasts is not planned", changes=True
+)
 # By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
 EXTRUDER_MODES = frozenset((82, 83))
-_PARKING = frozenset((125, 600, 701, 702))
-_WAITING = frozenset((109, 116, 190, 191, 303))
-_MOVES_FINISHED = 400  # waits until the axes stand
-_CORNERS = frozenset((205, 566))
-# Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that
-# are loaded, shaping, and which carriage follows.
-_SCALES = frozenset((92, 206, 218, 221, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666))
 # fmt: off
+# M codes of printers by number: what is said of them. Waits and parking are full stops.
+_MEANING: dict[int, Assumption] = {
+    **dict.fromkeys((
+        17, 18, 73, 84, *range(104, 112), 114, 115, *range(117, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164,
+        201, 202, 203, 204, 207, 208, 220, 240, 250, 280, 300, 301, 302, 304, 305, 400, 412, 413, 486, 500, 503, 504, 557,
+        558, 569, 572, 574, 575, 584, 851, 862, 900, 906, 907, 913, 914, 928, *EXTRUDER_MODES,
+    ), PRINTER_M),
+    **dict.fromkeys((109, 116, 190, 191, 303), WAIT_M),
+    **dict.fromkeys((205, 566), CORNER_M),
+    # Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that are
+    # loaded, shaping, and which carriage follows.
+    **dict.fromkeys((92, 206, 218, 221, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666), SCALE_M),
+    **dict.fromkeys((125, 600, 701, 702), PARKS),
+}
+# Whose words are axes, which do not move.
 _OF_AXES = frozenset((
     17, 18, 84, 92, 201, 202, 203, 204, 205, 206, 207, 208, 218, 301, 304, 350, 425, 557, 558, 566, 569,
     574, 579, 584, 593, 665, 666, 851, 906, 907, 913, 914,
 ))
-_OF_PRINTERS = _OF_AXES | EXTRUDER_MODES | frozenset((
-    73,
-    *range(104, 112), *range(114, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164, 190, 191,
-    220, 221, 240, 250, 280, 300, 302, 303, 305, 400, 412, 413, 420, 486, 500, 501, 502, 503, 504,
-    572, 575, 605, 862, 900, 928,
-))
 # fmt: on
+_MOVES_FINISHED = 400  # waits until the axes stand
 TEXTS = frozenset((117, 118))  # a message to the end of the line
 MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
 # G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates
@@ -101,11 +118,13 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A command that sets something ("M204", "$110"): values by letter or key in small letters; its word."""
+    """A command that sets something ("M204", "$110"): values by letter or key in small letters; its word; the
+    name of what it keeps."""
 
     name: str
     values: dict[str, float]
     word: int
+    slot: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,20 +168,22 @@ def _m_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     is_read = (code in M_GROUP or code in M_REFUSED) and not progress
     if code % 10 or code < 0 or number in MAY_MOVE or is_read:
         return None
-    if number in _PARKING:
-        return CodeSetting(PARKS, EVERYTHING, stops=True)
-    of = {WAIT_M: _WAITING, CORNER_M: _CORNERS, SCALE_M: _SCALES, PRINTER_M: _OF_PRINTERS}
-    what = next((what for what, numbers in of.items() if number in numbers), UNKNOWN_M)
+    what, stops = meaning(number)
     if number in SETS_LIMITS:
         return None if before else CodeSetting(None, EVERYTHING)
-    stops = number in _WAITING or number == _MOVES_FINISHED
-    if before:
+    if before and what is not PARKS:
         return CodeSetting(what, "PQ", stops)
     if number in _OF_AXES or stops:
         return CodeSetting(what, EVERYTHING, stops)
     if 100 <= number <= 199:
         return CodeSetting(what, "".join(c for c in EVERYTHING if c not in "XYZFT"))
     return None if set("XYZ").intersection(behind) else CodeSetting(what, EVERYTHING)
+
+
+def meaning(number: int) -> tuple[Assumption, bool]:
+    """What is said of an M code that moves nothing, and whether it is a full stop."""
+    what = _MEANING.get(number, UNKNOWN_M)
+    return what, what in (WAIT_M, PARKS) or number == _MOVES_FINISHED
 
 
 def may_be_ignored(name: str) -> bool:

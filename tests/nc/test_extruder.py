@@ -82,7 +82,7 @@ def test_what_the_extruder_cannot_do_is_refused(text: str, line: int, what: str)
 def test_without_the_axis_and_when_ignored_nothing_is_fed() -> None:
     text = "G21 F600\nM83\nG1 X10 E1\nG1 E-1\n"
     with pytest.raises(InputError, match="extruder"):
-        parse_program(text, load_machine("router"))
+        parse_program(text, load_machine("router"), Reading(extruder="refuse"))
     ignored = parse_program(text, PRINTER, Reading(extruder=IGNORE))
     assert len(ignored.extruded) == 0
     assert len(ignored) == 1

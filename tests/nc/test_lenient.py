@@ -108,7 +108,7 @@ def test_what_may_move_is_refused_with_its_line(line: str, place: str) -> None:
 
 def test_axis_words_beside_codes_of_the_machine_are_moves() -> None:
     """M100 to M199 take P and Q in RS274NGC: the coordinates are a move."""
-    program = parse_program("G21 G0 X1\nX2 M123 P1\nM140 X3")
+    program = parse_program("G21 G0 X1\nX2 M123 P1\nM155 X3")
     assert program.end[:, 0].tolist() == [1, 2, 3]
 
 

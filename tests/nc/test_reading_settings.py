@@ -45,7 +45,12 @@ def test_extruder_words_are_left_out_if_the_user_says_so() -> None:
     assert same_motion(program, plain)
     assert any(note.startswith("4 E words: left out (--extruder ignore)") for note in program.notes)
     with pytest.raises(InputError, match="--extruder ignore"):
-        parse_program(text)
+        parse_program(text, reading=Reading(extruder="refuse"))
+    left_out = parse_program(text)  # a printer's program for a machine without an extruder
+    assert same_motion(left_out, plain)
+    assert any(
+        "4 E words: left out (the machine file has no table [axes.e])" in a for a in left_out.assumptions
+    )
 
 
 def test_dwells_of_printers_are_in_milliseconds() -> None:

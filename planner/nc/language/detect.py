@@ -15,6 +15,7 @@ from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
 from planner.nc.lexer import FAULT, Words, split_words
+from planner.nc.printer import is_command
 from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, Reading
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
@@ -62,6 +63,7 @@ _SUBPROGRAMS = (".mpf", ".spf")
 _FIRST = rb"(?:IN|DF|PU|PD|PA|PR|SP|VS|IP|SC|RO|PS|BP|PG|LT|CO|FS|PW|WU|QL|NP|AF)"
 _BEHIND_CONTROL = rb"\A(?:\s|\xef\xbb\xbf)*+(?>" + CONTROL + rb"[\s;]*)*+"
 _HPGL = re.compile(_BEHIND_CONTROL + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"|\Z)", re.IGNORECASE)
+_MACRO = re.compile(rb"\s*[A-Z]+_[A-Z]", re.IGNORECASE)  # PRINT_START of a printer
 _NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
 _CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
@@ -138,7 +140,7 @@ def is_plotter_file(data: bytes, source: str) -> bool:
     """True if a text is HPGL: by its content where that is clear, else by the suffix of its name."""
     head = data[:_LOOKED_AT]
     if _HPGL.match(head):
-        return True
+        return not _MACRO.match(head)
     return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
 
 
@@ -156,7 +158,7 @@ def is_siemens(words: Words, source: str) -> bool:
     odd = words.rows_with(
         np.flatnonzero((words.letter == FAULT) | np.isin(words.letter, (ord("%"), ord("O"))))
     )
-    return any(_SIEMENS.match(row_text(words, row)) for row in odd)
+    return any(_SIEMENS.match(words.row_text(row)) for row in odd)
 
 
 def without_leader(data: bytes) -> tuple[bytes, str]:
@@ -201,17 +203,20 @@ def ends_frame(text: str) -> bool:
     return bool(_ENDS_FRAME.search(text))
 
 
-def dialect_of(words: Words, reading: Reading) -> str | None:
-    """The language that a program computes in, or None; `Reading.dialect` decides where it is given."""
+def dialect_of(words: Words, reading: Reading, *, prints: bool = False) -> str | None:
+    """The language that a program computes in, or None; `Reading.dialect` decides where it is given. Commands of
+    a printer (`prints`) are of none."""
     ends = words.find("M", 2, 30)
     found, end = None, words.row(int(ends[0])) if len(ends) else len(words.line)
     for row in may_compute(words):
         if row > end and found is None:
             return None  # what follows the end of a program that computes nothing is not read
-        text = bare(row_text(words, row))
+        text = bare(words.row_text(row))
         frame = _FRAME.search(text)
         only = frame is not None and not any(sign.search(text) for sign in _STATEMENTS)
-        if not computes(text) or (only and _not_read(frame, reading)):
+        of_language = '"' not in text and (_LINUXCNC.search(text) or _FANUC.search(text))
+        of_printer = prints and not of_language and is_command(words.row_text(row))
+        if not computes(text) or of_printer or (only and (prints or _not_read(frame, reading))):
             continue
         if reading.dialect != AUTO:
             return reading.dialect
@@ -236,7 +241,7 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     (`_has_signs`)."""
     if reading.strict or reading.dialect not in (AUTO, FANUC):
         return False
-    texts = (bare(row_text(words, row)) for row in may_compute(words))
+    texts = (bare(words.row_text(row)) for row in may_compute(words))
     if dialect == LINUXCNC and any(map(_LINUXCNC.search, texts)):
         return False
     if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
@@ -302,9 +307,3 @@ def is_fanuc(words: Words, dialect: str | None, reading: Reading) -> bool:
     numbers = np.flatnonzero((words.letter == ord("O")) & (words.value >= 0.0))
     moves = np.flatnonzero(np.isin(words.letter, list(b"XYZ")))
     return len(numbers) > 0 and (not len(moves) or bool(numbers[0] < moves[0]))
-
-
-def row_text(words: Words, row: int) -> str:
-    """The line of a row as text."""
-    start, end = words.line_at(int(words.at[words.first[row]]))
-    return words.data[start:end].decode("latin-1")

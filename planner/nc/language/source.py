@@ -15,7 +15,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.nc.faults import Fault
 from planner.nc.integers import Integers
 from planner.nc.language import tree
-from planner.nc.language.detect import bare, computes, ends_frame, may_compute, row_text
+from planner.nc.language.detect import bare, computes, ends_frame, may_compute
 from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
 from planner.nc.lexer import BOM, Words
 
@@ -52,7 +52,7 @@ class Source:
     def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
         self.scale = integers.scale(words)
-        bare_texts = ((row, bare(row_text(words, row))) for row in may_compute(words))
+        bare_texts = ((row, bare(words.row_text(row))) for row in may_compute(words))
         # rows, ascending, that are statements of the language rather than words
         self.lines = [
             row for row, text in bare_texts if computes(text) or _PROGRAM.match(text) or ends_frame(text)

@@ -1,0 +1,108 @@
+"""Programs of 3-D printers as slicers write them are read without an option, and lead where they should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from same_program import STRICT, machine
+
+from planner.base.errors import InputError
+from planner.nc.program import Kind
+from planner.nc.reader import parse_program
+
+MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC)
+PRUSA = """M73 P0 R12
+M201 X1000 Y1000 Z200 E5000
+M862.3 P "MK3S" ; printer model check
+M115 U3.13.2+7
+M555 X90 Y90 W60 H60
+M83
+G28 W
+G80
+G29 P1 X0 Y0 W50 H20 C
+M486 Acube (Instance 1).stl
+G1 X60.0 E9.0 F1000.0
+M221 S95
+G1 E-.8 F2100
+G2 X64 Y4 I0 J4 E.05
+M84 X Y E
+"""
+BAMBU = """M17 X1.2 Y1.2 Z0.75
+M104 S75
+M83
+M1002 gcode_claim_action : 2
+M620 S0A
+T0
+M621 S0A
+M1006 A0 B10 L100 C37 D10 M60 E37 F10 N60
+G29.1 Z0
+G380 S2 Z30 F300
+M622 J1
+    G1 X65 E2 F12000
+M623
+M970.3 Q1 A7 B30 C80  H15 K0
+M624 BAAAAAAAAAA=
+M142 P1 R35 S40 T45 U0.3 V0.5 W0.8 O45 L1
+G1 Y5
+G1 Z.2
+M73 P100 R0
+"""
+KLIPPER = """EXCLUDE_OBJECT_DEFINE NAME=a CENTER=1,2 POLYGON=[[1,2],[3,4]]
+PRINT_START BED=60 EXTRUDER=200
+SET_PRESSURE_ADVANCE ADVANCE=0.04
+G1 X50 Y0 F6000
+TIMELAPSE_TAKE_FRAME
+_MY_MACRO
+M117 layer (1 of 2
+G1 X0
+END_PRINT
+"""
+CHECKED = "N0 M110*35\nN1 M82*2\nN2 G1 X10 Y10 F3000*100\nN3 G1 X20.5 E1*91 ; comment\n"
+REPRAP = 'M83\nM98 P"start.g"\nM568 P0 R150 S210 A2\nG10 P0 S200\nG1 X7 F600\nG60 S1\nG1 X9 Y2\nG61 S1 X\nP0 S1 L1\nT1\nG1 Y5'
+PROGRAMS = {
+    "Prusa": (PRUSA, [[0, 0, 0], [60, 0, 0], [64, 4, 0]]),
+    "Bambu": (BAMBU, [[65, 0, 0], [65, 5, 0], [65, 5, 0.2]]),
+    "Klipper": (KLIPPER, [[50, 0, 0], [0, 0, 0]]),
+    "checksums": (CHECKED, [[10, 10, 0], [20.5, 10, 0]]),
+    "RepRapFirmware": (REPRAP, [[7, 0, 0], [9, 2, 0], [7, 2, 0], [7, 5, 0]]),
+    "macro first": ("print_start bed=60\nG1 X3 F600\nPRINT_END\n", [[3, 0, 0]]),
+    "homing": ("M140 S60\nG1 X9 Y9 F600\nG28 X0\nG28 O\n", [[9, 9, 0], [0, 9, 0], [0, 0, 0]]),
+    "shift": (
+        "M83\nG1 Z2 F600\nSET_GCODE_OFFSET Z=0.5\nG1 Z2\nSET_GCODE_OFFSET Z_ADJUST=-0.2 MOVE=1\nG1 X1",
+        [[0, 0, 2], [0, 0, 2.5], [0, 0, 2.3], [1, 0, 2.3]],
+    ),
+    "states": (
+        "M83\nG1 X5 F600\nSAVE_GCODE_STATE NAME=a\nG91\nG1 X1 F60\nG92 X0\nRESTORE_GCODE_STATE NAME=a MOVE=1\nG1 X8",
+        [[5, 0, 0], [6, 0, 0], [5, 0, 0], [8, 0, 0]],
+    ),
+    "place": ("M83\nSET_KINEMATIC_POSITION X=100\nG1 X110 F600", [[10, 0, 0]]),
+}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_lead_where_they_should(name: str) -> None:
+    text, places = PROGRAMS[name]
+    program = parse_program(text, machine())
+    np.testing.assert_allclose(program.end[np.isin(program.kind, MOVES)], places, atol=1e-12)
+    with pytest.raises(InputError):
+        parse_program(text, machine(), STRICT)
+
+
+def test_what_may_move_is_said_first() -> None:
+    said = "\n".join(parse_program(KLIPPER, machine()).assumptions)
+    assert "3 macros of the printer" in said
+    said = "\n".join(parse_program(PRUSA, machine()).assumptions)
+    assert "2 codes of a 3-D printer that level, wipe or probe" in said
+
+
+def test_a_restored_state_has_its_feed() -> None:
+    program = parse_program(PROGRAMS["states"][0], machine())
+    assert program.feed.tolist() == [10.0, 1.0, 10.0, 10.0]
+
+
+@pytest.mark.parametrize(
+    "line", ["FORCE_MOVE STEPPER=x DISTANCE=5", "G999", "RESTORE_GCODE_STATE NAME=b", "G61 S3"]
+)
+def test_what_moves_and_is_not_known_is_refused(line: str) -> None:
+    with pytest.raises(InputError, match=r"^<text>:3:"):
+        parse_program(f"M83\nG1 X1 F60\n{line}\nG1 X2", machine())

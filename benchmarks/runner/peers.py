@@ -26,9 +26,9 @@ from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.names import NORMAL
-from planner.controls.export import models
 from planner.controls.export.candidates import standing
 from planner.controls.export.chords import Polyline, programmed_polyline
+from planner.controls.timing import models
 from planner.controls.timing.linuxcnc import linuxcnc_time
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.machine import Machine

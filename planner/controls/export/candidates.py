@@ -10,7 +10,7 @@ faster.
 
 Candidates are the program as it is, with G64 P of the whole tolerance, or with half of it for P and half for
 Q, which joins short moves; and the planned path as chords, with G64 P for the room that they leave. The model
-(linuxcnc_model.py) was off by -2.1 to +0.9 % on programs like these, so another candidate than the first is
+(timing/linuxcnc.py) was off by -2.1 to +0.9 % on programs like these, so another candidate than the first is
 taken only where it is predicted to be faster by more than `MARGIN`. A program that says its path mode keeps
 it, and its own path.
 """

@@ -26,10 +26,10 @@ from benchmarks.runner.judged import Judged, NotApplicable, NotHere
 from planner.base.arrays import FloatArray
 from planner.base.errors import NotSolvedError
 from planner.base.names import NORMAL
-from planner.controls.export.candidates import standing
 from planner.controls.export.chords import Polyline, programmed_polyline
 from planner.controls.timing import models
 from planner.controls.timing.linuxcnc import linuxcnc_time
+from planner.controls.timing.times import standing
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.machine import Machine
 from planner.nc.program import Kind, Program
@@ -159,7 +159,12 @@ def _law(stops: Plan, line: Polyline, control: str) -> float:
     feed = np.where(line.rapid, np.inf, line.feed)
     law = models.CONTROLS[control]
     return models.predicted_time(
-        line.points, feed, standing(stops, line), stops.machine, stops.toolpath.axes, law
+        line.points,
+        feed,
+        standing(stops.program, line.block, switches=True),
+        stops.machine,
+        stops.toolpath.axes,
+        law,
     )
 
 
@@ -167,7 +172,7 @@ def _linuxcnc(stops: Plan, line: Polyline, tolerance: float) -> float:
     feed = np.where(line.rapid, np.inf, line.feed)
     moves = np.linalg.norm(np.diff(line.points, axis=0), axis=1) > 0.0
     at = np.append(0, np.flatnonzero(moves) + 1)  # a point that moves on, after those that stand in its place
-    stands = np.logical_or.reduceat(standing(stops, line), at)
+    stands = np.logical_or.reduceat(standing(stops.program, line.block, switches=True), at)
     return linuxcnc_time(
         line.points[at], feed[moves], stands, stops.machine, stops.toolpath.axes, tolerance - line.miss
     )

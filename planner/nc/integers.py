@@ -48,7 +48,10 @@ class DwellWords:
         motion = words.find("G", *_MOTIONS)
         cycle = np.append(self._in_cycle, np.isin(words.value[motion], _CYCLES))
         found = []
-        for word in np.flatnonzero(np.isin(words.letter, list(b"PXU"))).tolist():
+        some = words.letter == ord("P")
+        for row in words.rows_with(words.find("G", _DWELL)):
+            some[words.first[row] : words.first[row + 1]] |= np.isin(words.of_rows(row)[0], list(b"XU"))
+        for word in np.flatnonzero(some).tolist():
             row = words.row(word)
             letter, value = words.of_rows(row)
             in_cycle = cycle[np.searchsorted(motion, words.first[row + 1])]

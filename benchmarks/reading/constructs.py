@@ -2,21 +2,21 @@
 
     python -m benchmarks.reading.constructs
 
-Writes results/constructs.md; tests/nc/language/test_constructs.py says where it is out of date.
+Writes results/constructs.json and .md; tests/nc/language/test_constructs.py says where it is out of date.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
+from benchmarks.record import RESULTS, write_results
 from planner.nc.language.heidenhain import definitions, moves
 from planner.nc.language.heidenhain import flow as conversational_flow
 from planner.nc.language.heidenhain import tables as conversational
 from planner.nc.language.making import ASSUMED
 from planner.nc.language.siemens import block_words, cycles, patterns, tables
 
-PAGE = Path(__file__).resolve().parents[1] / "results" / "constructs.md"
+PAGE = RESULTS / "constructs.md"
 READ, SAID, NOTHING, REFUSED = "read", "said first", "moves nothing", "refused"
 Row = tuple[str, str, str]  # a construct, what is done with it, and why
 
@@ -52,12 +52,7 @@ def rows() -> dict[str, list[Row]]:
 
 def page() -> str:
     """The page: a line for each outcome and reason, with its constructs."""
-    lines = [
-        "# Constructs by dialect",
-        "",
-        "Written by `python -m benchmarks.reading.constructs` from the tables of the reader.",
-        "",
-    ]
+    lines: list[str] = []
     for dialect, found in rows().items():
         lines += [f"## {dialect}", "", "| constructs | outcome | reason |", "|---|---|---|"]
         groups: dict[tuple[str, str], list[str]] = {}
@@ -73,5 +68,5 @@ def _listed(names: Iterable[str]) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    write_results("constructs", {"rows": rows()}, page())
     print(PAGE)

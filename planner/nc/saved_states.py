@@ -6,7 +6,7 @@
     RESTORE_GCODE_STATE NAME=a MOVE=1        brings them back; with MOVE=1 the head goes to the place, at MOVE_SPEED
     G60 S0, G61 S0 X Y F                     keeps the place, goes back to it (Marlin), with the axes named, or all
 
-How E counts is kept and brought back in extruder.py.
+Whether E is a place or a step (M82, M83) is not kept: it stays as it is.
 """
 
 from typing import NamedTuple

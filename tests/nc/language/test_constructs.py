@@ -24,9 +24,8 @@ WITHOUT = ("G451", "M94", "M97", "M98", "M109", "M110", "M114", "M115", "M116", 
 
 
 def test_the_page_is_that_of_the_tables() -> None:
-    assert constructs.PAGE.read_text(encoding="utf-8") == constructs.page(), (
-        "python -m benchmarks.reading.constructs"
-    )
+    made, _, page = constructs.PAGE.read_text(encoding="utf-8").partition("\n\n")
+    assert page == constructs.page(), f"out of date: {made}"
 
 
 @pytest.mark.parametrize("dialect", HEADS)

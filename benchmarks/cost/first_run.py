@@ -1,5 +1,6 @@
-"""What the installation, the first run and the next ones take, and what becomes of kernels on the disk that are changed, damaged or not
-to be trusted, in four ways to compile and keep them:
+"""What the installation, the first run and the next ones take, in four ways to compile kernels and keep them.
+
+And what becomes of kernels on the disk that are changed, damaged or not to be trusted:
 
     python -m benchmarks.cost.first_run [--ways planner,numba,lean,files]     into results/first-run.json and .md
 

@@ -1,5 +1,6 @@
 """`planner machine`: the built-in machines, and a machine file to start from."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +20,9 @@ def machine_named(name: str | None) -> "Machine":
     from planner.machine import load_machine
 
     path = Path(name or DEFAULT_MACHINE)
-    if name is not None and path.is_file() and path.suffix != ".toml":
+    if (
+        name is not None and os.path.isfile(path) and path.suffix != ".toml"
+    ):  # False, too, for names that are too long
         from planner.controls.machine_import.convert import import_machine, is_settings
 
         if is_settings(path):

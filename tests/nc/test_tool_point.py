@@ -193,7 +193,7 @@ def test_other_languages_without_kinematics(text: str, said: str) -> None:
         ),
         (
             "N10 G71 G90\nTRAORI\nG1 X5 A3=0 B3=0 C3=1 F600\nM30\n",
-            "<text>:3:7: .*A3=, a direction .*angles of the rotary axes",
+            "<text>:3:7: .*A3 is not read: a direction .*angles of the rotary axes",
         ),
         (
             "0 BEGIN PGM P MM\n1 LN X+1 Y+1 Z+1 TX+0 TY+0 TZ+1 F100\n2 END PGM P MM\n",

@@ -195,7 +195,7 @@ class BlockWords(Places):
                 if name == "ADISPOS"
                 else [tree.word(letter, at, value + tree.ONE if name == "TURN" else value)]
             )
-        if name in tables.REFUSED:
+        if name in tables.REFUSED and (number is None or reader.peek() == "="):  # C5 alone is the axis C at 5
             raise reader.fault(tables.refusal(name), at - reader.start)
         spindle = (
             name[1:] if letter in ("S", "M", "H", "T", "D") and name != letter and number is None else ""

@@ -80,7 +80,10 @@ def step_numbers(
 
 
 def directions(velocity: FloatArray) -> FloatArray:
-    """(n, A) the directions of velocities (n, A) [mm/s]; 0 where nothing moves."""
+    """(n, A) their directions [-]; 0 where nothing moves.
+
+    velocity : (n, A) [mm/s]
+    """
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     return np.divide(velocity, speed, out=np.zeros_like(velocity), where=speed > 0.0)
 

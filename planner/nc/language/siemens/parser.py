@@ -143,7 +143,11 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     "$P_UIFR": SiemensParser._offset,
     **dict.fromkeys(("RET", "STOPFROM"), SiemensParser._return),
     **dict.fromkeys(
-        (one for one in tables.REFUSED if one[0] not in "ABCG" or not one[1:].isdecimal()),
+        (
+            one
+            for one in tables.REFUSED
+            if one not in COMMANDS and (one[0] not in "ABCG" or not one[1:].isdecimal())
+        ),
         SiemensParser._refused,
     ),
 }

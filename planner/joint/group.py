@@ -68,7 +68,6 @@ class Group(NamedTuple):
     h_min: FloatArray  # (N, W)
     switch: FloatArray  # (N, W) over tolerance and pace
     switch_at: FloatArray  # (N, A, W) the vertex
-    side: FloatArray  # (N, A, W) over tolerance
     smooth: FloatArray  # (N, W) twice the weight of jerk^2, in time
     centre: FloatArray  # (N, W) in time, 0 where the row is not
     per_step: FloatArray  # (N, W) 1/step_max
@@ -153,7 +152,6 @@ def group_of(
         h_min=limit("h_min", 0.5),
         switch=stack([one.limits.switch / (one.limits.room_node * one.limits.pace) for one in windows]),
         switch_at=points([start[at] for at in switch_leg]),
-        side=points([one.limits.side / one.limits.room_node[:, None] for one in windows]),
         smooth=2.0 * limit("smooth") * limit("h"),
         centre=limit("centre") * limit("h") * on[:, 8 * axes + TUBE_NODE],
         per_step=1.0 / limit("step_max", 1.0),

@@ -184,7 +184,7 @@ class TubeNLP:
             return ca.sumsqr(point - base - drift * x - radius * (cos * e1 + sin * e2) - ahead * tangent)
 
         ordinate = v + a * h / 2
-        vertex, switch, side = ca.SX.sym("vertex", axes), ca.SX.sym("switch"), ca.SX.sym("side", axes)
+        vertex, switch = ca.SX.sym("vertex", axes), ca.SX.sym("switch")
         rows: list[tuple[Any, float, float]] = [
             (apart(p + h * v / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
             (apart(p1 - h * v1 / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
@@ -199,9 +199,7 @@ class TubeNLP:
                 (ca.vertcat(*(row / feed**2 for row in inner), ca.sumsqr(v1) / feed_end**2), -np.inf, 1.0)
             )
         if run.switch.any():
-            rows.append(
-                (ca.vertcat(switch * ca.dot(p1 - vertex, v1), ca.dot(side, p1 - vertex)), -np.inf, 0.0)
-            )
+            rows.append((switch * ca.dot(p1 - vertex, v1), -np.inf, 0.0))
         if (run.curvature > 0).any():
             rows.append(((s3 - s0) / step_max, -np.inf, 1.0))
         along = ca.SX.sym("along", watched)  # u of the places that are watched, times the pace
@@ -231,7 +229,7 @@ class TubeNLP:
         # -----------------------------------------------------------
         of_stage = [ca.vertcat(p, v, a, places[0]), ca.vertcat(j, h, *places[1:], along)]
         numbers = ca.vertcat(*(base, drift, e1, e2, begin, radius, rate, room, room_end, step_max))
-        numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, side, mean_next)
+        numbers = ca.vertcat(numbers, feed, feed_end, normal, own_mean, pace, vertex, switch, mean_next)
         numbers = ca.vertcat(numbers, from_rest, to_rest, word)
         of_step = ca.Function(
             "step", [*of_stage, numbers], [following, ca.vertcat(*(row for row, _, _ in rows))]

@@ -35,9 +35,9 @@ def jerk_weights(run: TubeRun, leg: Array, velocity: FloatArray, least: float) -
 def step_numbers(
     run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
-    """(N, 6 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its
+    """(N, 5 A + 12) what each of N steps needs to know: its leg, how far it may be from it inside and at its
     end, its limits; the vertex at the leg's end, and what the feed does where the step ends there
-    (`TubeRun.switch`, over tolerance and pace, and times the direction of the start there, over tolerance).
+    (`TubeRun.switch`, over tolerance and pace).
 
     mean_step          : (N,) mean length of a step on each step's leg [mm]
     length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
@@ -51,9 +51,6 @@ def step_numbers(
     fastest = np.linalg.norm(run.velocity)  # instead of inf, where nothing else limits
     strongest = 2.0 * np.linalg.norm(run.acceleration)
     own_pace, switch = pace(guess.state[:, 1]), np.zeros(len(leg))
-    side: FloatArray = np.zeros((len(leg), len(run.axis)))
-    ahead = directions(guess.state[last + 1, 1]) * length / room_end[last, None]
-    side[last] = run.switch[leg[last + 1], None] * ahead
     switch[last] = run.switch[leg[last + 1]] * length * speed / (room_end[last] * own_pace[last + 1])
     return np.column_stack(
         [
@@ -74,18 +71,8 @@ def step_numbers(
             own_pace / speed,
             run.vertex[leg + 1] / length,
             switch,
-            side,
         ]
     )
-
-
-def directions(velocity: FloatArray) -> FloatArray:
-    """(n, A) their directions [-]; 0 where nothing moves.
-
-    velocity : (n, A) [mm/s]
-    """
-    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-    return np.divide(velocity, speed, out=np.zeros_like(velocity), where=speed > 0.0)
 
 
 def pace(velocity: FloatArray) -> FloatArray:

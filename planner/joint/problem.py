@@ -13,7 +13,7 @@ from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER
 from planner.joint.normal_rows import turns_far
-from planner.joint.numbers import CENTRE, ROUNDING, directions, jerk_weights, pace
+from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
 from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
 
@@ -171,8 +171,6 @@ def _limits(
     of_switch = np.where(at_vertex & (run.switch[leg] != 0.0), leg, -1 if beside is None else beside)
     more[:, rows.SWITCH] = of_switch >= 0
     more[0, rows.SWITCH] = False
-    side = np.where(at_vertex, run.switch[leg], 0.0)[:, None] * directions(cut.state[lo:hi, 1])
-    more[:, rows.SIDE] = more[:, rows.SWITCH] & side.any(axis=1)
     return StepLimits(
         leg=leg,
         passed=passed,
@@ -195,7 +193,6 @@ def _limits(
         h_min=h / LONGER,
         switch=np.where(of_switch >= 0, run.switch[of_switch], 0.0),
         switch_leg=np.maximum(of_switch, 0),
-        side=side,
         smooth=jerk_weights(run, leg, cut.state[lo : hi + 1, 1], smooth),
         centre=np.full(hi - lo, CENTRE),
         aside=NARROWED * narrow[0],

@@ -4,6 +4,7 @@
     E alone            nothing else moves: a full stop for as long as it takes (geometry/extrusion.py), at the F in force
     M82, M83           E is a place, or a step. After G91 it is a step whatever holds, as in Klipper; Marlin's G90 also ends M83
     G92 E0             what E is called from here on; nothing moves
+    RESTORE_GCODE_STATE   M82 or M83, G90 or G91, F and the place of E as SAVE_GCODE_STATE kept them
 
 E is in the program's units, and starts at 0. The words are gone through once more, for E alone, after the
 blocks are known: a row of the program has one block at most where E stands beside G0 to G3.
@@ -37,7 +38,11 @@ class _Fed(NamedTuple):
 
 
 def with_extruder(
-    program: Program, words: Words, rows: int, factors: Sequence[tuple[int, float]] = ()
+    program: Program,
+    words: Words,
+    rows: int,
+    factors: Sequence[tuple[int, float]] = (),
+    states: Sequence[tuple[int, str, bool]] = (),
 ) -> Program:
     """The program with what the extruder feeds on each block, and full stops where it moves alone. Raises
     InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside another
@@ -45,8 +50,13 @@ def with_extruder(
 
     words   : of the program; of these the first `rows` rows
     factors : by which F counts from a line on (M220)
+    states  : line, name, and whether it is brought back, of the states that are kept (saved_states.py)
     """
-    fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES))
+    state = np.zeros(rows, dtype=np.int64)
+    names = list(dict.fromkeys(name for _, name, _ in states))
+    for of, name, back in states:
+        state[words.line[:rows] == of] = (1 + names.index(name)) * (-1 if back else 1)
+    fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES, state))
     if not fed.amount.any():
         return program
     of_line, factor = zip((0, 1.0), *factors, strict=True)
@@ -109,12 +119,22 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
 
 
 @njit(cache=True, error_model="numpy")
-def _fed(letter, value, first, with_moves):
-    """Filament by row (R,) [mm], NaN beside G codes not in `with_moves`; feed in force (R,) [mm/s]."""
+def _fed(letter, value, first, with_moves, state):
+    """Filament by row (R,) [mm], NaN beside G codes not in `with_moves`; feed in force (R,) [mm/s].
+
+    state : (R,) k in rows that keep the state of the number k, -k in those that bring it back, else 0
+    """
     rows = len(first) - 1
     amount, feeds = np.zeros(rows), np.zeros(rows)
     absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0
+    kept = np.zeros((1 + np.abs(state).max() if rows else 1, 4))
     for row in range(rows):
+        if state[row] > 0:
+            kept[state[row], 0], kept[state[row], 1] = absolute, absolute_moves
+            kept[state[row], 2], kept[state[row], 3] = feed, place
+        elif state[row] < 0:
+            back = kept[-state[row]]
+            absolute, absolute_moves, feed, place = back[0] > 0.0, back[1] > 0.0, back[2], back[3]
         has, sets, others, unknown, e, before = False, False, False, False, 0.0, unit
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]

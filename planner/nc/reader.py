@@ -159,7 +159,8 @@ def execute(
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.ignored.follows and not len(faults):
-        program = with_extruder(program, words, interpreter.rows_read, interpreter.limits.factors)
+        of_lines = interpreter.limits.factors, interpreter.saved.marks
+        program = with_extruder(program, words, interpreter.rows_read, *of_lines)
     return interpreter, program, faults
 
 

@@ -6,7 +6,7 @@
     RESTORE_GCODE_STATE NAME=a MOVE=1        brings them back; with MOVE=1 the head goes to the place, at MOVE_SPEED
     G60 S0, G61 S0 X Y F                     keeps the place, goes back to it (Marlin), with the axes named, or all
 
-Whether E is a place or a step (M82, M83) is not kept: it stays as it is.
+How E counts is kept and brought back in extruder.py, by the `marks` of these commands.
 """
 
 from typing import NamedTuple
@@ -43,6 +43,7 @@ class SavedStates:
     def __init__(self) -> None:
         self.kept: dict[str, _Kept] = {}
         self.shift = np.zeros(3)
+        self.marks: list[tuple[int, str, bool]] = []  # line, name, and whether the state is brought back
 
     def take(self, setting: Setting, state: State, table: BlockTable, line: int) -> None:
         """Execute a command. Raises WordFault for a state that was not kept, and for a move without a feed."""
@@ -51,6 +52,8 @@ class SavedStates:
             feeds = state.feed, state.feed_unit, state.feed_factor
             kept = _Kept(state.position.copy(), state.absolute, state.g92.copy(), self.shift.copy(), *feeds)
             self.kept[name[0] + setting.slot] = kept
+            if name == SAVE:
+                self.marks.append((line, setting.slot, False))
         elif name in (RESTORE, "G61"):
             back = self.kept.get({RESTORE: "S", "G61": "G"}[name] + setting.slot)
             if back is None:
@@ -82,6 +85,7 @@ class SavedStates:
             target[axes] = back.position[axes]
             _go(setting, target, speed, state, table, line)
             return
+        self.marks.append((line, setting.slot, True))
         state.absolute, self.shift = back.absolute, back.shift.copy()
         state.g92[:] = back.g92
         state.apply_offsets()

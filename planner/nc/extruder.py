@@ -4,14 +4,21 @@
     E alone            nothing else moves: a full stop for as long as it takes (geometry/extrusion.py), at the F in force
     M82, M83           E is a place, or a step. After G91 it is a step whatever holds, as in Klipper; Marlin's G90 also ends M83
     G92 E0             what E is called from here on; nothing moves
-    RESTORE_GCODE_STATE   M82 or M83, G90 or G91, F and the place of E as SAVE_GCODE_STATE kept them
+    M221 S95           the flow: what follows feeds 95 % of its E
+    M200 D1.75         E is a volume of filament of that diameter; D0 or S0: a length again
+    G10, G11           back by S of M207, forward again by that and S of M208, at their F, once each; RETRACT_LENGTH ...
+                       of SET_RETRACTION; where none of them stands before, they feed nothing, with a note
+    RESTORE_GCODE_STATE   M82 or M83, G90 or G91, F, the flow and the place of E as SAVE_GCODE_STATE kept them
 
 E is in the program's units, and starts at 0. The words are gone through once more, for E alone, after the
 blocks are known: a row of the program has one block at most where E stands beside G0 to G3.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,12 +29,41 @@ from planner.base.kernels import njit
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.lexer import Words
 from planner.nc.program import MOVES, EventTable, Kind, Program, renumbered
+from planner.nc.settings import PRINTER_FEED, SET_RETRACTION
 
-_FLOW, _WHOLE_FLOW = 221.0, 100.0  # M221 S100
-_E, _F, _G, _M = ord("E"), ord("F"), ord("G"), ord("M")
+_FLOW, _VOLUME = 221.0, 200.0  # M codes
+_PERCENT = 100.0
+_D, _E, _F, _G, _M, _S = (ord(letter) for letter in "DEFGMS")
+_KEYS = {
+    "M207": {"s": "length", "f": "speed", "r": "extra", "t": "speed_forward"},  # R and T are RepRapFirmware's
+    "M208": {"s": "extra", "f": "speed_forward"},
+    SET_RETRACTION: {
+        "retract_length": "length",
+        "retract_speed": "speed",
+        "unretract_extra_length": "extra",
+        "unretract_speed": "speed_forward",
+    },
+}
 # G codes in tenths beside which E is the extruder's: straight moves, arcs, planes, units, distance and feed
 # modes.
 _WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 910, 911, 940])
+
+
+class Retraction(NamedTuple):
+    """From a line on: the length that G10 takes back, what G11 adds to it [mm], and their speeds [mm/s]."""
+
+    line: int = 0
+    length: float = 0.0
+    speed: float = PRINTER_FEED
+    extra: float = 0.0
+    speed_forward: float = 0.0
+
+    def changed(self, name: str, given: Mapping[str, float], line: int) -> Retraction:
+        """As a command of `RETRACTIONS` changes it."""
+        per = 1.0 if name == SET_RETRACTION else SECONDS_PER_MINUTE
+        found = {of: given[key] for key, of in _KEYS[name].items() if given.get(key, -1.0) >= 0.0}
+        speeds = {of: value / per for of, value in found.items() if of.startswith("speed")}
+        return self._replace(line=line, **found | speeds)
 
 
 class _Fed(NamedTuple):
@@ -43,28 +79,27 @@ def with_extruder(
     rows: int,
     factors: Sequence[tuple[int, float]] = (),
     states: Sequence[tuple[int, str, bool]] = (),
+    retractions: Sequence[Retraction] = (),
 ) -> Program:
     """The program with what the extruder feeds on each block, and full stops where it moves alone. Raises
-    InputError for a flow that is not 100 % (M221), for an E word beside more than one move or beside another
-    G code, and for one alone before the first F word.
+    InputError for an E word beside more than one move or beside another G code, and for one alone before the
+    first F word.
 
     words   : of the program; of these the first `rows` rows
     factors : by which F counts from a line on (M220)
     states  : line, name, and whether it is brought back, of the states that are kept (saved_states.py)
+    retractions : how G10 and G11 feed from a line on
     """
     state = np.zeros(rows, dtype=np.int64)
     names = list(dict.fromkeys(name for _, name, _ in states))
     for of, name, back in states:
         state[words.line[:rows] == of] = (1 + names.index(name)) * (-1 if back else 1)
     fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES, state))
-    if not fed.amount.any():
-        return program
     of_line, factor = zip((0, 1.0), *factors, strict=True)
     fed.feed[:] *= np.array(factor)[np.searchsorted(of_line, words.line[:rows], side="right") - 1]
-    for row in words.rows_with(words.find("M", _FLOW)):
-        letter, value = words.of_rows(row)
-        if row < rows and (value[letter == ord("S")] != _WHOLE_FLOW).any():
-            _refuse_any(program, words.line[row : row + 1], "a flow that is not 100 % (M221)")
+    _retract(fed, words, rows, retractions)
+    if not fed.amount.any():
+        return program
     given = np.flatnonzero(fed.amount)
     line, unknown = words.line[given], np.isnan(fed.amount[given])
     _refuse_any(program, line[unknown], "an E word beside a G code that is none of G0 to G3, G5 and G92")
@@ -79,6 +114,21 @@ def with_extruder(
     extruded[of_moves[first[~alone]]] = fed.amount[given[~alone]]
     at = np.searchsorted(program.line, line[alone], side="right")
     return _with_stops(program, extruded, at, line[alone], _Fed(*(c[given[alone]] for c in fed)))
+
+
+def _retract(fed: _Fed, words: Words, rows: int, retractions: Sequence[Retraction]) -> None:
+    """Put what G10 and G11 feed into the rows: of two that are the same in turn the first."""
+    back, of_line = 0.0, [of.line for of in retractions]
+    for row in words.rows_with(words.find("G", 10.0, 11.0)) if retractions else ():
+        letter, value = words.of_rows(row)
+        known = bisect_right(of_line, int(words.line[row])) - 1
+        if row >= rows or known < 0 or np.isin(letter, [ord("L"), ord("P")]).any():
+            continue
+        of, forward = retractions[known], bool((value[letter == _G] == 11.0).any())
+        if forward == (back > 0.0):
+            fed.amount[row] = back + of.extra if forward else -of.length
+            fed.feed[row] = of.speed_forward or of.speed if forward else of.speed
+            back = 0.0 if forward else of.length
 
 
 def _refuse_any(program: Program, line: Array, what: str) -> None:
@@ -127,22 +177,30 @@ def _fed(letter, value, first, with_moves, state):
     rows = len(first) - 1
     amount, feeds = np.zeros(rows), np.zeros(rows)
     absolute, absolute_moves, unit, feed, place = True, True, 1.0, 0.0, 0.0
-    kept = np.zeros((1 + np.abs(state).max() if rows else 1, 4))
+    flow, per_volume = 1.0, 1.0
+    kept = np.zeros((1 + np.abs(state).max() if rows else 1, 5))
     for row in range(rows):
         if state[row] > 0:
             kept[state[row], 0], kept[state[row], 1] = absolute, absolute_moves
-            kept[state[row], 2], kept[state[row], 3] = feed, place
+            kept[state[row], 2:] = feed, place, flow
         elif state[row] < 0:
             back = kept[-state[row]]
-            absolute, absolute_moves, feed, place = back[0] > 0.0, back[1] > 0.0, back[2], back[3]
+            absolute, absolute_moves = back[0] > 0.0, back[1] > 0.0
+            feed, place, flow = back[2], back[3], back[4]
         has, sets, others, unknown, e, before = False, False, False, False, 0.0, unit
+        m, s, d = 0.0, -1.0, -1.0
         for word in range(first[row], first[row + 1]):
             c, v = letter[word], value[word]
             if c == _E:
                 has, e = True, v
             elif c == _F and v > 0.0:
                 feed = v * before / SECONDS_PER_MINUTE
+            elif c == _S:
+                s = v
+            elif c == _D:
+                d = v
             elif c == _M:
+                m = v
                 others = others or not (v == 82.0 or v == 83.0)
                 if v == 82.0 or v == 83.0:
                     absolute = v == 82.0
@@ -157,6 +215,10 @@ def _fed(letter, value, first, with_moves, state):
                 for k in range(len(with_moves)):
                     known = known or code == with_moves[k]
                 unknown = unknown or not (known or code == 920)
+        if m == _FLOW and s > 0.0:
+            flow = s / _PERCENT
+        elif m == _VOLUME and (d >= 0.0 or s == 0.0):
+            per_volume = 4.0 / (np.pi * d**2) if d > 0.0 and s != 0.0 else 1.0
         feeds[row] = feed
         if not has or others:
             continue
@@ -165,9 +227,9 @@ def _fed(letter, value, first, with_moves, state):
         elif sets:
             place = e * unit
         elif absolute and absolute_moves:
-            amount[row] = e * unit - place
+            amount[row] = (e * unit - place) * flow * per_volume
             place = e * unit
         else:
-            amount[row] = e * unit
+            amount[row] = e * unit * flow * per_volume
             place += e * unit
     return amount, feeds

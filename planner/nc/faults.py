@@ -13,10 +13,11 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.nc.codes import LETTERS_REFUSED, PARKABLE, Assumption
+from planner.nc.extruder import Retraction
 from planner.nc.lexer import Words
 from planner.nc.program import MadeWhenAsked, plain
 from planner.nc.reading import AUTO, IGNORE, Reading
-from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, TOOL_POINT_M
+from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, RETRACTION, TOOL_POINT_M
 
 # How a letter is treated whatever stands beside it, in `IgnoredWords.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
@@ -161,6 +162,7 @@ class IgnoredWords:
         self.strict = reading.strict
         self.printer = False
         self.extruder = ""  # the last T word of a printer
+        self.retractions: list[Retraction] = []  # that a printer's program sets
         self.parked = np.full(256, np.nan)
         self.treatment = np.full(256, READ, dtype=np.uint8)
         for letter in LETTERS_REFUSED:
@@ -189,7 +191,7 @@ class IgnoredWords:
 
     def count(self, what: Assumption, word: str, line: int, times: int = 1) -> None:
         """Keep that a word was met; `times` if it stands for more of them."""
-        if what is EXTRUDER_ZERO and self.follows:
+        if self.follows and (what is EXTRUDER_ZERO or (what is RETRACTION and self.retractions)):
             return
         turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
         if turning and word.upper().lstrip("M0") in ("128", "428"):

@@ -198,7 +198,7 @@ class Mover:
         state = self.state
         if state.motion < 0:
             raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
-        auxiliary.take_default(state, self.feed_default, block, self.findings)
+        auxiliary.take_default(state, self.feed_default, block, self.findings, printer=self.ignored.printer)
         drills = state.motion in codes.CYCLES or (state.fanuc and state.motion == codes.THREADING)
         if not drills:
             state.series = None
@@ -303,7 +303,7 @@ class Mover:
         found = self.splines.read(state, block, self.table.blocks)
         if found is None:
             return
-        auxiliary.take_default(state, self.feed_default, block, self.findings)
+        auxiliary.take_default(state, self.feed_default, block, self.findings, printer=self.ignored.printer)
         auxiliary.check_feed(state, block)
         (points, weights), line = found
         state.position[:3] = points[-1, -1]

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.nc.codes import Assumption, number
+from planner.nc.codes import Assumption
+from planner.nc.extruder import Retraction
 from planner.nc.faults import IgnoredWords
 from planner.nc.lexer import FAULT, Words
 from planner.nc.moves import Block
@@ -24,6 +25,7 @@ from planner.nc.settings import (
     MACRO,
     PARKS,
     PRINTER_M,
+    RETRACTIONS,
     SCALE_M,
     SETS_LIMITS,
     TOOLS,
@@ -35,7 +37,7 @@ from planner.nc.settings import (
 
 _COUNTS = (82.0, 83.0, 104.0, 109.0, 140.0, 190.0)  # M codes that only printers have
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
-_NAME = r"[A-Za-z_][A-Za-z]*_\w*(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
+_NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
 _COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE)
 _EXTENDED = re.compile(rf"\s*(?:{_NAME})", re.IGNORECASE)
 _KEY = re.compile(r"([A-Za-z]\w*)\s*=\s*(\"[^\"]*\"|\S*)")
@@ -43,30 +45,7 @@ _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")
 # G codes that are read as in any program, by number; of the others those that level, wipe, park or probe.
 _ANY = frozenset((0, 1, 2, 3, 4, 5, 10, 11, 17, 18, 19, 20, 21, *range(52, 60), 90, 91, 92, 93, 94))
 _LEVELS = frozenset(
-    (
-        12,
-        26,
-        27,
-        29,
-        30,
-        31,
-        32,
-        33,
-        34,
-        35,
-        39,
-        42,
-        76,
-        *range(80, 90),
-        130,
-        150,
-        212,
-        375,
-        380,
-        392,
-        425,
-        2814,
-    )
+    (12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425, 9111)
 )
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
@@ -80,10 +59,11 @@ SAVE, RESTORE, OFFSET, PLACE = (
 OF_STATE = frozenset((SAVE, RESTORE, OFFSET, PLACE, "G60", "G61"))
 # Names of Klipper by what is said of them, in this order; of others (macros of the machine) MACRO.
 _NAMES = {
-    PARKS: r"PAUSE|RESUME|(UN)?LOAD_FILAMENT|FILAMENT_(UN)?LOAD|CANCEL_PRINT|ACTIVATE_EXTRUDER",
+    PARKS: r"@?PAUSE|RESUME|(UN)?LOAD_FILAMENT|FILAMENT_(UN)?LOAD|CANCEL_PRINT|ACTIVATE_EXTRUDER",
     WAIT_M: r"TEMPERATURE_WAIT",
-    SCALE_M: r"BED_MESH_(PROFILE|CLEAR|OFFSET)|SKEW_PROFILE|SET_(SKEW|INPUT_SHAPER|DUAL_CARRIAGE|STEPPER_\w+|TMC_\w+|EXTRUDER_\w+)",
-    PRINTER_M: r"SET_\w+|EXCLUDE_OBJECT\w*|RESPOND|TIMELAPSE_\w+|_?TIMELAPSE_\w+|SAVE_\w+|CLEAR_PAUSE|ENABLE_\w+|(QUERY|GET|DUMP|STATUS"
+    SCALE_M: r"BED_MESH_(PROFILE|CLEAR|OFFSET)|SKEW_PROFILE|SET_(SKEW|INPUT_SHAPER|DUAL_CARRIAGE"
+    r"|STEPPER_\w+|TMC_\w+|EXTRUDER_\w+)",
+    PRINTER_M: r"@.+|SET_\w+|EXCLUDE_OBJECT\w*|RESPOND|_?TIMELAPSE_\w+|SAVE_\w+|CLEAR_PAUSE|ENABLE_\w+|(QUERY|GET|DUMP|STATUS"
     r"|SDCARD|UPDATE|START_PRINT_TIMER|PRINT_STATS)_\w+|TURN_OFF_HEATERS|SYNC_EXTRUDER_MOTION|MMU_\w*STATS|ACTION_\w+",
 }
 _MEANT = dict.fromkeys((98, 401, 402), LEVELLING) | {290: SCALE_M}
@@ -116,7 +96,7 @@ def command_of(text: str) -> Command | None:
         return None
     name = "".join(match[1].upper().split())
     if len(name) > 1 and name[0] in "GMTP" and name[1].isdigit() and len(name) < 9:
-        name = name[0] + number(round(float(name[1:]) * 10.0))
+        name = f"{name[0]}{float(name[1:]):g}"
     return Command(name, text[match.end() :].strip())
 
 
@@ -145,8 +125,8 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     name, values = found.name, found.values()
     code = int(name[1:].partition(".")[0]) if name[1:2].isdigit() else -1
     limits = name == VELOCITY_LIMIT or (name == f"M{code}" and code in SETS_LIMITS)
+    given = {key: _number(value) for key, value in values.items()}
     if limits or name in OF_STATE:
-        given = {key: _number(value) for key, value in values.items()}
         block.settings.append(Setting(name, given, word, values.get("name" if found.extended else "s", "")))
     elif name[0] == "G" and code in _ANY:
         return False
@@ -158,6 +138,11 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     elif name in _HOMING:
         block.homing = "".join(axis for axis in "XYZ" if axis.lower() in values) or "XYZ"
     else:
+        if name in RETRACTIONS and (found.extended or "s" in given):
+            before = ignored.retractions[-1] if ignored.retractions else Retraction()
+            ignored.retractions.append(before.changed(name, given, block.line))
+            if given.get("z"):
+                ignored.count(SCALE_M, name, block.line)
         what, stops = _meaning(found, code, ignored)
         if what is None:
             return False

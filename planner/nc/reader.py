@@ -159,7 +159,7 @@ def execute(
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.ignored.follows and not len(faults):
-        of_lines = interpreter.limits.factors, interpreter.saved.marks
+        of_lines = interpreter.limits.factors, interpreter.saved.marks, interpreter.ignored.retractions
         program = with_extruder(program, words, interpreter.rows_read, *of_lines)
     return interpreter, program, faults
 

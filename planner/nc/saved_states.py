@@ -19,7 +19,7 @@ from planner.nc.block_table import BlockTable
 from planner.nc.moves import WordFault
 from planner.nc.printer import OFFSET, PLACE, RESTORE, SAVE
 from planner.nc.program import Kind
-from planner.nc.settings import Setting
+from planner.nc.settings import PRINTER_FEED, Setting
 from planner.nc.state import State
 
 _AXES = "xyz"
@@ -46,7 +46,7 @@ class SavedStates:
         self.marks: list[tuple[int, str, bool]] = []  # line, name, and whether the state is brought back
 
     def take(self, setting: Setting, state: State, table: BlockTable, line: int) -> None:
-        """Execute a command. Raises WordFault for a state that was not kept, and for a move without a feed."""
+        """Execute a command. Raises WordFault for a state that was not kept."""
         name, given = setting.name, setting.values
         if name in (SAVE, "G60"):
             feeds = state.feed, state.feed_unit, state.feed_factor
@@ -74,7 +74,7 @@ class SavedStates:
             if given.get("move"):
                 target = state.position.copy()
                 target[:3] += by
-                _go(setting, target, given.get("move_speed"), state, table, line)
+                _go(target, given.get("move_speed"), state, table, line)
 
     def _restore(self, setting: Setting, back: _Kept, state: State, table: BlockTable, line: int) -> None:
         given = setting.values
@@ -83,7 +83,7 @@ class SavedStates:
             target = state.position.copy()
             axes = [axis for axis, letter in enumerate(_AXES) if letter in given] or [0, 1, 2]
             target[axes] = back.position[axes]
-            _go(setting, target, speed, state, table, line)
+            _go(target, speed, state, table, line)
             return
         self.marks.append((line, setting.slot, True))
         state.absolute, self.shift = back.absolute, back.shift.copy()
@@ -91,21 +91,17 @@ class SavedStates:
         state.apply_offsets()
         state.feed, state.feed_unit, state.feed_factor = back.feed, back.feed_unit, back.feed_factor
         if given.get("move"):
-            _go(setting, back.position, given.get("move_speed"), state, table, line)
+            _go(back.position, given.get("move_speed"), state, table, line)
 
 
 def _given(given: dict[str, float]) -> list[int]:
     return [axis for axis, letter in enumerate(_AXES) if letter in given]
 
 
-def _go(
-    setting: Setting, target: FloatArray, speed: float | None, state: State, table: BlockTable, line: int
-) -> None:
+def _go(target: FloatArray, speed: float | None, state: State, table: BlockTable, line: int) -> None:
     """A straight move at a speed [mm/s], or at F where None is given."""
     before = state.feed
-    state.feed = before if speed is None else speed
-    if not state.feed > 0.0:
-        raise WordFault(setting.word, f"{setting.name} moves, and no speed is given before it")
+    state.feed = speed or before or PRINTER_FEED
     state.position[:] = target
     table.add(Kind.LINE, line, state)
     state.feed = before

@@ -22,6 +22,9 @@ EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
 # what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
+SET_RETRACTION = "SET_RETRACTION"
+RETRACTIONS = ("M207", "M208", SET_RETRACTION)  # what G10 and G11 do on printers
+PRINTER_FEED = 25.0  # before the first F [mm/s]: Marlin's motion.cpp and Klipper's gcode_move.py
 SMOOTHNESS = "G187"  # of Haas: its E is a tolerance
 _GRBL_AXES = "xyzabc"  # grblHAL has six
 GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate(_GRBL_AXES)} | {
@@ -88,14 +91,14 @@ EXTRUDER_MODES = frozenset((82, 83))
 _MEANING: dict[int, Assumption] = {
     **dict.fromkeys((
         17, 18, 73, 84, *range(104, 112), 114, 115, *range(117, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164,
-        201, 202, 203, 204, 207, 208, 220, 240, 250, 280, 300, 301, 302, 304, 305, 400, 412, 413, 486, 500, 503, 504, 557,
+        200, 201, 202, 203, 204, 207, 208, 220, 221, 240, 250, 280, 300, 301, 302, 304, 305, 400, 412, 413, 486, 500, 503, 504, 557,
         558, 569, 572, 574, 575, 584, 851, 862, 900, 906, 907, 913, 914, 928, *EXTRUDER_MODES,
     ), PRINTER_M),
     **dict.fromkeys((109, 116, 190, 191, 303), WAIT_M),
     **dict.fromkeys((205, 566), CORNER_M),
-    # Steps per mm and their parts, offsets, flow, skew, scale, delta geometry, bed mesh, backlash, settings that are
+    # Steps per mm and their parts, offsets, skew, scale, delta geometry, bed mesh, backlash, settings that are
     # loaded, shaping, and which carriage follows.
-    **dict.fromkeys((92, 206, 218, 221, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666), SCALE_M),
+    **dict.fromkeys((92, 206, 218, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666), SCALE_M),
     **dict.fromkeys((125, 600, 701, 702), PARKS),
 }
 # Whose words are axes, which do not move.

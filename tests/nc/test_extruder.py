@@ -61,6 +61,39 @@ def test_blocks_around_a_move_alone_keep_their_words() -> None:
     ]
 
 
+def test_the_flow_and_volumes_scale_what_is_fed() -> None:
+    text = "G21 F600\nM82\nG1 X10 E1\nM221 S50\nG1 X20 E3\nM221 X0 Y0\nM200 D2\nG1 X30 E4\nM200 S0\nM221 S100\nG1 X40 E5\n"
+    assert read(text).extruded == pytest.approx([1.0, 1.0, 0.5 / np.pi, 1.0])
+    kept = (
+        "G21 F600\nM83\nSAVE_GCODE_STATE NAME=a\nM221 S50\nG1 X1 E1\nRESTORE_GCODE_STATE NAME=a\nG1 X2 E1\n"
+    )
+    assert read(kept).extruded == pytest.approx([0.5, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("settings", "back", "forward", "speeds"),
+    [
+        ("M207 S1.5 F1800\nM208 S0.1 F1200", 1.5, 1.6, (30.0, 20.0)),
+        ("M207 S2 R0.2 F600 T1200", 2.0, 2.2, (10.0, 20.0)),
+        ("SET_RETRACTION RETRACT_LENGTH=0.6 RETRACT_SPEED=40", 0.6, 0.6, (40.0, 40.0)),
+        ("M207 S1\nM207 S3 F300", 3.0, 3.0, (5.0, 5.0)),
+    ],
+)
+def test_a_firmware_retraction_goes_back_and_forward_once(
+    settings: str, back: float, forward: float, speeds: tuple[float, float]
+) -> None:
+    program = read(f"G21 F600\nM83\nG1 X1 E1\n{settings}\nG10\nG10\nG1 X9\nG11\nG11\nG1 X10 E1\n")
+    assert program.extruded == pytest.approx([1.0, -back, 0.0, forward, 1.0])
+    assert program.feed[[1, 3]] == pytest.approx(speeds)
+    assert not any("retraction" in note for note in program.notes)
+
+
+def test_without_settings_a_retraction_feeds_nothing_and_is_said() -> None:
+    program = read("G21 F600\nM83\nG1 X1 E1\nG10\nG1 X9\nG11\n")
+    assert np.count_nonzero(program.extruded) == 1
+    assert any("retractions of an extruder" in text for text in program.assumptions)
+
+
 def test_words_of_codes_are_not_the_extruders() -> None:
     program = read("G21 F600\nM203 X500 Y500 E25\nM92 E93\nM83\nG1 X10 E1\n")
     assert program.extruded == pytest.approx([1.0])

@@ -100,6 +100,12 @@ def test_a_restored_state_has_its_feed() -> None:
     assert program.feed.tolist() == [10.0, 1.0, 10.0, 10.0]
 
 
+def test_a_move_before_the_first_feed_has_that_of_printers() -> None:
+    program = parse_program("M83\nG1 X1\nSET_GCODE_OFFSET Z=1 MOVE=1\nG1 X2 F60", machine())
+    assert program.feed.tolist() == [25.0, 25.0, 1.0]
+    assert any("what Marlin and Klipper begin with, F1500" in text for text in program.assumptions)
+
+
 @pytest.mark.parametrize(
     "line", ["FORCE_MOVE STEPPER=x DISTANCE=5", "G999", "RESTORE_GCODE_STATE NAME=b", "G61 S3"]
 )

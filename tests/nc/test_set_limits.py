@@ -14,7 +14,6 @@ from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.program import SetLimit
 from planner.nc.reader import parse_program
-from planner.nc.reading import Reading
 from planner.nc.set_limits import limited
 from planner.report.export import write_plan
 
@@ -64,14 +63,6 @@ def test_the_extruder_alone_has_the_factor() -> None:
 def test_a_factor_that_is_not_positive_is_refused(value: str) -> None:
     with pytest.raises(InputError, match=r":2:1: M220.* must be positive"):
         parse_program(f"G21 F60\nM220 {value}\nG1 X1")
-
-
-def test_a_flow_that_is_not_whole_is_refused_where_the_extruder_is_followed() -> None:
-    text = "G21\nM83\nM221 S{}\nG1 X9 E1 F60\n"
-    with pytest.raises(InputError, match=r":3: .*flow"):
-        parse_program(text.format(95), PRINTER)
-    assert len(parse_program(text.format(100), PRINTER)) == 1
-    assert len(parse_program(text.format(95), PRINTER, Reading(extruder="ignore"))) == 1
 
 
 def test_the_time_of_a_plan_with_a_factor(tmp_path: Path) -> None:

@@ -209,7 +209,7 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
     seconds = block.value.get("P")
     if seconds is not None and ignored.printer:
         seconds *= MILLISECOND
-        findings.note("G4 P is in milliseconds, as 3-D printers have it (M82, M83)", block.line)
+        findings.note("G4 P is in milliseconds, as 3-D printers have it", block.line)
     elif seconds is None and not ignored.strict and (ignored.printer or "S" in block.value):
         seconds = block.value.get("S", 0.0)
         findings.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)

@@ -16,7 +16,6 @@ from planner.nc.moves import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
 from planner.nc.settings import (
     ALWAYS_READ,
     EVERYTHING,
-    EXTRUDER_MODES,
     GRBL,
     LEFT_OUT_BY_USER,
     TEXTS,
@@ -200,7 +199,6 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
         block.settings.append(Setting(name, {}, word))
     else:
         ignored.count(found.what, words.text(word), block.line)
-    ignored.printer |= letter == "M" and (found.what is None or code // 10 in EXTRUDER_MODES)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
     return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.letters

@@ -17,7 +17,7 @@ from planner.nc.extruder import Retraction
 from planner.nc.lexer import Words
 from planner.nc.program import MadeWhenAsked, plain
 from planner.nc.reading import AUTO, IGNORE, Reading
-from planner.nc.settings import EXTRUDER_ZERO, PRINTER_M, RETRACTION, TOOL_POINT_M
+from planner.nc.settings import EXTRUDER_ZERO, RETRACTION, TOOL_POINT_M
 
 # How a letter is treated whatever stands beside it, in `IgnoredWords.treatment`.
 READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
@@ -151,7 +151,7 @@ class IgnoredWords:
     treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
     parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
     moved     : letters of axes that are not planned and were refused, because they move
-    printer   : the program is one for a 3-D printer (printer.py), or has a code that only those have
+    printer   : the program is one for a 3-D printer (printer.py)
     follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
     at_tip    : the machine has kinematics: the switch of the tool centre point is read (tool_point.py)
     """
@@ -196,7 +196,6 @@ class IgnoredWords:
         turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
         if turning and word.upper().lstrip("M0") in ("128", "428"):
             what = TOOL_POINT_M
-        self.printer |= what is PRINTER_M
         found = self._counted.setdefault(what, _Counted(0, word, line))
         found.times += times
 

@@ -6,10 +6,12 @@ the same digits one place further on (0.0001 inch). X100. is 100 everywhere. Whi
 taken from the lines before it in the file.
 
 P words are dwells beside G4, and of a canned cycle on the line or in force. LinuxCNC and grbl have them in
-seconds. Fanuc and Haas have all of them in milliseconds; written with a point Haas takes seconds.
+seconds. Fanuc and Haas have all of them in milliseconds; written with a point Haas takes seconds. X and U
+beside G4 follow the rule of lengths: seconds, or 0.001 s where the least increment is 0.001 mm, in G20 too.
 """
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +23,10 @@ from planner.nc import codes
 from planner.nc.lexer import Words
 
 _DWELL = 4.0
-_LONG = 100.0  # X or U of a dwell without a point from here on is in ms: in seconds it would be minutes
+_IN_UNITS = (
+    "X or U of a dwell without a point is read in seconds, as lengths without one are in whole units; "
+    "least_increment = 0.001 under [dialect] of the machine file makes it milliseconds"
+)
 _MOTIONS = np.array([code / 10 for code, group in codes.G_GROUP.items() if group in ("motion", "cycle end")])
 _CYCLES = np.array(sorted({*codes.CYCLES, codes.THREADING})) / 10  # G76 of mills bores
 _DWELLING = {*codes.CYCLES, codes.THREADING, 40}
@@ -62,16 +67,16 @@ class DwellWords:
         self._in_cycle = bool(cycle[-1])
         return found
 
-    def in_seconds(self, words: Words) -> Words:
-        """The words of a chunk of Fanuc's with dwells in seconds, which numbers with a point are already."""
-        texts = ((w, words.text(w).upper()) for w in self.find(words))
-        times = [
-            w
-            for w, text in texts
-            if "." not in text and (text[:1] == "P" or (text[:1] in ("X", "U") and words.value[w] >= _LONG))
-        ]
-        if not times:
-            return words
+    def in_seconds(self, words: Words, say: Callable[[str, int, int], None] | None) -> Words:
+        """The words of a chunk of Fanuc's with dwells in seconds, which numbers with a point are already.
+
+        say : gets how X and U without a point are read, their line and index; None with a least increment
+        """
+        whole = [w for w in self.find(words) if "." not in words.text(w)]
+        times = [w for w in whole if words.text(w)[:1] in "Pp"]  # as written: X of a lathe has become P
+        if say is not None:
+            for word in sorted(set(whole).difference(times)):
+                say(_IN_UNITS, int(words.line[words.row(word)]), word)
         value = words.value.copy()
         value[times] *= MILLISECOND
         return dataclasses.replace(words, value=value)
@@ -91,7 +96,9 @@ class Integers:
         switch = words.find("G", 20.0, 21.0)
         inch = np.append(False, words.value[switch] == 20.0)
         at = np.searchsorted(switch, words.first[1:], side="left")  # switches up to the end of each row
-        return np.where(inch[at], self.increment * INCH_INCREMENT, self.increment)
+        in_inches = inch[at]
+        in_inches[words.rows_with(words.find("G", _DWELL))] = False  # a time has no inches
+        return np.where(in_inches, self.increment * INCH_INCREMENT, self.increment)
 
     def applied(self, words: Words) -> Words:
         """The words with their numbers in units."""

@@ -21,7 +21,7 @@ from planner.nc.block_reader import read_block
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
 from planner.nc.faults import FaultList, Findings, IgnoredWords, Notes
-from planner.nc.integers import DwellWords
+from planner.nc.integers import DwellWords, integers_of
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
 from planner.nc.moves import Block, WordFault
@@ -121,7 +121,10 @@ class Interpreter:
 
     def in_seconds(self, words: Words) -> Words:
         """The next words of the program with the times of dwells in seconds, as `execute` takes them."""
-        return self._dwells.in_seconds(words) if self.state.fanuc else words
+        if not self.state.fanuc:
+            return words
+        known = integers_of(self.machine).increment is not None
+        return self._dwells.in_seconds(words, None if known else self.findings.assume)
 
     def execute(self, words: Words) -> None:
         """Execute all rows, plain ones by the compiled loop (plain.py). Faults are kept, none is raised."""

@@ -2,10 +2,11 @@
 
     M862.3 P "MK3S"      G29 P1 X10 W30      M486 A"cube (1)"      SET_VELOCITY_LIMIT ACCEL=5000      T1      M1006 A0 M60 N50
 
-A program is one if it heats a nozzle or a bed, says how E counts (M82, M83), or has a command of Klipper: a name of
-two words or more, or with KEY=VALUE behind it. G codes that RS274NGC shares with printers are read as those of any
-program. Of the others, those that set limits and coordinates act (set_limits.py, saved_states.py), all else is an
-event: counted where it moves nothing, and said first where it may move, for what it moves is not known.
+A program is one if it says how E counts (M82, M83), sets a heater, fan, limit or flow to a number (M104 S200; M104
+and M109 alone are codes of mills), or has a command of Klipper: a name of two words or more, or with KEY=VALUE
+behind it. G codes that RS274NGC shares with printers are read as those of any program. Of the others, those that
+set limits and coordinates act (set_limits.py, saved_states.py), all else is an event: counted where it moves
+nothing, and said first where it may move, for what it moves is not known.
 """
 
 import math
@@ -35,7 +36,10 @@ from planner.nc.settings import (
     meaning,
 )
 
-_COUNTS = (82.0, 83.0, 104.0, 109.0, 140.0, 190.0)  # M codes that only printers have
+# M codes that only printers have, and those that only printers have with a number on a line of their own.
+_COUNTS = (82.0, 83.0)
+_SETS = (104.0, 106.0, 109.0, 140.0, 141.0, 190.0, 191.0, 201.0, 202.0, 203.0, 204.0, 220.0, 221.0)
+_NUMBERS = b"SRXYZE"  # letters of such numbers
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
 _NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
 _COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE)
@@ -102,7 +106,12 @@ def command_of(text: str) -> Command | None:
 
 def is_printer(words: Words) -> bool:
     """True for a program of a 3-D printer."""
-    if len(words.find("M", *_COUNTS)):
+    of_sets = [words.of_rows(row)[0].tolist() for row in words.rows_with(words.find("M", *_SETS))]
+    sets = (
+        ord("G") not in letters and letters.count(ord("M")) == 1 and set(letters) & set(_NUMBERS)
+        for letters in of_sets
+    )
+    if len(words.find("M", *_COUNTS)) or any(sets):
         return True
     rows = words.rows_with(np.flatnonzero(words.letter == FAULT))
     return any(_EXTENDED.match(words.row_text(row)) for row in rows)

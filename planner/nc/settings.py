@@ -84,15 +84,13 @@ LEVELLING = Assumption(
 TOOLS = Assumption(
     "change{|s} of the extruder (T)", "a full stop; what it moves and lasts is not planned", changes=True
 )
-# By number. M82 and M83 are the extruder's G90 and G91: only 3-D printers have them.
-EXTRUDER_MODES = frozenset((82, 83))
 # fmt: off
 # M codes of printers by number: what is said of them. Waits and parking are full stops.
 _MEANING: dict[int, Assumption] = {
     **dict.fromkeys((
-        17, 18, 73, 84, *range(104, 112), 114, 115, *range(117, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164,
+        17, 18, 73, *range(82, 85), *range(104, 112), 114, 115, *range(117, 122), 126, 127, *range(140, 146), 149, 150, 155, 163, 164,
         200, 201, 202, 203, 204, 207, 208, 220, 221, 240, 250, 280, 300, 301, 302, 304, 305, 400, 412, 413, 486, 500, 503, 504, 557,
-        558, 569, 572, 574, 575, 584, 851, 862, 900, 906, 907, 913, 914, 928, *EXTRUDER_MODES,
+        558, 569, 572, 574, 575, 584, 851, 862, 900, 906, 907, 913, 914, 928,
     ), PRINTER_M),
     **dict.fromkeys((109, 116, 190, 191, 303), WAIT_M),
     **dict.fromkeys((205, 566), CORNER_M),

@@ -112,3 +112,24 @@ def test_a_move_before_the_first_feed_has_that_of_printers() -> None:
 def test_what_moves_and_is_not_known_is_refused(line: str) -> None:
     with pytest.raises(InputError, match=r"^<text>:3:"):
         parse_program(f"M83\nG1 X1 F60\n{line}\nG1 X2", machine())
+
+
+@pytest.mark.parametrize(
+    "code",
+    ["M104", "M109", "M109 P501", "M105", "M140", "M190", "M106", "M107", "M17", "M84", "M203", "M250"],
+)
+def test_codes_that_mills_have_too_do_not_make_a_printer(code: str) -> None:
+    """Probe arms and questions of Haas, C axes and barriers of Okuma: dwells stay in seconds, E words and G61 what they are."""
+    program = parse_program(f"G21 F600\n{code}\nG1 X5\nG4 P2\nG61\nG0 X9\n")
+    assert program.dwell.sum() == 2.0
+    assert not [note for note in program.notes if "printers" in note]
+    with pytest.raises(InputError, match="extruder"):
+        parse_program(f"G21 F600\n{code}\nG1 X5 E2\n")
+
+
+@pytest.mark.parametrize(
+    "code", ["M104 S200", "N5 M109 R180", "M140 S60", "M106 S255", "M82", "M83", "M204 S900", "M221 S95"]
+)
+def test_codes_that_only_printers_have_make_one_wherever_they_stand(code: str) -> None:
+    for text in (f"{code}\nG4 P2000\nG1 X5 F600\n", f"G4 P2000\nG1 X5 F600\n{code}\n"):
+        assert parse_program("G21\n" + text).dwell.sum() == 2.0

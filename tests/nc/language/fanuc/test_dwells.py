@@ -81,3 +81,22 @@ def test_a_long_dwell_in_seconds_is_said_first_unless_the_dialect_is_given(text:
     short = parse_program(HEAD + "G4 P59\n", machine())
     assert not short.assumptions
     assert np.isclose(short.dwell.sum(), 59.0)
+
+
+@pytest.mark.parametrize("letter", "XU")
+@pytest.mark.parametrize("unit", ["G21", "G20"])
+@pytest.mark.parametrize("number", [1, 99, 100, 2500])
+def test_x_and_u_follow_the_rule_of_lengths(letter: str, unit: str, number: int) -> None:
+    """Seconds, said first, where lengths without a point are whole units; least increments where the machine has them."""
+    text = HEAD.replace("G21", unit) + "G1 X1. F9.\nG4 {}{}\nG1 X2.\n"
+    increments = machine(dialect={"least_increment": 0.001})
+    for tail in ("", "#1=5\n"):  # with macros, too
+        whole = parse_program(text.format(letter, number) + tail, machine(), FANUC)
+        assert dwells(whole) == [number]
+        assert [said for said in whole.assumptions if "without a point is read in seconds" in said]
+        fine = parse_program(text.format(letter, number) + tail, increments, FANUC)
+        assert dwells(fine) == [pytest.approx(number * 0.001)]
+        for of in (machine(), increments):
+            pointed = parse_program(text.format(letter, f"{number}.") + tail, of, FANUC)
+            assert dwells(pointed) == [number]
+            assert not [said for said in (*pointed.notes, *fine.notes) if "without a point" in said]

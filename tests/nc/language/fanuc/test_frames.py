@@ -77,7 +77,7 @@ CASES = {
         "G12 I4. K7. Q2. Z-1. D1 F300.\nG0 Z5.",
         "G1 Z-1 F300\nG2 X2 Y0 I1\nG2 X2 Y0 I-2\nG1 X4\nG2 X4 Y0 I-4\nG1 X5\nG2 X5 Y0 I-5\nG2 X0 Y0 I-2.5\nG0 Z5",
     ),
-    "dwells": ("G4 X1.5\nG4 U2.\nG4 P500\nG4 X1000", "G4 P1.5\nG4 P2\nG4 P.5\nG4 P1"),
+    "dwells": ("G4 X1.5\nG4 U2.\nG4 P500\nG4 X1", "G4 P1.5\nG4 P2\nG4 P.5\nG4 P1"),
     "a tolerance of Haas": ("G187 P2 E0.03\nG1 X5. Y5.", "G64 P0.03\nG1 X5 Y5"),
     "work systems of Haas": (
         "G10 L20 P3 X7. Y0 Z0\nG154 P3\nG0 X1.\nG54 X2.\nG112 X3.",

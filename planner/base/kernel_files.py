@@ -28,8 +28,7 @@ from typing import NamedTuple
 
 
 def fault_of(folder: str) -> str:
-    """Why files of this folder must not be run, in words after its name; empty if they may. It need not be
-    there yet."""
+    """Why files of this folder, which need not be there yet, must not be run; empty if they may."""
     if not os.path.isabs(folder):
         return "is not an absolute path"
     if not hasattr(os, "geteuid"):
@@ -72,8 +71,7 @@ def _owner_of_package() -> int:
 
 @cache
 def _private_group() -> int | None:
-    """The group that is this user's alone, as many systems give everybody one of their own name; None without
-    one."""
+    """The group that is this user's alone, as many systems give everybody one; None without one."""
     import grp
     import pwd
 
@@ -95,8 +93,7 @@ class KernelCacheWarning(UserWarning):
 
 
 class Compilation:
-    """Who is told of kernels that are compiled: `begins` with True for one that is kept for the next run, and
-    `ends`."""
+    """Who is told of kernels being compiled: `begins` with True for one that is kept, and `ends`."""
 
     def begins(self, is_kept: bool) -> None:
         """A kernel is about to be compiled."""
@@ -154,8 +151,7 @@ def place(function: FunctionType, content: bytes, types_and_tools: str) -> Kerne
 
 
 def read(file: KernelFile) -> bytes | None:
-    """The kernel that was written to it, or None: what is damaged, of another content, or may be somebody
-    else's, is not there."""
+    """The kernel in it, or None: what is damaged, of another content or somebody else's is not there."""
     for folder in (*folders(), *([] if fault_of(installed()) else [installed()])):
         path = os.path.join(folder, file.name)
         try:
@@ -173,8 +169,7 @@ def read(file: KernelFile) -> bytes | None:
 
 
 def write(file: KernelFile, kernel: bytes) -> str:
-    """Keep a kernel, in place of what had its name; returns the path. Raises OSError if it can be written
-    nowhere."""
+    """Keep a kernel under its name; returns the path. Raises OSError if it can be written nowhere."""
     faults: list[OSError] = []
     rest = file.content + kernel
     for folder in folders():
@@ -227,8 +222,7 @@ def folders() -> list[str]:
 
 
 def _of_user() -> str:
-    """The user's cache directory. A relative one in XDG_CACHE_HOME counts as none, as its specification
-    says."""
+    """The user's cache directory; a relative XDG_CACHE_HOME counts as none, as its specification says."""
     if sys.platform == "win32":
         return os.environ.get("LOCALAPPDATA") or os.path.expanduser(r"~\AppData\Local")
     if sys.platform == "darwin":

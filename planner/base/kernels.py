@@ -87,8 +87,7 @@ _one_at_a_time = threading.RLock()
 
 
 def njit(*, cache: bool = True, **settings: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk where that is
-    possible."""
+    """`numba.njit` with these settings, as a decorator; with `cache` kernels are kept on disk if possible."""
 
     def made(function: Callable[..., Any]) -> Any:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):

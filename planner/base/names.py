@@ -144,8 +144,7 @@ def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None
 
 
 def known_name(kind: str, name: str, names: Iterable[str], aliases: Iterable[str] = ()) -> str:
-    """The name, as it is. Raises InputError if it is none of `names`, with one that is near among them and
-    their aliases."""
+    """The name, if it is one of `names`; else raises InputError, with a near one of these or `aliases`."""
     if name in (known := tuple(names)):
         return name
     near = difflib.get_close_matches(str(name), (*known, *aliases), n=1)

@@ -7,8 +7,7 @@ from planner.base.kernels import njit
 
 
 def nearest(values: FloatArray, wanted: FloatArray) -> Array:
-    """(n,) indices of the ascending values (m,), m > 0, that are nearest to those wanted (n,); the first of
-    equally near ones."""
+    """(n,) indices of the ascending values (m,), m > 0, nearest to `wanted` (n,); the first of equals."""
     above = np.clip(np.searchsorted(values, wanted), 1, max(len(values) - 1, 1))
     below = np.minimum(above - 1, len(values) - 1)
     above = np.minimum(above, len(values) - 1)

@@ -117,8 +117,7 @@ USUAL = Sizes()
 
 
 def chosen(said: str) -> Sizes:
-    """The sizes that `said` asks for: "" for the usual ones, `small`, or kinds with commas between them.
-    Raises InputError for another word."""
+    """The sizes of `said`: "" the usual, `small`, or kinds with commas. Raises InputError for others."""
     kinds = {word.strip() for word in said.split(",") if word.strip()}
     unknown = sorted(kinds - {SMALL, *KINDS})
     if unknown:

@@ -73,8 +73,7 @@ class ScaledShape:
         return reach * self.share
 
     def breaks(self, params: FloatArray) -> tuple[float, ...]:
-        """The middle, where the matched side changes or two curves of a pair meet, whatever the `params`
-        (4,)."""
+        """The middle, where the matched side changes or two curves of a pair meet, whatever `params` (4,)."""
         return (0.5,)
 
 

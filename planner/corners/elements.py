@@ -39,8 +39,7 @@ class ElementTable(NamedTuple):
 
 
 class ElementIntervals(NamedTuple):
-    """P intervals on the elements of a smooth path, for kernels that evaluate it there; the first three are
-    its `ElementTable`."""
+    """P intervals on the elements of a smooth path, for kernels; the first three are its `ElementTable`."""
 
     legs: Array
     corners: Array

@@ -64,8 +64,7 @@ class FirCorner:
         return self
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m = V R(Tk/2) [mm] for tangent lengths d = V R(Tk) = `reach` (n,) [mm] at feeds
-        `feed` (n,) [mm/s]."""
+        """(n,) middle values m = V R(Tk/2) [mm] for d = V R(Tk) = `reach` (n,) [mm] at `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         return V * self.ramp(self.overlap_from_ramp(reach / V) / 2)
 
@@ -78,8 +77,7 @@ class FirCorner:
         return V * self.ramp(np.minimum(2.0 * self.overlap_from_ramp(middle / V), self.T1 + self.T2))
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n, 4) parameters V [mm/s], T1, T2, Tk [s] for tangent lengths d = `reach` (n,) [mm] at feeds
-        `feed` (n,) [mm/s]."""
+        """(n, 4) parameters V [mm/s], T1, T2, Tk [s] for d = `reach` (n,) [mm] at `feed` (n,) [mm/s]."""
         V = np.minimum(feed, self.feed_max)
         rows = np.empty((len(reach), 4))
         rows[:, 0], rows[:, 1], rows[:, 2] = V, self.T1, self.T2
@@ -99,8 +97,7 @@ class FirCorner:
         return np.where(t <= T2, early, np.where(t <= T1, middle, late))
 
     def overlap_from_ramp(self, value: FloatArray) -> FloatArray:
-        """(n,) times t in [0, Td] with R(t) = `value` (n,) [s]; Td where the value is larger than R(Td) =
-        Td/2."""
+        """(n,) times t in [0, Td] with R(t) = `value` (n,) [s]; Td for values above R(Td) = Td/2."""
         T1, T2 = self.T1, self.T2
         early = np.cbrt(6 * T1 * T2 * value)
         middle = T2 / 2 + np.sqrt(np.maximum(2 * T1 * value - T2**2 / 12, 0.0))
@@ -111,8 +108,7 @@ class FirCorner:
         return t
 
     def _late_overlap(self, value: FloatArray) -> FloatArray:
-        """The last branch, by Newton on the convex R from the right: t - Td/2 + (Td-t)^3/(6 T1 T2) =
-        value."""
+        """The last branch, by Newton on the convex R from the right: t - Td/2 + (Td-t)^3/(6 T1 T2)."""
         T1, T2 = self.T1, self.T2
         delay = T1 + T2
         t = np.full(value.shape, delay)

@@ -193,8 +193,7 @@ class KinematicCorner:
 
     @classmethod
     def from_machine(cls, machine: Machine, axes: tuple[str, ...]) -> KinematicCorner:
-        """The shape for the machine's limits of acceleration and jerk of `axes`. Raises InputError for an
-        axis that it lacks."""
+        """The shape for the machine's limits of `axes`. Raises InputError for an axis that it lacks."""
         return cls(acceleration=machine.limits("acceleration", axes), jerk=machine.limits("jerk", axes))
 
     def at(self, change: FloatArray) -> KinematicFamily:

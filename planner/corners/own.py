@@ -39,8 +39,7 @@ class PolynomialCorner(ScaledShape, ABC):
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """(K,) coefficients of z^3, z^4 ... [-], K = `OWN_TERMS`. Raises InputError unless f is as the
-        module's text says."""
+        """(K,) coefficients of z^3, z^4 ... [-], K = `OWN_TERMS`. Raises InputError for other f."""
         z = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PLACES))
         f = np.broadcast_to(np.asarray(self.retreat(1.0 - z), dtype=np.float64), z.shape)
         if not np.isfinite(f).all() or abs(f[-1] - 1.0) > POLYNOMIAL or abs(f[0]) > POLYNOMIAL:

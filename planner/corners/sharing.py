@@ -48,6 +48,5 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
 
 
 def _claim(free: FloatArray, fraction: FloatArray, other_can: FloatArray) -> FloatArray:
-    """The share of one end in the free length (R,): its fraction, or all that the other end cannot use
-    [mm]."""
+    """The share of one end in the free length (R,): its fraction, or what the other cannot use [mm]."""
     return np.maximum(free * fraction, free - other_can)

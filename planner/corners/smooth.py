@@ -26,22 +26,18 @@ from planner.machine import Machine
 
 
 class CornerFamily(Protocol):
-    """Corners at n given joints: how tangent length d and middle value m depend on each other
-    (corners/blend.py)."""
+    """Corners at n given joints: tangent length d and middle value m by each other (corners/blend.py)."""
 
     def reach(self, middle: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at programmed feeds `feed` (n,)
-        [mm/s]."""
+        """(n,) tangent lengths d [mm] for middle values m (n,) [mm] at feeds `feed` (n,) [mm/s]."""
         ...
 
     def middle(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed` (n,)
-        [mm/s]."""
+        """(n,) middle values m [mm] for tangent lengths d = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
         ...
 
     def params(self, reach: FloatArray, feed: FloatArray) -> FloatArray:
-        """(n, 4) parameters of the shape for tangent lengths d = `reach` (n,) [mm] at programmed feeds `feed`
-        (n,) [mm/s]."""
+        """(n, 4) parameters for tangent lengths d = `reach` (n,) [mm] at feeds `feed` (n,) [mm/s]."""
         ...
 
 
@@ -123,8 +119,7 @@ class SmoothPath:
 
     @cached_property
     def passed(self) -> FloatArray:
-        """(M+1,) where the path passes the start of each segment, counted like `Legs.place` [mm]; it differs
-        from that on splines."""
+        """(M+1,) where the path passes each segment's start, like `Legs.place` [mm] but on splines."""
         return passed_places(self.toolpath, self.legs, self.spline)
 
     @property
@@ -220,8 +215,7 @@ def round_corners(
 
 
 def _close_legs(d: FloatArray, length: FloatArray) -> FloatArray:
-    """(R+1, 2) factors on tangent lengths that close legs with next to nothing between their corners; the
-    larger corner takes it."""
+    """(R+1, 2) factors on tangent lengths that close legs with next to nothing between their corners."""
     scale = np.ones((len(d), 2))
     free = length - d[:-1] - d[1:]
     leg = np.flatnonzero(free < CLOSE * length)

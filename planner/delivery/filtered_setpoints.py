@@ -86,8 +86,7 @@ class FilteredSetpoints:
         return total if even else np.where(age > self.middle, -total, total)
 
     def of(self, motion: MotionInTime) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Times (T,) [s] and positions (T, A) [mm] behind the filters, part by part, from the start until the
-        filters are empty."""
+        """Times (T,) [s], positions (T, A) [mm] behind the filters, part by part, until these are empty."""
         first, kept = 0, None
         for places in self._setpoints(motion):
             seen = places if kept is None else np.concatenate([kept, places])
@@ -98,8 +97,7 @@ class FilteredSetpoints:
             first, kept = first + count, seen[count:]
 
     def _setpoints(self, motion: MotionInTime) -> Iterator[FloatArray]:
-        """(n, 2, A) positions and velocities of the setpoints, some at a time, at rest before and behind
-        while that counts."""
+        """(n, 2, A) positions and velocities of the setpoints, some at a time, at rest before and behind."""
         still: FloatArray | None = None
         for chunk in sample_motion(motion, self.dt).chunks():
             both = np.stack([chunk.position, chunk.velocity], axis=1)

@@ -78,8 +78,7 @@ class Behind:
         self._setpoints = FilteredSetpoints(machine.interpolation, lengths, machine.dt)
 
     def errors(self, motion: MotionInTime) -> Errors:
-        """Errors of what the machine makes of the setpoints of a motion; without filters those of the motion
-        itself."""
+        """Errors of what the machine makes of a motion's setpoints; without filters of the motion itself."""
         return (
             self.path_errors(motion) if self._setpoints is None else self.path.of(self._setpoints.of(motion))
         )
@@ -108,15 +107,13 @@ class Behind:
         )
 
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
-        """(n,) True where `time` (n,) [s] is one at which the filters hold something of two runs: there a
-        longer rest is enough."""
+        """(n,) True where filters hold something of two runs at `time` (n,): a longer rest is enough."""
         runs = runs_of(motion)
         early, late = runs_within(runs.begin, runs.end, time, self.filters.delay)
         return early < late
 
     def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
-        """(G,) the shortest rest behind each run with which the filtered motion keeps the tolerance [s]; 0
-        behind the last run."""
+        """(G,) the shortest rest behind each run that keeps the filtered tolerance [s]; 0 behind the last."""
         found = np.zeros(len(runs))
         for low in range(0, len(runs) - 1, STOPS_AT_ONCE):
             stop = np.arange(low, min(low + STOPS_AT_ONCE, len(runs) - 1))
@@ -145,8 +142,7 @@ class Behind:
 
 
 def runs_within(begin: FloatArray, end: FloatArray, time: FloatArray, delay: float) -> tuple[Array, Array]:
-    """First and last (n,) of the runs from `begin` to `end` (G,) that have a share in what is delivered at
-    `time` (n,) [s]."""
+    """First and last (n,) of runs from `begin` to `end` (G,) that what is at `time` (n,) is made of."""
     early = np.searchsorted(end, time - delay, side="right")
     late = np.maximum(np.searchsorted(begin, time) - 1, 0)
     return np.minimum(early, late), late

@@ -100,8 +100,7 @@ def _slowed(
 def _rests(
     motion: MotionInTime, begin: float, end: float, within: float, jerk_limited: bool
 ) -> tuple[float, float]:
-    """The last rest of the motion up to `begin` and the first from `end` on, as far as `within` [s]; its own
-    ends beyond that."""
+    """The last rest up to `begin` and the first from `end` on, within `within` [s]; its own ends beyond."""
     edges = np.append(motion.t, motion.end)
     k, n = np.searchsorted(edges, [begin + AT_REST, end + AT_REST])  # jumps are of what is behind the rest
     low, high = np.searchsorted(edges, begin - within), np.searchsorted(edges, end + within, side="right")
@@ -131,8 +130,7 @@ def _rests(
 
 
 def _reach(verdict: Verdict) -> float:
-    """How far before and behind a place a motion has to be slower [s], by what its verdict saw
-    (motion/slowed.py)."""
+    """How far before and behind a place a motion has to be slower [s], by its verdict (motion/slowed.py)."""
     groups = {name.partition(".")[2] for name, check in verdict.limits.items() if check.limited} - {""}
     found = [0.0]
     for name in groups:

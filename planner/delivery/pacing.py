@@ -45,8 +45,7 @@ class MotionRuns:
         return dataclasses.replace(self, begin=edges[self.first], end=edges[self.last])
 
     def behind(self, by: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(G,) begins and ends of the runs [s], each but the last followed by a longer standstill, `by` (G,)
-        [s]."""
+        """(G,) begins and ends of the runs [s], each but the last followed by `by` (G,) [s] more."""
         later = np.append(0.0, np.cumsum(by[:-1]))
         return self.begin + later, self.end + later
 
@@ -70,8 +69,7 @@ def runs_of(motion: Timed) -> MotionRuns:
 
 
 def _rests(motion: AxisMotion) -> Array:
-    """(L,) True where nothing moves at the start of a piece, nor begins to with a jump of the
-    acceleration."""
+    """(L,) True where nothing moves at the start of a piece, nor begins to with an acceleration."""
     lasting = np.diff(np.append(motion.t, motion.end))[:, None]
     after = motion.acceleration + lasting * motion.jerk
     before = np.vstack([np.zeros_like(after[:1]), after[:-1]])

@@ -34,8 +34,7 @@ Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions
 
 
 class Errors(NamedTuple):
-    """How far a motion is from the program, as shares of the tolerance [-]; 1 - SPARE and less is not told of
-    places."""
+    """How far a motion is from the program, in tolerances [-]; up to 1 - SPARE places are not told."""
 
     time: FloatArray  # (n,) of places where the contour leaves the tolerance [s]
     ratio: FloatArray  # (n,) there

@@ -74,8 +74,7 @@ WaitingT = TypeVar("WaitingT", bound=_Waiting)
 
 
 class Standing(NamedTuple):
-    """Standstills that samples need: a motion that comes to rest at the times `at` (n,), ascending, stands
-    longer there `by` (n,) [s]."""
+    """Standstills that samples need: a motion at rest at `at` (n,), stands `by` (n,) [s] longer."""
 
     at: FloatArray
     by: FloatArray
@@ -113,8 +112,7 @@ def with_standstills(motion: WaitingT, stands: Standing) -> WaitingT:
 
 
 def _rests(motion: MotionInTime, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, Array]:
-    """When the motion comes to rest between its ends, when it leaves (n,) [s], where (n, A) [mm], and the
-    block there."""
+    """When the motion comes to rest between its ends, when it leaves (n,) [s], where (n, A), the block."""
     seen = joined(list(in_chunks(motion, dt, np.append(motion.t, motion.end))))
     still = seen.feed <= STANDING * seen.feed.max()
     begin = np.flatnonzero(still & ~np.append(False, still[:-1]))

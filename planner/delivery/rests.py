@@ -53,8 +53,7 @@ class Mean:
 
 
 def mean_of_filters(filters: Filters) -> Mean:
-    """The mean of moving averages: the motion in each of `STEPS` parts of it counts as it is in the
-    middle."""
+    """The mean of moving averages: in each of `STEPS` parts the motion counts as it is in the middle."""
     weight = np.diff(filters.step(filters.delay * np.arange(STEPS + 1) / STEPS))
     middle = np.arange(STEPS) + 0.5
     edge = np.arange(STEPS + 1)[:, None]
@@ -73,8 +72,7 @@ def mean_of_copies(shaper: Shaper) -> Mean:
     since = step - shaper.delay[:, None] * STEPS / shaper.length
 
     def between(place: FloatArray) -> FloatArray:
-        """(STEPS + 1, C) weights of the two steps beside the places (n, STEPS + 1); none for places at the
-        stop or before it."""
+        """(STEPS + 1, C) weights of the steps beside places (n, STEPS + 1); none at the stop or before."""
         share = np.clip(1.0 - np.abs(place[:, :, None] - step), 0.0, 1.0)
         return np.einsum("i,ijc->jc", shaper.weight, np.where(place[:, :, None] > 0.0, share, 0.0))
 

@@ -107,16 +107,14 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 
 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
-    """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among the bounds of the
-    feed."""
+    """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among its feed bounds."""
     d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
     allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 
 def _spread(whole: FloatArray, finer: float) -> tuple[Array, FloatArray]:
-    """Points inside intervals of durations `whole` (n,) [tau], graded towards both ends: their interval and
-    time, ascending."""
+    """Points inside intervals of durations `whole` (n,) [tau], denser at both ends: interval and time."""
     step = STEP / finer
     half = whole / 2.0
     most = np.where(half <= NEAR, half, NEAR * (1.0 + np.log(np.maximum(half, NEAR) / NEAR))) / step

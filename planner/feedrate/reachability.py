@@ -105,8 +105,7 @@ class Reachability:
     """The numba reachability solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is
-        reachable."""
+        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece cannot be joined."""
         began = time.perf_counter()
         x, u, bad_piece = _solve(axis_rows(problem), _bounds_of(problem))
         took = time.perf_counter() - began

@@ -52,14 +52,12 @@ THIRD_ORDER: dict[str, ThirdOrderSolver] = {
 
 
 def second_order_solver(solver: str | FeedrateSolver) -> FeedrateSolver:
-    """The solver without jerk limits of that name, or the solver given. Raises InputError for a name that is
-    none of them."""
+    """The solver without jerk limits of that name, or the one given. Raises InputError for another name."""
     return _named(solver, SECOND_ORDER, "second-order", THIRD_ORDER) if isinstance(solver, str) else solver
 
 
 def third_order_solver(solver: str | ThirdOrderSolver) -> ThirdOrderSolver:
-    """The solver with jerk limits of that name, or the solver given. Raises InputError for a name that is
-    none of them."""
+    """The solver with jerk limits of that name, or the one given. Raises InputError for another name."""
     return _named(solver, THIRD_ORDER, "optimal", SECOND_ORDER) if isinstance(solver, str) else solver
 
 

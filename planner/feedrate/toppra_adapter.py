@@ -60,8 +60,7 @@ class ToppraSolver:
     """toppra's TOPPRA with Seidel's solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece ask for more than is
-        reachable."""
+        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece cannot be joined."""
         toppra = _import_toppra()
         began = time.perf_counter()
         x, u = np.empty(len(problem)), np.zeros(len(problem))
@@ -158,8 +157,7 @@ def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
 def _rows(
     problem: FeedrateProblem, g: int, length: float, time_unit: float
 ) -> tuple[FloatArray, tuple[FloatArray | None, ...]]:
-    """Grid (n+1,) of piece g and toppra's parameters (a, b, c, F, g, bounds of u, bounds of x) in the given
-    units."""
+    """Grid (n+1,) of piece g and toppra's a, b, c, F, g, bounds of u, bounds of x in the given units."""
     points = slice(problem.piece[g], problem.piece[g + 1])
     d1, d2_left, d2_right = problem.d1[points], problem.d2_left[points], problem.d2_right[points]
     size, axes = d1.shape

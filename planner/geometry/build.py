@@ -180,14 +180,12 @@ def _laid(program: Program, splines: CurveSegments, block: Array) -> _Laid:
 
 
 def turning_angle(u1: FloatArray, u2: FloatArray) -> FloatArray:
-    """(n,) angles between the unit vectors u1 and u2 (n, A), row by row [rad]. Exact to rounding near 0 and
-    pi, unlike acos."""
+    """(n,) angles between unit vectors u1 and u2 (n, A) [rad]; exact near 0 and pi, unlike acos."""
     return 2.0 * np.arctan2(np.linalg.norm(u2 - u1, axis=-1), np.linalg.norm(u1 + u2, axis=-1))
 
 
 def _axes_in_use(program: Program, machine: Machine) -> Array:
-    """Indices of the axes that the machine has or that move: a plotter needs no z for a program that stays in
-    the plane."""
+    """Indices of the axes that the machine has or that move: a plotter needs no z to stay in the plane."""
     moved = (program.end != program.start).any(axis=0)
     for normal in np.unique(program.arc_normal):
         moved[: len(LINEAR_AXES)][np.arange(len(moved[: len(LINEAR_AXES)])) != normal] = True
@@ -216,8 +214,7 @@ def _check_coordinates(program: Program) -> None:
 
 
 def _curves_of(program: Program, tolerance: FloatArray) -> CurveSegments:
-    """The segments of all splines, for tolerances (B,) of the blocks [mm]; pieces that go nowhere are left
-    out."""
+    """The segments of all splines, for tolerances (B,) of blocks [mm]; those that go nowhere left out."""
     splines = program.splines
     goes = np.flatnonzero(np.ptp(splines.points, axis=1).max(axis=1, initial=0.0) > ZERO_LENGTH)
     near = CHORD_SHARE * tolerance[splines.block[goes]]
@@ -283,8 +280,7 @@ def _curvature_bound(arcs: Arcs) -> FloatArray:
 
 
 def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> FloatArray:
-    """Feed (M,) [mm/s] of the segments along the path in all axes, at most `feed_max` of the machine; of
-    threads as it is, to be refused."""
+    """Feed (M,) [mm/s] along the path in all axes, at most the machine's `feed_max`; of threads as it is."""
     feed = program.feed[block].copy()
     if len(program.axes) > len(LINEAR_AXES):
         feed *= path_per_length(program.axes, machine.radius, laid)
@@ -295,14 +291,12 @@ def _feeds(program: Program, machine: Machine, block: Array, laid: _Laid) -> Flo
 
 
 def feed_groups(axes: tuple[str, ...]) -> Array:
-    """(A,) what F goes by, of which the first that moves counts: 0 for x, y, z, 1 for u, v, w, 2 for rotary
-    axes."""
+    """(A,) what F goes by, the first that moves: 0 for x, y, z, 1 for u, v, w, 2 for rotary axes."""
     return np.array([0 if axis in LINEAR_AXES else 2 if axis in ROTARY_AXES else 1 for axis in axes])
 
 
 def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath) -> FloatArray:
-    """(M,) ds/dl of segments: the length in all axes, rotary ones at a radius [mm], for a unit of what F goes
-    by (program.py)."""
+    """(M,) ds/dl: the length in all axes [mm], for a unit of what F goes by (program.py)."""
     change, groups = (laid.end - laid.start) ** 2, feed_groups(axes)
     further = change[:, groups > 0].sum(axis=1)
     linear, parallel, rotary = (np.sqrt(change[:, groups == n].sum(axis=1)) for n in range(3))
@@ -314,8 +308,7 @@ def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath
 
 
 def _exact(program: Program, block: Array, joint: Array) -> Array:
-    """(M,) True for segments of blocks under G61 and G61.1, but where a corner at their start is that of a
-    block under G64."""
+    """(M,) True for segments under G61 and G61.1, but where the corner at their start is under G64."""
     rounded = joint == Joint.CORNER
     exact: Array = (program.path_control[block] != PathControl.BLEND) & ~rounded[:-1] & ~rounded[1:]
     return exact

@@ -121,8 +121,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
 
 
 def parted_by_feed(toolpath: Toolpath) -> Toolpath:
-    """The same path with a corner of angle 0 where the programmed feed changes on a straight line, so that a
-    leg ends there."""
+    """The same path with a corner of angle 0 where the feed changes on a line, so that a leg ends there."""
     same_way = toolpath.joint[1:-1] == Joint.SMOOTH
     change = np.flatnonzero(same_way & (toolpath.feed[1:] != toolpath.feed[:-1])) + 1
     return toolpath.with_joints(change, Joint.CORNER)

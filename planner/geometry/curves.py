@@ -63,8 +63,7 @@ class Curves:
         return len(self.twist)
 
     def at(self, row: Array, length: FloatArray, x: FloatArray) -> FloatArray:
-        """(n, 4, A) points [mm] and three x-derivatives of the curves in rows `row` (n,), `length` (n,) [mm]
-        long, at x (n,) [mm]."""
+        """(n, 4, A) points [mm], three x-derivatives of curves `row` (n,), `length` (n,) [mm], at x (n,)."""
         out = np.empty((len(row), 4, self.points.shape[2]))
         _at(self.points, self.weight, row, length, np.asarray(x, float), out)
         return out

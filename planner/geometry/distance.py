@@ -44,8 +44,7 @@ def _from_lines(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatA
 
 
 def _from_arcs(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatArray:
-    """(n,) distance of points (n, A) from arcs (n,): from the point at the same angle, in each of the turns,
-    and from both ends."""
+    """(n,) distance of points (n, A) from arcs (n,): at the same angle in each turn, and from both ends."""
     arcs, row, length = toolpath.arcs, toolpath.arc[segment], toolpath.length[segment]
     out = point - arcs.center[row]
     angle = np.arctan2((out * arcs.e2[row]).sum(axis=1), (out * arcs.e1[row]).sum(axis=1))
@@ -62,8 +61,7 @@ def _from_arcs(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatAr
 
 
 def _from_curves(toolpath: Toolpath, point: FloatArray, segment: Array) -> FloatArray:
-    """(n,) distance of points (n, A) from curves (n,): from the nearest of some places, then between its
-    neighbours by thirds."""
+    """(n,) distance of points (n, A) from curves (n,): from some places, then between these by thirds."""
     row, length = toolpath.curve[segment], toolpath.length[segment]
 
     def off(share: FloatArray) -> FloatArray:

@@ -33,8 +33,7 @@ LEAST_LEFT = 0.5  # of the length between two joints, whatever is saved of it [-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Extrusion:
-    """The extruder along a path of M segments: K joints where it has its programmed place, P moves while the
-    other axes wait."""
+    """The extruder along M segments: K joints with a programmed place, P moves while the axes wait."""
 
     limits: FloatArray  # (3,) of its velocity [mm/s], acceleration [mm/s2] and jerk [mm/s3]
     joint: Array  # (K,) index, ascending, the first 0 and the last M

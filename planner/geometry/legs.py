@@ -49,8 +49,7 @@ class Legs:
 
     @property
     def place(self) -> FloatArray:
-        """(M+1,) where each segment starts, counted along the legs from the start of the job [mm]; last,
-        where the job ends."""
+        """(M+1,) where each segment starts along the legs, from the start of the job [mm]; last, its end."""
         start = np.concatenate([[0.0], np.cumsum(self.length)])
         return np.append(np.repeat(start[:-1], np.diff(self.first)) + self.offset, start[-1])
 
@@ -97,8 +96,7 @@ def legs_of(toolpath: Toolpath) -> Legs:
 
 
 def _set_curves(table: Array, toolpath: Toolpath, segment: Array) -> None:
-    """Write the curves among the legs (R,) that begin with the segments `segment` (R,) into their records, in
-    place."""
+    """Write the curves among legs (R,) from the segments `segment` (R,) into their records, in place."""
     leg = np.flatnonzero(toolpath.curve[segment] >= 0)
     row, bend = toolpath.curve[segment[leg]], toolpath.curvature[segment[leg]]
     for k, name in enumerate(("start", "direction", "center", "e1")):

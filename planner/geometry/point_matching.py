@@ -107,8 +107,7 @@ class SegmentsInOrder:
             self._settle_before(at)
 
     def runs(self) -> tuple[Array, Array] | None:
-        """(R,) at which point each run of points at one segment begins, and (R,) that segment; None where it
-        cannot be told."""
+        """(R,) at which point each run of points at one segment begins, (R,) the segment; None if unknown."""
         last = len(self._chain.budget) - 1
         if self._lost or (not self._count and not self._open) or self._high != last:
             return None
@@ -142,8 +141,7 @@ class SegmentsInOrder:
 
 
 class _Marks(NamedTuple):
-    """For n points the first link (n,) that each can be at, where its marks begin (n,), and the marks: how
-    each is best entered."""
+    """For n points the first link (n,) each can be at, where its marks begin (n,), and the marks."""
 
     first: Array
     begin: Array

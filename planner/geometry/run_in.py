@@ -35,8 +35,7 @@ def run_in(toolpath: Toolpath, machine: Machine) -> FloatArray:
 
 
 def require_room(toolpath: Toolpath, machine: Machine) -> None:
-    """Raise InputError for a thread whose feed the machine does not have, or that has no move with room to
-    reach it."""
+    """Raise InputError for a thread whose feed the machine has not, or no move has room to reach."""
     held = np.flatnonzero(toolpath.held)
     if not len(held):
         return
@@ -65,8 +64,7 @@ def require_room(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def _parted(toolpath: Toolpath, held: np.ndarray) -> np.ndarray:
-    """(n,) True where a cut begins among the indices `held` (n,), but for the first: another move or a stop
-    lies before it."""
+    """(n,) True where a cut begins among `held` (n,) but the first: behind another move or a stop."""
     parted = np.append(False, np.diff(held) > 1) | (toolpath.joint[held] == Joint.STOP)
     parted[0] = False
     return parted

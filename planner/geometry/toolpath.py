@@ -171,8 +171,7 @@ class Toolpath:
         return np.flatnonzero(np.append(True, self.block[1:] != self.block[:-1]))
 
     def block_ends(self) -> Toolpath:
-        """One line for each block, from its start to its end, as long as the block: to time blocks, no path
-        to be followed."""
+        """One line for each block, as long as the block: to time blocks, no path to be followed."""
         first = self.block_first
         if len(first) == len(self):
             return self

@@ -39,8 +39,7 @@ LEVELS = COLUMNS[1:5]  # position, velocity, acceleration, jerk
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AxisMotion:
-    """L pieces of constant jerk over A axes; a standstill is a piece without velocity. After the last piece
-    everything is at rest."""
+    """L pieces of constant jerk over A axes; standstills have no velocity, and behind the last all rests."""
 
     axes: tuple[str, ...]  # axis letters
     t: FloatArray  # (L,) start of each piece [s], non-decreasing; the first is 0
@@ -75,8 +74,7 @@ class AxisMotion:
         return s
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
-        period."""
+        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's period."""
         return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **self.columns(times))
 
     def columns(self, times: FloatArray) -> dict[str, Any]:
@@ -88,8 +86,7 @@ class AxisMotion:
         return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
-        """The motion standing longer by `by` (n,) [s] at the ends of its pieces nearest to the times `at`
-        (n,) [s], where it rests."""
+        """The motion standing longer by `by` (n,) [s] at the piece ends nearest to `at` (n,), its rests."""
         before = nearest(np.append(self.t, self.end), at)
         place = self.at(self.t[before], 1.0).position  # a piece begins there
         later = np.zeros(len(self) + 1)

@@ -18,8 +18,7 @@ def joint_setpoints(motion: Trajectory, kinematics: Kinematics) -> Trajectory:
 
 
 def tip_of_setpoints(setpoints: Trajectory, chain: Chain) -> Trajectory:
-    """The motion of the tip that setpoints of the joints carry, with its derivatives: `joint_setpoints` the
-    other way."""
+    """The motion of the tip that setpoints of the joints carry: `joint_setpoints` the other way."""
     return _changed(setpoints, lambda axes, table, radius: points_along(chain, axes, table, radius))
 
 

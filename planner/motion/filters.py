@@ -90,8 +90,7 @@ class Filters:
         return np.prod([np.abs(np.sinc(np.asarray(w) * T / (2.0 * np.pi))) for T in self.times], axis=0)
 
     def residue(self, frequency: float, damping: float) -> float:
-        """Fraction of its vibration that a mode of `frequency` [Hz] and `damping` ratio keeps: |M| at its
-        pole [-]."""
+        """Fraction of its vibration that a mode of `frequency` [Hz] and `damping` keeps [-]."""
         w = 2.0 * np.pi * frequency
         pole = w * (-damping + 1j * np.sqrt(1.0 - damping**2))
         return float(np.prod([np.abs((1.0 - np.exp(-pole * T)) / (pole * T)) for T in self.times]))

@@ -29,8 +29,7 @@ class _AnyMotion(Protocol):
 
 
 class TrajectoryOnDemand(Trajectory):
-    """A `Trajectory` with the columns of a motion at 0, dt, 2 dt, ... and at its end, evaluated when they are
-    asked for."""
+    """A `Trajectory` of a motion at 0, dt, 2 dt, ... and its end, evaluated when it is asked for."""
 
     def __new__(cls, *given: Any, **fields: Any) -> Any:
         """With the fields of a `Trajectory`, as from `dataclasses.replace`, such a one."""
@@ -53,13 +52,11 @@ class TrajectoryOnDemand(Trajectory):
         return float(self._motion.end)
 
     def at_places(self, first: Array, block: Array, line: Array) -> TrajectoryOnDemand:
-        """The same with other blocks and lines: sample first[n] is the first of those at block[n], line[n]
-        (R,)."""
+        """The same with other places: sample first[n] is the first of those at block[n], line[n] (R,)."""
         return TrajectoryOnDemand(self._motion, self.dt, len(self), _Places(first, block, line))
 
     def heard_by(self, take: Callable[[Trajectory], object]) -> TrajectoryOnDemand:
-        """The same; whoever first goes through its chunks lets `take` have them too, so that they are
-        evaluated once for both."""
+        """The same; whoever first goes through its chunks lets `take` have them too."""
         heard = TrajectoryOnDemand(self._motion, self.dt, len(self), self._places)
         object.__setattr__(heard, "_take", take)
         return heard
@@ -121,8 +118,7 @@ class _Changed:
 
 
 class _Places:
-    """Blocks and lines of samples: those from first[n] on, up to the next one, are at block[n] and line[n]
-    (R,)."""
+    """Blocks and lines of samples: those from first[n] on are at block[n] and line[n] (R,)."""
 
     def __init__(self, first: Array, block: Array, line: Array):
         self.first, self.block, self.line = first, block, line

@@ -60,14 +60,12 @@ class Shaper:
 
     @property
     def variance(self) -> float:
-        """Of the delays [s2]: half of it times an acceleration is about how far the shaped motion is from the
-        path [mm]."""
+        """Of the delays [s2]: half of it times an acceleration is about how far off the path D is [mm]."""
         return float(self.weight @ (self.delay - self.middle) ** 2)
 
 
 def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
-    """The zero-vibration shaper of all modes (Singer and Seering 1990): 2^n copies for n modes; one copy
-    without any."""
+    """The zero-vibration shaper of n modes (Singer and Seering 1990): 2^n copies; one without any."""
     delay, weight = np.zeros(1), np.ones(1)
     for mode in modes:
         half = 0.5 * damped_period(mode.frequency, mode.damping)
@@ -80,8 +78,7 @@ def shaper_of(modes: tuple[Mode, ...]) -> Shaper:
 
 @dataclass(frozen=True, eq=False)
 class ShapedMotion:
-    """A motion given to a shaper, from which comes the motion that is delivered; before and after, the motion
-    rests."""
+    """A motion given to a shaper, and the motion delivered from it; before and after, it rests."""
 
     motion: MotionInTime
     shaper: Shaper
@@ -98,8 +95,7 @@ class ShapedMotion:
         return self.motion.end + self.shaper.length
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The mean of the copies at ascending times (T,) [s]; block and line are those at the mean delay, s
-        and feed means as well."""
+        """The mean of the copies at times (T,) [s]; block and line at the mean delay, s and feed means."""
         place = times - np.append(self.shaper.delay, self.shaper.middle)[:, None]
         at_rest = (place <= 0.0) | (place >= self.motion.end)
         # two times next to each other may be one after a delay was subtracted
@@ -120,6 +116,5 @@ class ShapedMotion:
         )
 
     def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
-        """The motion standing longer by `by` (n,) [s] where all copies have come to rest, at the times `at`
-        (n,) [s]."""
+        """The motion standing longer by `by` (n,) [s] at the times `at` (n,) [s], where all copies rest."""
         return ShapedMotion(self.motion.waiting(at - self.shaper.length, by), self.shaper)

@@ -60,8 +60,7 @@ class Place(NamedTuple):
 
 
 def reach(v: float, A: float, J: float) -> float:
-    """The least reach for an axis that is nowhere faster than v, with limits A and J [s]; inf for what is not
-    limited."""
+    """The least reach of an axis nowhere faster than v, with limits A and J [s]; inf if not limited."""
     of_jerk = 0.0
     if np.isfinite(J):
         of_jerk = (A + np.sqrt(A * A + 16.0 / 9.0 * v * J)) / (2.0 * J)

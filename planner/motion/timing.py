@@ -155,8 +155,7 @@ class MotionInTime(Protocol):
         ...
 
     def waiting(self, at: FloatArray, by: FloatArray) -> MotionInTime:
-        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the ends `at` (n,) of pieces
-        [s]."""
+        """The motion standing longer by `by` (n,) [s] where it rests, at the ends `at` (n,) of pieces [s]."""
         ...
 
 
@@ -182,8 +181,7 @@ class Motion:
         return _trajectory(self, times, dt)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Motion:
-        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to the times `at` (n,)
-        [s]."""
+        """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to `at` (n,) [s]."""
         law = self.law
         # a run's last piece is its standstill
         still = np.flatnonzero(np.append(law.run[1:] != law.run[:-1], True))
@@ -211,8 +209,7 @@ def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
 
 
 def in_chunks(motion: MotionInTime, dt: float, times: FloatArray) -> Iterator[Trajectory]:
-    """The motion at the times (T,) [s], put in order, in chunks that share their ends; dt [s] is the
-    trajectories' period."""
+    """The motion at the times (T,) [s], in order, in chunks that share their ends; dt [s]: the period."""
     times = np.unique(times)
     for first in range(0, len(times), CHUNK):
         yield motion.at(times[first : first + CHUNK + 1], dt)

@@ -87,8 +87,7 @@ class Trajectory:
         yield self
 
     def through(self, change: Callable[[Trajectory], Trajectory]) -> Trajectory:
-        """The motion with other positions and derivatives: `change` gives those of any samples, each by
-        itself."""
+        """The motion with positions and derivatives that `change` gives of any samples, each by itself."""
         return change(self)
 
     def rows(self, k: Array) -> Trajectory:
@@ -111,8 +110,7 @@ def in_degrees(axes: tuple[str, ...], radius: float) -> FloatArray:
 
 
 def joined(chunks: list[Trajectory]) -> Trajectory:
-    """One trajectory from consecutive chunks; a sample that a chunk shares with the one before counts
-    once."""
+    """One trajectory of consecutive chunks; a sample that a chunk shares with the one before counts once."""
     fresh = [int(k > 0 and len(c) and c.t[0] <= chunks[k - 1].t[-1]) for k, c in enumerate(chunks)]
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])

@@ -54,8 +54,7 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
 
 def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatArray:
-    """(M+1,) the same of a motion in chunks, each of which may begin with the last sample of the one
-    before."""
+    """(M+1,) the same of a motion in chunks, each may begin with the last sample of the one before."""
     times = np.empty(len(toolpath) + 1)
     wanted, latest = _wanted(toolpath, 0, len(toolpath)), np.full(len(toolpath) + 1, np.inf)
     seen: tuple[FloatArray, ...] | None = None

@@ -73,8 +73,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether the joint search of a small job has not ended; behind filters the motion on the path is planned
-    anyway, and is no slower."""
+    """Whether the search of a small job has not ended; behind filters the path is planned anyway."""
     small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
     return small and tried.best is None and not filters_count(*job.real)
 
@@ -119,8 +118,7 @@ def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bo
 
 
 def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
-    """Method kinematic, and full stops at the ends of all blocks but of lines that go straight on, where that
-    does not pass."""
+    """Method kinematic, and where it does not pass full stops at all blocks but lines that go straight on."""
     best = tried.best
     limits = Limits.of(job.machine, job.toolpath.axes)
     if np.isinf([limits.tangential, limits.tangential_jerk]).all():  # which its corners do not keep

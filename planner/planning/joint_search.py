@@ -234,8 +234,7 @@ def searched_runs(
 def search_run(
     k: int, run: TubeRun, start: Start, solver: TubeSolver | InTwo, within: float = np.inf
 ) -> Searching[FoundRun]:
-    """The solution of the search along run k from its start; of no use if it takes as long as `within`
-    [s]."""
+    """The solution of the search along run k; of no use if it takes as long as `within` [s]."""
     if run.left:
         return FoundRun(run, Status.ACCEPTABLE, run.left)
     guess = start.guess(k, run)
@@ -257,8 +256,7 @@ def search_run(
 def _in_two(
     k: int, run: TubeRun, start: Start, solver: InTwo
 ) -> Searching[tuple[TubeRun, Guess, TubeSolution]]:
-    """The run with the budgets that the last of the searches had, the steps from which that began, and its
-    solution."""
+    """The run with the budgets of the last search, the steps from which that began, and its solution."""
     guess = start.guess(k, run)
     found = start.in_long_steps.get(k) or (yield from solver.first.search(run, guess))
     start.in_long_steps[k] = found

@@ -45,8 +45,7 @@ class Start(RunsInTime):
         return with_reserve(run, toolpath, machine, *reserve_for(run, leg, found, reach))
 
     def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
-        """The motion along run k, cut into steps; at the nodes it is exactly what it is there, so that parts
-        of it can stay."""
+        """The motion along run k, cut into steps; exact at the nodes, so that parts of it can stay."""
         guess = guess_from(run, *self.window(k, run), cut)
         inner = self.departure[k] + np.cumsum(guess.h[:-1])
         seen = self.motion.at(inner, 1.0)

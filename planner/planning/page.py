@@ -68,8 +68,7 @@ class Method(ABC):
 
     @property
     def keeps_tolerance(self) -> bool:
-        """Whether the method promises the tolerance. If not, its motion is delivered as it is, and the
-        verdict says the rest."""
+        """Whether the method promises the tolerance; if not, its motion is delivered as it is."""
         return True
 
     @abstractmethod
@@ -136,8 +135,7 @@ def job_of(program: Program, machine: Machine, tolerance: float | None, stages: 
 
 
 def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:
-    """Whether filters behind the setpoints make the plan slower, as far as is known: then less of the
-    tolerance for the path may be faster."""
+    """Whether filters make the plan slower, as far as is known: less tolerance for the path may be faster."""
     if job.machine.fir is None or best.making is None:
         return False
     return not method.measures_filters or not passed(best) or best.making.filtered
@@ -162,16 +160,14 @@ def within_tolerance(job: Job, method: Method) -> Plan:
 
 
 def tolerant(run: Job, made: Plan, planned: Callable[[Job], Plan]) -> Plan:
-    """The plan of a job of one run; where it does not pass planned with less tolerance, or slower in
-    places."""
+    """The plan of a job of one run; with less tolerance, or slower in places, where it does not pass."""
     if made.verdict is None or made.verdict.passed:
         return made
     return faster(with_less_tolerance(run, made, planned), made.slower_in_places())
 
 
 def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan:
-    """The plan of the attempts that apply, in turn; the last one that makes a plan when there is none always
-    does."""
+    """The plan of the attempts that apply, in turn; the last one makes a plan where there is none."""
     tried = Tried()
     for attempt in attempts:
         if attempt.applies(job, settings, tried):

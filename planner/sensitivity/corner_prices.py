@@ -34,8 +34,7 @@ REACH = 12
 
 
 class RoundedPath:
-    """A solution on a path of M segments whose R+1 joints are rounded, and what another rounding does to its
-    time."""
+    """A solution on a path of M segments with R+1 joints, and what another rounding does to its time."""
 
     def __init__(
         self,
@@ -51,8 +50,7 @@ class RoundedPath:
         self._problem, self._solution, self._now = problem, solution, now
 
     def change(self, machine: Machine, more: FloatArray | float = 0.0) -> FloatArray:
-        """(R+1,) change of the time at every joint [s] with another machine, or `more` tolerance (M+1,)
-        [mm]."""
+        """(R+1,) change of the time at every joint [s] with another machine, or `more` tolerance (M+1,)."""
         samples, path = self.samples, self.path
         toolpath = dataclasses.replace(path.toolpath, tolerance=path.toolpath.tolerance + more)
         new = round_corners(toolpath, machine, path.corner, blend_tangents=True)

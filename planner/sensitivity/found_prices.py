@@ -75,8 +75,7 @@ class RunPrices:
         return np.asarray(self.alone[:, 3 * len(self.found.run.axis) + price.FEED])
 
     def of_axis(self, quantity: int, axis: int) -> float:
-        """dT/d(ln limit) of a quantity (`QUANTITIES`) of an axis of the toolpath, where more of it alone is
-        worth something [s]."""
+        """dT/d(ln limit) of a quantity of an axis, where more of it alone is worth something [s]."""
         axes = self.found.run.axis
         return float(self.alone[:, quantity * len(axes) + np.flatnonzero(axes == axis)].sum())
 
@@ -94,8 +93,7 @@ class RunPrices:
         return found
 
     def feed_saves(self, ratio: float) -> FloatArray:
-        """(N,) time saved by `ratio` of the feed, as far as the axes can follow it in the direction that the
-        motion has [s]."""
+        """(N,) time saved by `ratio` of the feed, as far as the axes can follow the motion with it [s]."""
         steps = self.found.steps
         assert steps is not None
         h = steps.h[:, None]
@@ -104,8 +102,7 @@ class RunPrices:
         return np.asarray(-self.of_feed() * (1.0 - 1.0 / np.clip(follows, 1.0, ratio)))
 
     def nearer_end(self) -> Array:
-        """(N,) vertices nearest to the steps, on their legs; no end of the run unless it has one leg
-        alone."""
+        """(N,) vertices nearest to the steps, on their legs; no end of the run but of a single leg."""
         offset, legs = self.found.run.offset, len(self.found.run)
         begin, end = offset[self.leg], offset[self.leg + 1]
         nearer = self.leg + (self.middle - begin > end - self.middle)
@@ -115,8 +112,7 @@ class RunPrices:
 def found_prices(
     toolpath: Toolpath, machine: Machine, found: list[FoundRun], cycle_time: float
 ) -> PriceList | None:
-    """The prices of the runs along a toolpath whose search tells them, of a motion of `cycle_time` [s]; None
-    if there are none."""
+    """The prices of runs along a toolpath, of a motion of `cycle_time` [s]; None if there are none."""
     runs = [
         RunPrices(toolpath, one, one.price, one.place)
         for one in found
@@ -142,8 +138,7 @@ def found_prices(
 def _of_limits(
     toolpath: Toolpath, machine: Machine, runs: list[RunPrices]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The limits of the axes and of the state by name, in mm or rad and s, and dT/d(ln limit) of these and of
-    the feed [s]."""
+    """The limits by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
     limit, slope = {}, {FEED.name: fsum(float(run.of_feed().sum()) for run in runs)}
     for quantity, kind in enumerate(QUANTITIES):
         values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]

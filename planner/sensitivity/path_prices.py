@@ -107,15 +107,13 @@ def _by_speed(
     of: tuple[Machine, str],
     rest: FloatArray | None,
 ) -> float:
-    """dT/d(ln of a feed or axis velocity) [s] for more of it: where it and another bound are equal, it is the
-    other one that stays."""
+    """dT/d(ln of a feed or axis velocity) [s] for more of it: of equal bounds the other one stays."""
     gained = np.log(bounds_with(samples, *of, STEP, rest) / problem.feed_sq_max)
     return float(now.feed_sq_max @ gained) / STEP
 
 
 def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machine) -> float:
-    """The largest share of the tolerance that chords between samples use, kappa v^2 dt^2 / 8 over eps, eq.
-    (18)."""
+    """The largest share of the tolerance that chords use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
     kappa = np.maximum(samples.kappa_left, samples.kappa_right)
     tolerance = samples.path.toolpath.tolerance[samples.segment]
     chord = kappa * solution.feed_sq * chord_rate(machine)

@@ -36,16 +36,14 @@ class GridHistory:
     share: FloatArray
 
     def ranked(self) -> list[tuple[str, float]]:
-        """Names and fractions of the cycle time, to `SHARE_DIGITS`: the limits, largest fraction first, then
-        "none" and "rest"."""
+        """Names and shares of the cycle time, to `SHARE_DIGITS`: limits, largest first, "none", "rest"."""
         share = np.round(self.share, SHARE_DIGITS)
         limits, others = np.flatnonzero(share[:-2]), len(share) - 2 + np.flatnonzero(share[-2:])
         order = [*limits[np.argsort(-share[limits], kind="stable")], *others]
         return [(self.active_names[k], float(share[k])) for k in order]
 
     def percents(self) -> list[tuple[str, int]]:
-        """Those of `ranked` in whole per cent, halves up, from 1 % on; "nothing" and "dwells" for "none" and
-        "rest"."""
+        """Those of `ranked` in whole per cent from 1 % on; "nothing" and "dwells" for "none" and "rest"."""
         found = [(WORDS.get(name, name), math.floor(100.0 * share + 0.5)) for name, share in self.ranked()]
         return [(name, percent) for name, percent in found if percent]
 
@@ -124,7 +122,6 @@ class PriceList:
         return f"<PriceList: more would save {most or 'nothing'}>"
 
     def ranked(self) -> list[tuple[str, float]]:
-        """Names and the time that `MORE_LIMIT` or `MORE_TOLERANCE` more of each saves [s], the largest saving
-        first."""
+        """Names and what `MORE_LIMIT` or `MORE_TOLERANCE` more saves [s], the largest saving first."""
         worth = [(name, saved) for name, saved in self.saved.items() if saved >= SAVED_MIN]
         return sorted(worth, key=lambda entry: -entry[1])

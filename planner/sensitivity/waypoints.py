@@ -60,8 +60,7 @@ class Way(NamedTuple):
         return Bounds(speed, size @ self.limit[1], size @ self.limit[2]), direction / speed[:, None]
 
     def coordinates(self) -> tuple[FloatArray, Array]:
-        """(N, A) the direction in which each leg is bounded: its tangent, or where an axis is slower than the feed, (N,),
-        that axis."""
+        """(N, A) the direction that bounds each leg: its tangent, or, (N,), an axis slower than the feed."""
         of_axis = self.limit[0] / np.maximum(np.abs(self.tangent), TINY)
         slowest, rows = of_axis.argmin(axis=1), np.arange(len(of_axis))
         by_axis = of_axis[rows, slowest] < self.feed

@@ -22,8 +22,7 @@ APART = 1e-3
 
 
 class Corridor(NamedTuple):
-    """V vertices of all runs one after the other, run q holds first[q] : first[q+1]; or those of one run
-    (`run_corridor`)."""
+    """V vertices of all runs, run q holds first[q] : first[q+1]; or of one run (`run_corridor`)."""
 
     first: Array  # (Q+1,)
     place: Array  # (V,) along the legs from the start of the job [mm]

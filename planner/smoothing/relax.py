@@ -62,8 +62,7 @@ class Goal(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """All runs relaxed. A run without a certificate, or that did not fit, has its control points from
-    before."""
+    """All runs relaxed. A run without a certificate, or that did not fit, is as before."""
 
     certified: Array  # (Q,)
     control: FloatArray  # (n, A)
@@ -155,8 +154,7 @@ def _relax(corridor, splines, runs, goal, own, found):
 
 
 def relax(corridor: Corridor, splines: Splines, runs: SplineRuns, goal: Goal) -> Relaxed:
-    """Relax the splines that fit (`Relaxed`), each run by itself, side by side: the result is the same for
-    any number of threads."""
+    """Relax the splines that fit, each run by itself; the same for any number of threads."""
     found = Relaxed(
         certified=np.zeros(len(splines.fits), dtype=np.bool_),
         control=splines.control.copy(),

@@ -23,8 +23,7 @@ LONGEST_TOLERANCE = 4.0  # ... or so many tolerances [-]
 
 
 class SplineRuns(NamedTuple):
-    """Q runs in the order of the path. Run q begins on the leg before its first joint and ends on the leg
-    after its last."""
+    """Q runs in order. Run q begins on the leg before its first joint and ends on the leg after its last."""
 
     joint_first: Array  # (Q,) joints between legs that it replaces
     joint_last: Array  # (Q,)

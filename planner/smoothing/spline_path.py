@@ -166,8 +166,7 @@ def _polynomials(splines: Splines, q: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _moving(toolpath: Toolpath) -> Array:
-    """(A,) True for axes that a toolpath moves somewhere: the others accelerate nowhere on its splines
-    either."""
+    """(A,) True for axes that a toolpath moves: the others accelerate nowhere on its splines either."""
     points = np.vstack([toolpath.start, toolpath.end])
     arcs = np.vstack([toolpath.arcs.e1, toolpath.arcs.e2, toolpath.arcs.drift])
     curves = (np.ptp(toolpath.curves.points, axis=1) > 0.0).any(axis=0)
@@ -184,8 +183,7 @@ def _smallest(longest: FloatArray, runs: SplineRuns) -> FloatArray:
 
 
 def with_spline(path: SmoothPath, shape: SplineShape) -> SmoothPath:
-    """The path with the splines of the runs that fit in place of their corners, each span as a polynomial
-    (geometry/spline.py)."""
+    """The path with the splines of the runs that fit, each span a polynomial (geometry/spline.py)."""
     runs, splines = shape.runs, shape.splines
     axes = len(path.toolpath.axes)
     kept = np.flatnonzero(splines.fits)

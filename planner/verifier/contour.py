@@ -63,8 +63,7 @@ class Apart:
         return None if not self.fits else max(float(reading.match.worst[5]) for reading in self.readings)
 
     def contour_check(self, toolpath: Toolpath) -> LimitCheck:
-        """The motion's worst distance from the path, as far as it could be followed, against the budget
-        there."""
+        """The motion's worst distance from the path, as far as it was followed, against the budget there."""
         reading = max(self.readings, key=lambda each: each.match.worst[0])
         ratio, distance, budget, time, piece, _ = reading.match.worst
         ratio, budget = ratio * self.widened, budget / self.widened
@@ -166,8 +165,7 @@ def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
 def apart(
     readings: list[Observed], pieces: ProgramPieces, read: Callable[[ProgramPieces], list[Observed]]
 ) -> Apart:
-    """The readings that measure the motion: `readings` if it fits in them, or those by `read` with wider
-    budgets in which it does."""
+    """The readings that measure the motion: `readings` if it fits, or those by `read` with wider budgets."""
     found = Apart(readings, pieces)
     if found.fits:
         return found
@@ -186,8 +184,7 @@ def apart(
 def lost_after(
     readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces, complete: bool
 ) -> int | None:
-    """NC line of the last block that the motion could be followed along before it was lost, or ended too
-    early; None if it ran them all."""
+    """NC line of the block behind which the motion was lost, or ended too early; None if it ran them all."""
     tallies = [reading.match.tally for reading in readings]
     at = [tally[LOST_AFTER] for tally in tallies if tally[LOST_AFTER] != NOT_LOST]
     if not at and not complete:

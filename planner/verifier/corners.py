@@ -130,8 +130,7 @@ class CornerCheck:
 
     @property
     def compared(self) -> Array:
-        """(C,) True where the gain says something: the corner is run through, and eq. (20) lies below the
-        programmed feed."""
+        """(C,) True where the gain tells something: the corner is run through, eq. (20) below the feed."""
         return self._turns & ~self.stands & (self.feed_paper < self.feed_programmed)
 
     def told(self) -> tuple[FloatArray, FloatArray]:

@@ -69,8 +69,7 @@ AT_ONCE = SIZES.corners_at_once
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Reading:
-    """The motion near each of C vertices: time [s], speed [mm/s], |a_n| and A(n) [mm/s2], distance from the
-    vertex [mm]."""
+    """The motion near C vertices: time [s], speed [mm/s], |a_n|, A(n) [mm/s2], distance [mm]."""
 
     time: FloatArray
     feed: FloatArray
@@ -236,8 +235,7 @@ def _nearest_sample(
 def _nearest_point(
     motion: AnyMotion, start: FloatArray, period: float, vertex: FloatArray, machine: Machine
 ) -> _Reading:
-    """The motion's nearest point to each vertex, at most a period from the time `start` [s]: Newton's method
-    on (p - P).p' = 0."""
+    """The motion's nearest point to each vertex, within a period of `start` [s]: Newton on (p - P).p' = 0."""
     time, readings = start, []
     for _ in range(NEAREST_STEPS + 1):
         unique, row = np.unique(np.clip(time, 0.0, motion.end), return_inverse=True)
@@ -280,8 +278,7 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
 
 
 def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:
-    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n, of any length; where that is 0, the least
-    over all directions."""
+    """(C,) A(n) [mm/s2] for vectors `direction` (C, L) along n; where that is 0, the least of all n."""
     limits = machine.limits("acceleration", axes)[_linear(axes)]
     size = np.linalg.norm(direction, axis=1)
     given = np.abs(direction) @ limits

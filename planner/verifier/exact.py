@@ -97,8 +97,7 @@ def _positions(trajectory: Trajectory) -> Iterator[tuple[FloatArray, FloatArray]
 
 
 def _beside(toolpath: Toolpath) -> Array:
-    """(2, M) True for exact segments whose start, and whose end, is passed without a full stop from or to one
-    that is not exact."""
+    """(2, M) True for exact segments that are entered, and left, without a full stop beside one not exact."""
     free, moving = np.pad(~toolpath.exact, 1), toolpath.joint != Joint.STOP
     return toolpath.exact & np.array([free[:-2] & moving[:-1], free[2:] & moving[1:]])
 
@@ -132,8 +131,7 @@ def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces
 
 
 def _lost_at(reading: Observed, pieces: ProgramPieces) -> int | None:
-    """The first piece of those with these budgets that a motion is not seen to run along to its end; None if
-    it runs along all."""
+    """The first piece that a motion is not seen to run along to its end; None if it runs along all."""
     match = reading.match
     allowed = pieces.joint["budget"] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
     missed = np.flatnonzero(match.passed["near"] > allowed)

@@ -102,8 +102,7 @@ class Excess:
 
     @property
     def slower(self) -> float:
-        """By how much slower the motion would have to be there to keep what is allowed [-]; inf where that
-        does not help."""
+        """By how much slower the motion would have to be there [-]; inf where that does not help."""
         if self.still >= 1.0:
             return float("inf")
         return float(((self.ratio - self.still) / (1.0 - self.still)) ** (1.0 / self.power))
@@ -119,8 +118,7 @@ class Spans:
     ratio: list[float] = field(default_factory=list)
 
     def take(self, t: FloatArray, over: FloatArray) -> None:
-        """The spans of samples at the times t (n,) [s] with the ratios `over` (n, columns), 0 where nothing
-        is exceeded."""
+        """The spans of samples at t (n,) [s] with ratios `over` (n, columns), 0 where nothing is exceeded."""
         for column in np.flatnonzero(over.any(axis=0)).tolist():
             self.add(column, t, over[:, column])
 
@@ -154,7 +152,6 @@ def above(ratio: FloatArray) -> FloatArray:
 
 
 def of_check(name: str, span: tuple[float, float], ratio: float) -> Excess:
-    """Of one place of which no more is known than the largest ratio of a quantity, "jerk.e" for example, and
-    the `span` [s] that it is of."""
+    """Of a quantity, "jerk.e" for example, of which its largest ratio in the `span` [s] is known."""
     power = POWERS[NAMES.index(name.partition(".")[0])]
     return Excess(kind=Kind.LIMIT, name=name, begin=span[0], end=span[1], ratio=ratio, power=power)

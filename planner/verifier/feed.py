@@ -40,8 +40,7 @@ class Feeds:
         self._gap = 0.0  # between them at most [s]
 
     def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
-        """The next samples, with the pieces `first` and `last` (n,) that each can be on, as for
-        `Switches.take`."""
+        """The next samples, with the pieces `first` and `last` (n,) each can be on (`Switches.take`)."""
         self._switches.take(new, skip, first, last)
         new = Chords(*(column[skip:].copy() for column in new))
         before = self._left[-1].t[-1:] if self._left else new.t[:1]

@@ -90,8 +90,7 @@ def filtered(
 
 
 def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray, FloatArray]:
-    """Mean over the last T of a motion at times h apart, and its derivative; from the first time on for which
-    that is known."""
+    """Mean over the last T of a motion at times h apart, and its derivative; from where that is known on."""
     behind = int(np.ceil(T / h))
     origin = x[0].copy()
     x = x - origin
@@ -169,8 +168,7 @@ class At(NamedTuple):
 
 
 class Signal:
-    """The signal of setpoints, read chunk by chunk from its start to its end; only what is asked for next is
-    kept."""
+    """The signal of setpoints, chunk by chunk; only what is asked for next is kept."""
 
     def __init__(self, trajectory: Trajectory, interpolation: str):
         self._chunks = trajectory.chunks()
@@ -180,8 +178,7 @@ class Signal:
         self._areas = np.empty((0, 0))
 
     def take(self, begin: float, end: float) -> None:
-        """Keep what the times from `begin` to `end` [s] need, counted from the first setpoint; `begin` never
-        goes back."""
+        """Keep what times from `begin`, which never goes back, to `end` [s] need, from the first setpoint."""
         kept = [(self._t, self._p, self._v)] if len(self._t) else []
         last = self._t[-1] if kept else -np.inf
         while last < end and (chunk := next(self._chunks, None)) is not None:
@@ -210,8 +207,7 @@ class Signal:
         return At(place, self._areas[k] + part + beyond * place, origin)
 
     def _between(self, k: Array, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Places (n, A) at the shares w (n,) of the periods k (n,), less the origin, and their integrals from
-        the period's begin."""
+        """Places (n, A) at the shares w (n,) of the periods k (n,), less the origin, and their integrals."""
         h = (self._t[k + 1] - self._t[k])[:, None]
         p0, p1 = self._p[k] - self._p[0], self._p[k + 1] - self._p[0]
         place, area = self._of(w[:, None], p0, p1 - p0, h * self._v[k], h * self._v[k + 1])

@@ -44,8 +44,7 @@ def measured(readings: list[Observed], group: int) -> FloatArray:
 def excesses(
     readings: list[Observed], checks: dict[str, LimitCheck], not_limited: tuple[str, ...]
 ) -> list[Excess]:
-    """Where limits are exceeded: by the columns, everywhere that they show it; by what else the checks are
-    of, at the worst place."""
+    """Where limits are exceeded: wherever columns show it, else at the worst place of the check."""
     found = [each for reading in readings for each in reading.worst.over.excesses(not_limited)]
     shown = {each.name for each in found}
     broken = [check for name, check in checks.items() if check.broken and name.partition(".")[0] not in shown]

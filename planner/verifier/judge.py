@@ -146,8 +146,7 @@ def verify(
 
 
 def _both_errors(apart: contour.Apart, toolpath: Toolpath) -> tuple[float | None, float | None]:
-    """The parts of the contour error in linear axes [mm] and in rotary ones [deg]; None without rotary axes,
-    and where it is not known."""
+    """The contour error in linear axes [mm] and in rotary ones [deg]; None without these, or if unknown."""
     if not apart.fits or not set(toolpath.axes) & set(ROTARY_AXES):
         return None, None
     linear, rotary = np.max([reading.apart for reading in apart.readings], axis=0)

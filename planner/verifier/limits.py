@@ -84,8 +84,7 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
 
 
 def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
-    """(A,) largest error of a position by its digits and by those of the last time, at the speed the motion
-    can have there [mm]."""
+    """(A,) largest error of a position by its digits and those of the last time, at its speed there [mm]."""
     rounding = np.zeros(len(acceleration))
     if len(given.position_rounding):
         rounding = rounding + given.position_rounding
@@ -165,8 +164,7 @@ def _look_at_gaps(
     difference: tuple[FloatArray, FloatArray],
     over: FloatArray,
 ) -> None:
-    """By how much the columns miss the differences (module text), over h, h^2 and h; `over` (n, 1) is 1 /
-    h."""
+    """By how much the columns miss the differences (module text), over h, h^2, h; `over` (n, 1) is 1/h."""
     axes, (v_max, a_max, j_max) = len(limits.axes), limits.per_axis
     gap = np.abs(difference[0] - _means(block.velocity)) - difference[1] - RATIO_ROUNDING * v_max
     gap = np.maximum(gap, 0.0) * over

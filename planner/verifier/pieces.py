@@ -119,8 +119,7 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
 
 
 def axis_groups(axes: tuple[str, ...]) -> Array:
-    """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the axes of the first group
-    that moves."""
+    """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the first group that moves."""
     return np.array(
         [("xyz", "uvw", "abc").index(next(g for g in ("xyz", "uvw", "abc") if a in g)) for a in axes]
     )

@@ -23,8 +23,7 @@ def units_of(machine: Machine, axes: tuple[str, ...]) -> FloatArray:
 
 
 def look_at_power(block: SampleBlock, limits: Limits, worst: Worst, first: int) -> None:
-    """Take in what a block of samples shows of the power of the axes, whose rows begin at `first`, where it
-    is limited."""
+    """Take in what a block shows of the power of the axes, rows from `first` on, where it is limited."""
     if not np.isfinite(limits.power).any():
         return
     if limits.judged[:2].all():

@@ -227,14 +227,12 @@ class AnyMotion(Protocol):
         ...
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record that is
-        returned."""
+        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record."""
         ...
 
 
 def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
-    """How many cells a period dt [s] needs for a tolerance [mm] under an acceleration [mm/s2] of all axes
-    together."""
+    """How many cells a period dt [s] needs for a tolerance [mm] at an acceleration [mm/s2] of all axes."""
     gap = float(np.sqrt(8.0 * BOW * tolerance / acceleration))
     return int(
         min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD)
@@ -244,8 +242,7 @@ def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
 def motion_between(
     motion: AnyMotion, dt: float, seed: int, per_period: int = PER_PERIOD
 ) -> Iterator[Trajectory]:
-    """The motion at the judge's own times, from its beginning to its end, in chunks; dt is the machine's
-    period [s]."""
+    """The motion at the judge's own times, in chunks; dt is the machine's period [s]."""
     draw = np.random.default_rng(seed)
     edges = np.concatenate([[0.0], motion.t, [motion.end]])
     begin, lasting = edges[:-1], np.diff(edges)

@@ -77,8 +77,7 @@ def _out_of_step(
     held: Array,
     room: FloatArray,
 ) -> FloatArray:
-    """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 where there are no samples between run-in
-    and run-out."""
+    """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 without samples behind the run-in."""
     passed = joint_times(reading, pieces)
     begin, end = passed[held], passed[held + 1]
     length, feed, start = toolpath.length[held], toolpath.feed[held], toolpath.start[held]

@@ -60,8 +60,7 @@ class Observed:
         return ", ".join(filter(None, (text, self.note)))
 
     def take(self, t: FloatArray, position: FloatArray, skip: int) -> None:
-        """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` of them were there
-        before."""
+        """Note ends and periods of samples t (n,) [s], position (n, A) [mm]; `skip` were there before."""
         if not self.samples:
             self.first, self.t_first = position[0].copy(), float(t[0])
         self.last, self.t_last = position[-1].copy(), float(t[-1])

@@ -72,8 +72,7 @@ ROOM = 4096  # chords and marks there is room for at first
 
 
 class Bounds(NamedTuple):
-    """velocity (A,) and digits (A+1,), as in limits.py, and the norm of the largest accelerations [mm/s2],
-    inf where not judged."""
+    """velocity (A,), digits (A+1,) as in limits.py; norm of the largest accelerations, inf if not judged."""
 
     velocity: FloatArray
     digits: FloatArray
@@ -148,8 +147,7 @@ class Switches:
             _settle(self._pieces, self.switch, self.state, self.along, self._kept, last, self._bounds)
 
     def _make_room(self) -> None:
-        """Leave out chords and marks that are not needed any more; twice the room where they are not half of
-        them."""
+        """Leave out chords and marks not needed any more; twice the room where they are not half of them."""
         head, tail = int(self.state[HEAD]), int(self.state[TAIL])
         begin = int(self._kept.chord["offset"][head]) if tail > head else int(self.state[USED])
         used = int(self.state[USED]) - begin

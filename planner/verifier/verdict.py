@@ -46,8 +46,7 @@ class LimitCheck:
         return self.limited and self.ratio > 1.0 + RATIO_ROUNDING
 
     def sentence(self, axes: tuple[str, ...]) -> str:
-        """Value, ratio, limit, time, place and line: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at
-        ..."."""
+        """Value, ratio, limit, time, place: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
         return self.fault(Kind.LIMIT, axes).sentence
 
     def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
@@ -61,8 +60,7 @@ class LimitCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ThreadCheck:
-    """How far one move in step with the spindle is from where the turns of the spindle want it
-    (spindle_sync.py)."""
+    """How far one move in step with the spindle is from where the spindle wants it (spindle_sync.py)."""
 
     line: int  # NC line
     feed: float  # at which the move is to be cut [mm/s]

@@ -249,8 +249,7 @@ def two_nodes(T1: FloatArray, T2: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _v_mean(
     guide: ChordGuide, at: Array, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """Largest constant speeds up to `most` (n,) at the chords `at` (n,) that the mean of the path allows
-    (module text)."""
+    """Largest constant speeds up to `most` (n,) at chords `at` (n,) by the mean of the path (module text)."""
     run = guide.run[at]
     T1, T2 = T1[run], T2[run]
     x, w = two_nodes(T1, T2)
@@ -276,8 +275,7 @@ def _v_mean(
 def _slower_corners(
     guide: ChordGuide, v: FloatArray, most: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """(R,) by how much the chords of each corner have to be slower to last as long as the gap [-]; 1
-    elsewhere."""
+    """(R,) how much slower the chords of corners have to be to last as long as the gap [-]; else 1."""
     chord = np.flatnonzero(guide.corner >= 0)
     by = np.ones(len(guide))
     if not len(chord):

@@ -42,8 +42,7 @@ MODES = 2
 
 
 def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
-    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops than the
-    given one."""
+    """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops."""
     plan = _settled(guide, machine)
     for fraction in STOPS:
         plan = _stopping(plan, machine, _waits(plan, fraction))
@@ -79,8 +78,7 @@ def _stopping(plan: Schedule, machine: Machine, stops: Array) -> Schedule:
 
 
 def _least_time(guide: LegGuide, stops: Array) -> FloatArray:
-    """A time (S,) [s] that each run cannot beat with full stops at the joints `stops` (R+1,): straight from
-    stop to stop."""
+    """A time (S,) [s] that no run beats with full stops at the joints `stops` (R+1,): straight moves."""
     stopping = guide.stopping(np.flatnonzero(stops))
     limits = (stopping.largest(value) for value in (stopping.feed, stopping.a_max, stopping.j_max))
     times = rest_to_rest_times(stopping.total(stopping.length), *limits)

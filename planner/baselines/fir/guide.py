@@ -149,8 +149,7 @@ class Guide(ABC):
     @property
     @abstractmethod
     def budget(self) -> FloatArray:
-        """(R, 2) what filters and interpolation may use of the tolerance on the first and the second half of
-        each leg [mm]."""
+        """(R, 2) what filters and interpolation may use of the tolerance on both halves of each leg [mm]."""
 
     @property
     def runs(self) -> int:
@@ -188,8 +187,7 @@ class Guide(ABC):
         return np.full(self.runs, T1), np.full(self.runs, T2)
 
     def pick(self, chosen: Array) -> Self:
-        """The runs `chosen` (S,), each shifted to where the one before ends, without the dwells: good for
-        planning only."""
+        """The runs `chosen` (S,), each behind the one before, without dwells: good for planning only."""
         columns = picked(self, chosen_rows(self.first, chosen))
         along = np.cumsum(columns["length"][:, None] * columns["direction"], axis=0)
         columns["point"] = np.vstack([np.zeros((1, len(self.axes))), along])

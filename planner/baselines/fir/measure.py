@@ -36,8 +36,7 @@ FEED_AT_REST = 1e-9  # [mm/s] below this the direction of the velocity is roundi
 
 
 class Measured(NamedTuple):
-    """Measured at n times: start and middle of all pieces, and when the joints that are no full stops are
-    passed."""
+    """Measured at n times: start and middle of all pieces, and when joints without a stop are passed."""
 
     t: FloatArray  # (n,) ascending [s]
     error: FloatArray  # (n,) deviation from the guide with the chord error, over the tolerance there [-]
@@ -52,8 +51,7 @@ class Measured(NamedTuple):
 
 
 class _Limits(NamedTuple):
-    """Acceleration and jerk of the axes, normal acceleration and the axes that it is of, and the chord error
-    over it, dt^2/8 [s2]."""
+    """Acceleration and jerk of the axes; normal acceleration, its axes, and the chord error over it [s2]."""
 
     acceleration: FloatArray
     jerk: FloatArray

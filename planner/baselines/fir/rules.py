@@ -187,8 +187,7 @@ def schedule(
 def _waiting(
     guide: LegGuide, machine: Machine, speed: FloatArray, inner: Array, T1: FloatArray, T2: FloatArray
 ) -> tuple[Array, FloatArray]:
-    """At which of the joints `inner` (n,) waiting costs less time than flowing, and the overlap [s] it then
-    has."""
+    """At which of the joints `inner` (n,) waiting costs less time than flowing, and the overlap [s]."""
     before, after = speed[inner - 1], speed[inner]
     lower, delay = np.minimum(before, after), T1 + T2
     tol, sin_half = guide.tol[inner], guide.sin_half[inner]

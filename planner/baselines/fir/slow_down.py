@@ -102,8 +102,7 @@ def make(plan: SpeedPlan, machine: Machine) -> Made:
 
 
 def slowing(ratio: FloatArray, most: float = BEYOND) -> FloatArray:
-    """(n,) factor on the speed for a measured `ratio` (n,) [-]: 1 where nothing is exceeded, `most` at most
-    elsewhere."""
+    """(n,) factor on the speed for a `ratio` (n,) [-]: 1 where nothing is exceeded, else `most` at most."""
     slower = np.clip(BEYOND / np.sqrt(np.maximum(ratio, 1.0)), SLOWEST, most)
     return np.where(ratio > 1.0 + RATIO_ROUNDING, slower, 1.0)
 

@@ -57,8 +57,7 @@ def superpose(command: Command) -> Filtered:
 
 
 def reached(motion: Filtered) -> FloatArray:
-    """(P,) how far the middle of each piece has come along the guide, which is the last column of the pieces
-    [mm]."""
+    """(P,) how far the middle of each piece has come along the guide, its last column [mm]."""
     middle = (motion.ends + motion.t) / 2 - motion.t
     s, v, a, j = motion.state[:, :, -1]
     along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))

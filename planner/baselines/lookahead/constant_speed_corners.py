@@ -52,8 +52,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> FloatArray:
 
 
 class CornerChain(NamedTuple):
-    """A smooth path as n legs with joints between them: corners at constant speed, full stops, and where only
-    the limits change."""
+    """A smooth path as n legs with joints: corners at constant speed, full stops, changes of limits."""
 
     # (n,) records `LEG`: what is free between two joints, each with what the corners beside it took of their
     # legs

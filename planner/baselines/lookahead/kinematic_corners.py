@@ -76,8 +76,7 @@ def corner_passages(
 
 
 def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
-    """A candidate slowed down to what its n legs have room for; a leg is divided where both of its corners
-    would be equally fast."""
+    """A candidate slowed down to what its n legs have room for, divided where corners would be as fast."""
     longest = np.minimum(np.append(legs.length, np.inf), np.insert(legs.length, 0, np.inf))
     wanted = np.minimum(needed(passage, legs), longest)
     ease = np.divide(passage.V**2, wanted, out=np.ones(len(wanted)), where=wanted > 0)

@@ -88,8 +88,7 @@ def capped(ways: np.recarray, legs: np.recarray, room: FloatArray) -> np.recarra
 
 
 def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]:
-    """Durations [s] and jerks along the path [mm/s3], both (n, 8): the corner at constant speed before each
-    leg, and its phases."""
+    """Durations [s] and jerks along the path [mm/s3], (n, 8): the corner before each leg, then its phases."""
     duration, jerk = np.zeros((len(legs), 1 + PHASES)), np.zeros((len(legs), 1 + PHASES))
     _moves(ways, legs, duration, jerk)
     return duration, jerk

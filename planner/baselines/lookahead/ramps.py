@@ -52,8 +52,7 @@ WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", 
 
 
 def records(dtype: np.dtype, **columns: Any) -> np.recarray:
-    """(n,) records `LEG` or `WAY` with these columns, each (n,); 0 in others. n legs have n+1 joints, the
-    first and last are stops."""
+    """(n,) records `LEG` or `WAY` with these columns (n,), 0 in others; n + 1 joints, stops at both ends."""
     table = np.zeros(len(next(iter(columns.values()))), dtype).view(np.recarray)
     for name, column in columns.items():
         table[name] = column

@@ -75,8 +75,7 @@ def interval_feed_sq_max(samples: PathSamples, machine: Machine) -> FloatArray:
 
 
 def bounds_of(samples: PathSamples, machine: Machine, limits: Sequence[Limit]) -> FloatArray:
-    """(P,) bound of feed^2 by some of `LIMITS` alone, without limits of one's own; inf where they bound
-    nothing [mm2/s2]."""
+    """(P,) bound of feed^2 by some of `LIMITS`, no user limits; inf where they bound nothing [mm2/s2]."""
     return _caps(OnGrid(samples, machine), limits).feed_sq_max
 
 

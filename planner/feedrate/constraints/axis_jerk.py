@@ -12,8 +12,7 @@ from planner.feedrate.constraints.limit import RowLimit, RowPoint
 
 
 def feed_sq_at_constant_speed(d3: FloatArray, limits: FloatArray) -> FloatArray:
-    """(P,) x <= min_k (j_k/|r'''_k|)^(2/3) [mm2/s2] for r''' in d3 (P, A) and limits (P, A) or (A,); inf
-    where r''' is 0."""
+    """(P,) x <= min_k (j_k/|r'''_k|)^(2/3) [mm2/s2]; r''' in d3 (P, A), limits (P, A) or (A,); or inf."""
     with np.errstate(divide="ignore"):
         return (np.abs(d3) / limits).max(axis=1) ** (-2.0 / 3.0)
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(d1: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array]:
-    """(P,) x <= min_k (v_k/|r'_k|)^2 [mm2/s2] for tangents d1 (P, A); also the index (P,) of the axis that
-    limits."""
+    """(P,) x <= min_k (v_k/|r'_k|)^2 [mm2/s2] for d1 (P, A), `limits` (A,); and the axis (P,)."""
     ratio = np.abs(d1) / limits
     axis = ratio.argmax(axis=1)
     return 1.0 / ratio[np.arange(len(d1)), axis] ** 2, axis

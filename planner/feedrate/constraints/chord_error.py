@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(kappa: FloatArray, tol: FloatArray, rate: float) -> FloatArray:
-    """(P,) kappa x rate <= tol for curvatures (P,) [1/mm], tolerances (P,) [mm] and `rate` [s2]; inf on
-    straights [mm2/s2]."""
+    """(P,) kappa x rate <= tol of curvatures (P,) [1/mm], `tol` (P,) [mm], `rate` [s2]; inf on straights."""
     return over(tol, kappa * rate)
 
 

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 def feed_sq_max(
     kappa: FloatArray, tol: FloatArray, time_constants: Sequence[FloatArray | float]
 ) -> FloatArray:
-    """(P,) kappa x sum T^2/24 <= tol [mm] for moving averages of lengths T = time_constants [s]; inf on
-    straights [mm2/s2]."""
+    """(P,) kappa x sum T^2/24 <= tol [mm], averages of lengths T = time_constants [s]; else inf."""
     return over(tol, kappa * sum(T * T for T in time_constants) / 24.0)
 
 

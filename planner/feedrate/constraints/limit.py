@@ -39,8 +39,7 @@ class Cap(NamedTuple):
 
 
 class RowPoint(NamedTuple):
-    """One axis at n grid points, seen from one side: r', r'', r''' of the axis, x = feed^2, u and jerk along
-    the path, all (n,)."""
+    """One axis at n grid points, from one side: r', r'', r''', x = feed^2, u, jerk along the path (n,)."""
 
     d1: FloatArray
     d2: FloatArray
@@ -73,13 +72,11 @@ class Limit:
         yield from ()
 
     def inside(self, grid: OnGrid) -> FloatArray | None:
-        """(P,) bound on feed^2 inside the interval to the right of each point, if that is straight [mm2/s2];
-        None for none."""
+        """(P,) bound on feed^2 inside the interval to the right, if straight [mm2/s2]; None for none."""
         return None
 
     def along(self, machine: Machine, axes: tuple[str, ...]) -> OwnLimit | None:
-        """The limit as a function of the path, with rows like an axis; None where it has none or cannot
-        bind."""
+        """The limit as a function of the path, with rows like an axis; None where it never binds."""
         return None
 
 
@@ -93,8 +90,7 @@ class AxisLimit(Limit):
 
     @classmethod
     def of(cls, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
-        """(A,) the limits of the axes, in mm or rad. Raises InputError if the machine lacks one of the
-        axes."""
+        """(A,) the limits of the axes, in mm or rad. Raises InputError if the machine lacks one of them."""
         return machine.limits(cls.name, axes)  # type: ignore[arg-type]
 
 
@@ -112,7 +108,6 @@ def over(value: FloatArray | float, by: FloatArray) -> FloatArray:
 
 
 def by_axis(name: str, axes: tuple[str, ...], feed_sq: FloatArray, axis: FloatArray) -> Iterator[Cap]:
-    """Caps feed_sq (P,) [mm2/s2] that come from one axis each, as caps of every axis; `axis` (P,) is its
-    index."""
+    """Caps feed_sq (P,) [mm2/s2] from one axis each, as caps of every axis; `axis` (P,) is its index."""
     for k, letter in enumerate(axes):
         yield Cap(f"{name}.{letter}", np.where(axis == k, feed_sq, np.inf))

@@ -57,8 +57,7 @@ class OnGrid:
         return interval_sides(self.samples)[1]
 
     def feed_of_words(self, side: Array) -> FloatArray:
-        """(P,) feed along the path in all axes at which what F goes by moves at F, for intervals `side` (P,)
-        [mm/s]."""
+        """(P,) feed in all axes at which what F goes by moves at F, for intervals `side` (P,) [mm/s]."""
         return allowed_along(self.samples.path.toolpath, self.samples.segment[side], self.samples.d1)
 
     def sides(self) -> tuple[Side, Side]:
@@ -85,8 +84,7 @@ class OnGrid:
 
 
 def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
-    """(P,) index of the interval to the left and to the right of every point; at a piece's ends the only one
-    there is."""
+    """(P,) index of the intervals left and right of every point; at a piece's ends the only one there is."""
     right = np.arange(len(samples))
     left = right - 1
     left[samples.piece[:-1]] += 1
@@ -95,8 +93,7 @@ def interval_sides(samples: PathSamples) -> tuple[Array, Array]:
 
 
 def remaining_budget(samples: PathSamples) -> FloatArray:
-    """(P,) what the rounding leaves of the contour budget for chord and filter errors, of the interval to the
-    right [mm]."""
+    """(P,) what rounding leaves of the contour budget for chords and filters, to the right [mm]."""
     path = samples.path
     element = samples.element
     corner = element < 0

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 
 def feed_sq_max(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:
-    """(P,) feed kappa sum T/2 <= angle [rad], as a bound of feed^2, for T = time_constants [s]; inf on
-    straights [mm2/s2]."""
+    """(P,) feed kappa sum T/2 <= angle [rad], a bound of feed^2; T = time_constants [s]; else inf."""
     return over(angle, kappa * sum(time_constants) / 2.0) ** 2
 
 

@@ -173,8 +173,7 @@ class Chain:
         return way_felt(FASTER * slow, a, j)
 
     def _stop(self, begin: int, end: int) -> int:
-        """Where no window converges: down to the last window's stop, or from rest with the plain start;
-        returns where it ends."""
+        """Where no window converges: to its last stop, or from rest by the plain start; where it ends."""
         if self.rest is not None and self.profile.x[begin] > 0.0:
             end = begin + len(self.rest.x) - 1
             self._keep(begin, end, self.rest)
@@ -187,8 +186,7 @@ class Chain:
         return ScaledWindow.of(self.columns, begin, end, self._room, self.solver.settings)
 
     def _solve_window(self, begin: int, end: int) -> Window | None:
-        """Solve the points begin..end, from the state at `begin` to rest at `end`; None if that does not
-        converge."""
+        """Solve the points begin..end, from the state at `begin` to rest; None if that does not converge."""
         behind = None
         if self.profile.x[begin] > 0.0 and self.rest is not None:
             behind = Way(self.rest.x, self.rest.u)
@@ -229,6 +227,5 @@ def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
 
 
 def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion from rest builds up its
-    acceleration and takes it back."""
+    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion builds up acceleration."""
     return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2

@@ -41,8 +41,7 @@ def columns_of(problem: FeedrateProblem) -> ProblemColumns:
 
 
 def acceleration_limits(problem: FeedrateProblem) -> FloatArray:
-    """(P, A) axis accelerations at each point less the larger margin of the intervals at both sides of each
-    point [mm/s2]."""
+    """(P, A) axis accelerations less the larger margin of the intervals beside each point [mm/s2]."""
     margin = problem.margin.copy()
     margin[problem.piece[1:] - 1] = 0.0
     before = np.concatenate([[0.0], margin[:-1]])

@@ -65,8 +65,7 @@ JUMP_ROUNDING = 1e-6  # jumps of r'' below this share of it are rounding [-]
 
 
 class Blocks(NamedTuple):
-    """The arrays of a window of n intervals (module text), x, u (n+1,), p and pi (n,) of the profile that
-    they are made at, ."""
+    """The arrays of a window of n intervals (module text); its profile: x, u (n+1,), p and pi (n,)."""
 
     n: int
     axes: int
@@ -103,8 +102,7 @@ class Room:
         self._kept: dict[str, FloatArray] = {}
 
     def blocks(self, columns: ProblemColumns, begin: int, end: int, feed: float, time: float) -> Blocks:
-        """`Blocks` with the grid of the points begin..end, in units of speed and time; whatever was there
-        before is overwritten."""
+        """`Blocks` with the grid of the points begin..end, in units of speed and time; all is overwritten."""
         n, axes, jumps = end - begin, columns.d1.shape[1], _jumps(columns, begin, end)
         blocks = Blocks(
             n=n,

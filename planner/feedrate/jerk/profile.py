@@ -12,8 +12,7 @@ from planner.feedrate.jerk.window import Window
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Profile:
-    """P points: x, u, jerk, duration (P,), and rows (P, A, 4), feed (P, 2), dynamics (P,) as in
-    `Multipliers`."""
+    """P points: x, u, jerk, duration (P,); rows (P, A, 4), feed (P, 2), dynamics (P,) as in `Multipliers`."""
 
     x: FloatArray
     u: FloatArray

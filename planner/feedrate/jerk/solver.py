@@ -116,8 +116,7 @@ class JerkLimited(WindowSettings):
 
 
 def _solve(pieces: list[Chain], counted: _Counted) -> None:
-    """Solve the pieces, on several cores if it is worth it, the longest first, so that none is left to one
-    core at the end."""
+    """Solve the pieces, on several cores if it is worth it, the longest first."""
     pieces = sorted(pieces, key=lambda piece: piece.first - piece.last)
     rooms = threading.local()
 

@@ -82,8 +82,7 @@ def envelope_profile(x, s):
 
 
 def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Feed^2 and acceleration (n + 1,) over the points s of a piece with n >= 4 intervals, in units with
-    fastest speed 1."""
+    """Feed^2 and acceleration (n + 1,) over the points s of n >= 4 intervals, fastest speed 1."""
     n = len(s) - 1
     x, u = np.zeros(n + 1), np.zeros(n + 1)
     tops = []

@@ -61,8 +61,7 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Window:
-    """The profile of a window in the problem's units; rows (N, A, 4), feed (N, 2) and dynamics (N,) as in
-    `Multipliers`."""
+    """The profile of a window in the problem's units; rows (N, A, 4) ... as in `Multipliers`."""
 
     x: FloatArray
     u: FloatArray
@@ -176,8 +175,7 @@ class ScaledWindow:
         yield self._slowed(*self._plain(near[0].max()), SLOWER_MAX)
 
     def _joined(self, way: Way, x: FloatArray, u: FloatArray) -> Way:
-        """A profile from rest put behind a way in the problem's units, which leads to the last point where it
-        is faster."""
+        """A profile from rest put behind a way in the problem's units, up to where that is last slower."""
         ahead, rate = way.x[: len(x)] / self.feed**2, way.u * self.time / self.feed
         beyond = 1 + int(np.flatnonzero(ahead > x[: len(ahead)])[-1])  # the first at least
         return Way(np.append(ahead[:beyond], x[beyond:]), np.append(rate[:beyond], u[beyond:]))
@@ -198,8 +196,7 @@ class ScaledWindow:
         return Way(fastest * x, fastest * u)
 
     def _slowed(self, x: FloatArray, u: FloatArray, most: float = np.inf) -> Way:
-        """A profile slow enough to keep its limits with `START_ROOM` to spare, but at most so many times
-        slower."""
+        """A profile that keeps its limits with `START_ROOM` to spare, at most so many times slower."""
         feed_sq, rate = x * self.feed**2, u * self.feed / self.time
         jerk = jerk_of(self.s, feed_sq, rate)
         slower = min(float(slower_by(self.columns, self.begin, feed_sq, rate, jerk, START_ROOM)), most)

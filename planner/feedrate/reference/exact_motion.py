@@ -32,8 +32,7 @@ def polished(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSo
 
 
 def with_exact_kinematics(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution | None:
-    """The profile nearest to a solution whose jerk is constant on every interval; None where there is
-    none."""
+    """The profile nearest to a solution whose jerk is constant on every interval; None if there is none."""
     limits, room = columns_of(problem), Room()
     columns: list[FloatArray] = []
     for first, beyond in zip(problem.piece[:-1], problem.piece[1:], strict=True):

@@ -75,8 +75,7 @@ def solve_pieces(
 def solution_of(
     problem: FeedrateProblem, found: Found, solver: str, began: float, *, priced: bool
 ) -> FeedrateSolution:
-    """The values found, as a solution; `priced` where its jerk is constant on every interval, which prices
-    are made for."""
+    """The values found, as a solution; `priced` where its jerk is constant on every interval."""
     took = time.perf_counter() - began
     if found.columns is None:
         return FeedrateSolution.failed(problem, found.status, found.sentence, solver, took, found.iterations)

@@ -35,8 +35,7 @@ FINEST = 1e-4
 
 
 class Intervals(NamedTuple):
-    """Where the P points of a grid are: the interval to the right of each; of the last one at the end of a
-    piece (`PathSamples`)."""
+    """Where the P points of a grid are: the interval to the right of each (`PathSamples`)."""
 
     element: Array
     w0: FloatArray
@@ -295,8 +294,7 @@ def evaluate(table: ElementTable, grid: Intervals, limits: PathLimits) -> Column
 
 
 def _begin(last: Array, point: int) -> int:
-    """The point, or the first one behind it that does not end a piece: what is left of that is found with
-    it."""
+    """The point, or the first one behind it that does not end a piece: the rest of it is found with that."""
     while point < len(last) and last[point]:
         point += 1
     return point

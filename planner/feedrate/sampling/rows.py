@@ -41,8 +41,7 @@ ROW = np.dtype(
 
 
 class PathLimits(NamedTuple):
-    """The bounds of a motion along the path: programmed feed of each segment, and limits of each axis; inf
-    for none."""
+    """The bounds along the path: programmed feed of each segment, and limits of each axis; inf for none."""
 
     feed: FloatArray  # (M,) [mm/s]
     velocity: FloatArray  # (A,) [mm/s]

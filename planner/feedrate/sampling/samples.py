@@ -228,8 +228,7 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
 
 
 def straight(legs: Array, element: Array) -> Array:
-    """(n,) True where `element` (n,) is what is free of a straight leg; `legs` (R,) are records of
-    geometry/legs.py."""
+    """(n,) True where `element` (n,) is the free part of a straight leg; `legs` (R,): geometry/legs.py."""
     leg = (element >= 0) & (element < len(legs))
     return leg & ~legs["round"][np.where(leg, element, 0)]
 

@@ -81,8 +81,7 @@ def _points(legs, corners, spans, element, w, axes):
 
 
 def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> UserRows:
-    """The rows of the limits `along`; `resolution` is the share of the limits that they may leave the chord
-    by (module text)."""
+    """The rows of the limits `along`; `resolution`: how far off the chord they may be, of the limits."""
     axes = samples.path.toolpath.axes
     at = samples.intervals
     middle = 0.5 * (samples.w0[at] + samples.w1[at])
@@ -108,8 +107,7 @@ def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Real:
-    """The bounds by the machine's axes on each interval (n,): feed^2, acceleration along the path, and
-    jerk."""
+    """The bounds by the machine's axes on each interval (n,): feed^2, acceleration and jerk along it."""
 
     feed_sq: FloatArray
     acceleration: FloatArray

@@ -44,8 +44,7 @@ def chain_of(program: Program, machine: Machine) -> Chain | None:
 
 
 def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:
-    """The function that makes setpoints of the joints of any samples of the plan's trajectory; None where
-    that is one of the axes."""
+    """What makes setpoints of the joints of any samples of the plan; None where the axes are the joints."""
     chain = None if plan.joints is None else chain_of(plan.program, plan.machine)
     return None if chain is None else lambda samples: joint_setpoints(samples, chain)
 
@@ -80,8 +79,7 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
 
 
 def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
-    """A plan of the tip with its setpoints of the joints, judged by them too: the verdict fails where one of
-    both does."""
+    """A plan of the tip with its setpoints of the joints; the verdict fails where one of both does."""
     if plan.trajectory is None or plan.verdict is None:
         return dataclasses.replace(plan, machine=machine)
     began = time.perf_counter()

@@ -66,8 +66,7 @@ def full_stops(toolpath: Toolpath) -> Array:
 
 
 def job_of_run(job: Job, first: int, last: int) -> Job:
-    """The job of the run between two full stops of a job, the joints `first` and `last`, from the standstill
-    before it."""
+    """The job of the run between the full stops `first` and `last`, with the standstill before it."""
 
     def part(toolpath: Toolpath) -> Toolpath:
         kept = np.zeros(len(toolpath), bool)

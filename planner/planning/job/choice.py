@@ -26,8 +26,7 @@ def shown_time(plan: Plan) -> float:
 
 
 def inside(made: Plan) -> bool:
-    """True if the motion's samples and chords keep the tolerance, at corners (eq. 18) wherever the samples
-    fall."""
+    """True if samples and chords keep the tolerance, at corners (eq. 18) wherever the samples fall."""
     verdict = made.verdict
     return verdict is None or not (
         verdict.vertex.broken or verdict.contour.broken or verdict.corners.overdrawn.any()
@@ -87,8 +86,7 @@ def better(best: Plan | None, rival: Plan, why: str, job: Job) -> Plan:
 
 
 def not_in_step(plan: Plan, *, shaped: bool) -> str | None:
-    """Why a plan with a thread out of step with the spindle is not delivered, it would be no thread; None
-    where all are in step."""
+    """Why a plan with a thread out of step with the spindle is not delivered; None where all are in step."""
     bad = [thread for thread in (plan.verdict.threads if plan.verdict else ()) if thread.broken]
     if not bad:
         return None

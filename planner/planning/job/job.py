@@ -126,15 +126,13 @@ class Job:
         return stop_time(toolpath, machine, join_lines=True)
 
     def behind_filters(self, motion: TimedT) -> TimedT:
-        """The motion, slowed down where it would leave the tolerance behind the filters of the machine
-        (delivery/filters.py)."""
+        """The motion, slower where it would leave the tolerance behind the filters (delivery/filters.py)."""
         with self.stage("filters"):
             machine, toolpath = self.real
             return kept(motion, toolpath, machine)
 
     def deliver_in_time(self, motion: TimedT, *, as_it_is: bool = False) -> Delivered | None:
-        """The motion delivered, behind filters slowed down where they ask for it; None if it takes longer
-        than `most`."""
+        """The motion delivered, slower where filters ask for it; None if it takes longer than `most`."""
         slower = self.behind_filters(motion) if motion.end <= self.most else motion
         if slower.end > self.most:
             return None
@@ -261,8 +259,7 @@ class Job:
         )
 
     def _ringing(self, made: Delivered | None, method: str) -> Iterator[str]:
-        """That vibration modes are excited, if they are; method fir makes its filters as long as leaves them
-        at rest."""
+        """That vibration modes are excited, if they are; method fir makes filters that leave them at rest."""
         shaped = made is None or isinstance(made.motion, ShapedMotion)
         if self.machine.modes and not shaped and method != "fir":
             can = (
@@ -274,8 +271,7 @@ class Job:
 
 
 def _at_blocks(trajectory: Trajectory, toolpath: Toolpath, first: Array, segment: Array) -> Trajectory:
-    """The trajectory with each sample at the block whose path it is at: from the samples `first` (n,) on at
-    `segment` (n,)."""
+    """The trajectory with each sample at its block: from the samples `first` (n,) on at `segment` (n,)."""
     if isinstance(trajectory, TrajectoryOnDemand):
         return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
     segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))

@@ -21,8 +21,7 @@ SAME_TIME = 1e-12  # share of a time that is rounding [-]
 
 
 def with_less_tolerance(job: Job, made: Plan, planned: Callable[[Job], Plan]) -> Plan:
-    """The plan made again with less and less tolerance until chords between samples keep it, as long as it
-    takes no longer than `job.most`."""
+    """The plan with less and less tolerance until chords keep it, as long as it beats `job.most`."""
     path, (machine, programmed) = job.toolpath, job.real
     before, times = np.nan, 1.0
     for again in range(1, PERIOD_ROUNDS + 1):

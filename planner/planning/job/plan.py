@@ -100,22 +100,19 @@ class Plan(Shown):
 
     @property
     def setpoints(self) -> Trajectory | None:
-        """The setpoints of the axes: the joints' motion where the tool centre point is on, else the
-        trajectory."""
+        """The setpoints of the axes: the joints' where the tool centre point is on, else the trajectory."""
         return self.trajectory if self.joints is None else self.joints
 
     @property
     def geometry(self) -> str | None:
-        """How the path was smoothed: "auto" or "spline", "corners" where each corner is rounded by itself;
-        None where no corner is rounded."""
+        """How the path is smoothed: "auto", "spline", or "corners" alone; None where none is rounded."""
         if self.corner is None:
             return None
         return self.corner if self.corner in (AUTO, SPLINE) else SINGLE_CORNERS
 
     @property
     def beside(self) -> tuple[Beside, ...]:
-        """The events while the axes stand still, tool changes for example, and how long they take; no part of
-        the cycle time."""
+        """The events while the axes stand still, and how long they take; no part of the cycle time."""
         return beside_motion(self.program, self.machine)
 
     def delivering(self, made: Delivered, **changes: Any) -> Plan:

@@ -41,8 +41,7 @@ def unit_notes(machine: Machine) -> list[str]:
 
 
 def short_block_notes(toolpath: Toolpath) -> list[str]:
-    """A sentence if most of the blocks that cut are shorter than the tolerance: what they draw may be rounded
-    away."""
+    """A sentence if most of the blocks that cut are shorter than the tolerance, which may round them away."""
     cutting = ~toolpath.rapid
     if not cutting.any():
         return []

@@ -21,8 +21,7 @@ VIEWS: dict[str, str] = {}
 
 
 class Figures(Protocol):
-    """The figures of a plan; what they take and raise is said where they are made
-    (report/interactive/page.py)."""
+    """The figures of a plan; report/interactive/page.py says what they take and raise."""
 
     def __call__(self) -> Figure:
         """The path, coloured by feed."""
@@ -48,8 +47,7 @@ class Page(Protocol):
 
 
 class Shown:
-    """The part of `Plan` that shows and writes it. Each raises NotSolvedError for a plan without a
-    trajectory."""
+    """The part of `Plan` that shows and writes it. Each raises NotSolvedError without a trajectory."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """The setpoints as a table of pandas, with the columns of a trajectory file; `attrs["units"]` has
@@ -92,8 +90,7 @@ class Shown:
         return files
 
     def report(self) -> Page:
-        """The page that opens in a browser: shown in a notebook, and written by
-        `plan.report().save("report.html")`."""
+        """The page for the browser: shown in a notebook, written by `plan.report().save("report.html")`."""
         page: Page = _view("report")(self)
         return page
 

@@ -33,8 +33,7 @@ class Step:
 
     @property
     def gain(self) -> float | None:
-        """Share of the cycle time that was gained [-]; 0 where the step was not kept, inf where nothing was
-        found before."""
+        """Share of the cycle time that was gained [-]; 0 where not kept, inf if nothing was there."""
         if self.kept is None or self.found is None or self.before is None:
             return None
         if not self.kept:

@@ -77,8 +77,7 @@ class FirMethod(Method):
 
 
 def motion_of(guide: LegGuide, motion: Filtered) -> AxisMotion:
-    """The axes of a filtered motion along a guide; each piece belongs to the block that its middle has
-    reached."""
+    """The axes of a filtered motion along a guide; each piece belongs to the block its middle has reached."""
     ends = guide.joint_at[guide.first]
     run = np.repeat(np.arange(guide.runs), np.diff(motion.first))
     segment = np.searchsorted(np.cumsum(guide.lines.length), reached(motion), side="right")

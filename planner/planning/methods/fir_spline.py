@@ -116,8 +116,7 @@ class FirSplineMethod(Method):
         return dataclasses.replace(toolpath, joint=best)
 
     def _plain(self, guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-        """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19) with the largest v_p of each run, and v_sc (par.
-        29)."""
+        """Paper 001 as it is: T1 = v_p/a, T2 = a/j (par. 19), the largest v_p of a run, v_sc (par. 29)."""
         acceleration, jerk = (machine.limits(q, guide.axes).min() for q in ("acceleration", "jerk"))
         T1, T2 = guide.largest(guide.feed) / acceleration, acceleration / jerk
         T1, T2 = (
@@ -142,8 +141,7 @@ def guide_of(toolpath: Toolpath, machine: Machine, own: tuple[float, float] | No
 
 
 def _motion(speeds: ChordSpeeds, toolpath: Toolpath) -> AxisMotion:
-    """The axes of the filtered motion; each piece belongs to the block that its middle has reached along the
-    guide."""
+    """The axes of the filtered motion; each piece belongs to the block its middle has reached."""
     guide, motion = speeds.guide, superpose(speeds.command())
     chord = np.searchsorted(guide.s, reached(motion), side="right") - 1
     run = np.repeat(np.arange(guide.runs), np.diff(motion.first))

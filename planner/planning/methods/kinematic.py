@@ -88,8 +88,7 @@ class KinematicMethod(Method):
         )
 
     def _chain(self, toolpath: Toolpath, machine: Machine, exact: Array) -> _Chain:
-        """Look ahead over the program, arcs as chords where that is faster; `exact` (M,) blocks keep to the
-        path."""
+        """Look ahead, arcs as chords where that is faster; `exact` (M,) blocks keep to the path."""
         curved = toolpath.arc >= 0
         whole = curved & (exact | _faster_whole(toolpath, machine))
         while True:
@@ -139,8 +138,7 @@ def _curve_notes(toolpath: Toolpath, exact: Array) -> list[str]:
 
 
 def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
-    """(M,) True for arcs that take less time from rest to rest than as chords at the speed of the corners
-    between these."""
+    """(M,) True for arcs that are faster from rest to rest than as chords at the speed of their corners."""
     arc = np.flatnonzero(toolpath.arc >= 0)
     whole = np.zeros(len(toolpath), bool)
     count, _ = arc_sagitta(toolpath, CHORD_FRACTION)
@@ -154,8 +152,7 @@ def _faster_whole(toolpath: Toolpath, machine: Machine) -> Array:
 
 
 def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> Array:
-    """(M,) True for the segments between two full stops that take longer than if every block ran from rest to
-    rest."""
+    """(M,) True for the segments between two full stops that take longer than with stops at all blocks."""
     lines, at = chain.lines, chain.path.first
     stop = np.flatnonzero(lines.joint[at] == Joint.STOP)
     lasting = np.diff(chain.time[stop])

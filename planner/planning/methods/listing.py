@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 
 class MethodNames:
-    """The names of the methods, in the order of the documentation; each with a sentence, and the method by
-    its name."""
+    """The names of the methods, in the order of the documentation; a sentence on each, and the method."""
 
     def __iter__(self) -> Iterator[str]:
         return iter(METHODS)

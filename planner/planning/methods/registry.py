@@ -152,8 +152,7 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
 
 
 def check_settings(method: str | Method = "optimal", **settings: Unpack[MethodSettings]) -> MethodSettings:
-    """The settings that are set. Raises InputError for an unknown name and for a setting that the method does
-    not use."""
+    """The settings that are set. Raises InputError for an unknown name or a setting not used."""
     given = _given(settings)
     _check_used(method_name(method) if isinstance(method, str) else method, given)
     return given
@@ -199,8 +198,7 @@ def _check_used(method: str | Method, given: MethodSettings) -> None:
 def _smoothing(
     geometry: str | None, corner: str | CornerShape | None
 ) -> tuple[str, str | CornerShape | None]:
-    """The geometry and the corner shape that are meant. Raises InputError for names that do not go
-    together."""
+    """The geometry and the corner shape that are meant. Raises InputError for names that do not fit."""
     if corner is None or isinstance(corner, str):
         return smoothing(geometry, corner)
     return smoothing(geometry, BEZIER)[0], corner  # a shape of one's own goes where the usual one goes

@@ -117,8 +117,7 @@ class CornerFeeds:
         self.power, self.before = np.ones(count), np.full((2, count), np.nan)
 
     def of_places(self, places: Violations) -> Array:
-        """(n,) the corner that is passed next to each place in time, within half of the delay; -1 where none
-        is."""
+        """(n,) the corner passed next to each place, within half of the delay; -1 where none is."""
         corner = np.flatnonzero(self.sharp)
         corner = np.concatenate([[-1], corner[np.argsort(places.near_time[corner], kind="stable")], [-1]])
         time = np.concatenate([[-np.inf], places.near_time[corner[1:-1]], [np.inf]])
@@ -212,8 +211,7 @@ class _Contour:
 
 
 def _zones(problem: FeedrateProblem, motion: Motion, time: FloatArray, reach: float) -> list[tuple[int, int]]:
-    """Grid points [a, b) within `reach` [mm] of where the motion is at the times (n,), the nearest one at
-    least."""
+    """Grid points [a, b) within `reach` [mm] of where the motion is at times (n,), one at least."""
     law = motion.law
     at = np.clip(np.searchsorted(law.t, time, side="right") - 1, 0, len(law.t) - 1)
     tau = np.clip(time - law.t[at], 0.0, np.append(np.diff(law.t), 0.0)[at])

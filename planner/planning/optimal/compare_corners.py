@@ -45,8 +45,7 @@ FASTER = (
 
 
 class CornerBounds(NamedTuple):
-    """Of a motion on corners between G full stops: time (G,) that it takes at least [s], points (G,) of its
-    grid, about."""
+    """Of a motion on corners between G full stops: least time (G,) [s], points (G,) of its grid, about."""
 
     time: FloatArray
     points: FloatArray

@@ -78,8 +78,7 @@ def _line(path: SmoothPath, joint: int) -> int:
 
 
 def _standstills(best: OnPath) -> Array:
-    """Joints of the toolpath behind the segments on which the profile rests between two full stops of the
-    path."""
+    """Joints behind the segments on which the profile rests between two full stops of the path."""
     inner = best.problem.interval.copy()
     inner[best.samples.piece[:-1]] = False
     return best.samples.segment[inner & (best.solution.feed_sq == 0.0)] + 1

@@ -35,8 +35,7 @@ class OnPath:
         return self.solution.solved and self.solution.cycle_time < other.solution.cycle_time
 
     def held_by_filters(self) -> OnPath:
-        """The same, if the normal acceleration is limited for what is behind the setpoints: then no limit of
-        the machine holds it."""
+        """The same, its normal acceleration named after the filters, for which alone it is limited."""
         problem = self.problem
         names = tuple(
             FILTER_ERROR.name if name == normal_limit.NAME else name for name in problem.bound_names

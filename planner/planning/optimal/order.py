@@ -105,8 +105,7 @@ def solve_again(planned: OnPath, problem: FeedrateProblem, solver: FeedrateSolve
 
 
 def second_order(path: SmoothPath, samples: PathSamples, machine: Machine, solver: FeedrateSolver) -> OnPath:
-    """Solve, add the points where the profile switches on straight elements, and solve again; a failure is
-    the solution's status."""
+    """Solve, add the points where the profile switches on straight elements, and solve again."""
     problem = feedrate_problem(samples, machine, measured=True)
     solution = solver.solve(problem)
     if solution.solved:

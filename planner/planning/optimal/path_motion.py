@@ -34,8 +34,7 @@ from planner.smoothing.spline_path import with_spline
 
 
 def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
-    """The time-optimal motion on a smooth path, tightened where it exceeds a limit between grid points; None
-    where there is none."""
+    """The time-optimal motion on a smooth path, its limits kept between grid points too; None if none."""
     try:
         found = time_optimal(job, settings)
     except NotSolvedError:  # no grid follows the path
@@ -131,8 +130,7 @@ def _rounded(job: Job, settings: Settings) -> SmoothPath:
 
 
 def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
-    """The grids that a path of this size is worth: by its points on a coarse one, which has one for each span
-    at least."""
+    """The grids for a path of this size: by its points on a coarse one, one a span at least."""
     of_spans = settings.effort.grids(len(path.spline.spans))
     if of_spans is settings.effort.sizes[-1]:
         return of_spans

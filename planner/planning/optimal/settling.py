@@ -158,8 +158,7 @@ class Settling:
         return Over(factor, limit, error, stops_between(early, late, len(begin)))
 
     def _put(self, factor: FloatArray, motion: Motion, time: FloatArray, worst: FloatArray) -> None:
-        """Put down to the pieces of p's law, in `factor` (L,), by what D is too fast at times (n,) [s]: (n,)
-        [-]."""
+        """Put down to pieces of p's law, in `factor` (L,), by what D is too fast at times (n,) [s]."""
         over = worst > 1.0 + EXCESS
         for delay in self.shaper.delay:
             np.maximum.at(factor, self._piece(motion, time[over] - delay), worst[over])

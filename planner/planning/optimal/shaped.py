@@ -111,8 +111,7 @@ def shaped(job: Job, settings: Settings, candidates: tuple[Candidate, ...] = CAN
 
 
 class _Search:
-    """The fastest of the candidates so far, and the one with stops at all corners, made when it is asked
-    for."""
+    """The fastest of the candidates so far, and the one with stops at all corners, made if asked for."""
 
     def __init__(self, job: Job, settings: Settings):
         self.job, self.settings, self.shaper = job, settings, shaper_of(job.machine.modes)
@@ -126,8 +125,7 @@ class _Search:
         return time >= min(self.best.delivered.end if self.best else np.inf, self.job.most)
 
     def fastest(self) -> Shaped | None:
-        """The best of the candidates, or the motion with stops at all corners if it is faster; that is not
-        made where it cannot be."""
+        """The best of the candidates, or the motion with stops at all corners where that is faster."""
         if self.useless(self._least):
             return self.best
         return self.tried(self._stopping, STOPPING) or self.best
@@ -180,8 +178,7 @@ def _faster(machine: Machine, by: float) -> Machine:
 
 
 def shaped_plan(job: Job, settings: Settings) -> Plan:
-    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes; else
-    as `shaped`."""
+    """The plan of a job with shaped setpoints. Raises InputError for a machine without vibration modes."""
     if not job.machine.modes:
         raise InputError(
             f"machine '{job.machine.name}' has no vibration modes to shape setpoints for; give it tables [[modes]] with frequency "

@@ -86,8 +86,7 @@ def excess(motion: Motion, toolpath: Toolpath, machine: Machine) -> FloatArray:
 
 
 def _on_one_interval(motion: Motion) -> Array:
-    """(L,) True for pieces of the law on one interval of the grid, where the path's derivatives do not
-    jump."""
+    """(L,) True for pieces of the law on one interval of the grid, where no derivative jumps."""
     s, grid = motion.law.s, motion.samples.s
     interval = np.searchsorted(grid, s, side="right") - 1
     beyond = np.append(s[1:], s[-1])
@@ -137,8 +136,7 @@ def _with_peaks(ratio: FloatArray, smooth: Array) -> FloatArray:
 
 
 def fastest_inside(law: TimeLaw) -> FloatArray:
-    """(n,) times at which the feed has a peak inside a piece of the law [s]: a solver sees its ends and its
-    middle."""
+    """(n,) times of peaks of the feed inside pieces of the law [s]: a solver sees ends and middle."""
     lasting = np.diff(np.append(law.t, law.end))
     braking = np.flatnonzero(law.jerk_s < 0.0)
     tau = -law.acc_s[braking] / law.jerk_s[braking]
@@ -147,8 +145,7 @@ def fastest_inside(law: TimeLaw) -> FloatArray:
 
 
 def tightened(problem: FeedrateProblem, factor: FloatArray) -> FeedrateProblem:
-    """The problem with room for motions that are too fast by `factor` (P,) on the interval to the right of
-    each point."""
+    """The problem with room for motions too fast by `factor` (P,) to the right of each point."""
     lam = np.maximum(factor, 1.0)
     lam[1:] = np.maximum(lam[1:], lam[:-1])  # at both ends of an interval
     return dataclasses.replace(problem, limit_scale=problem.limit_scale * lam)

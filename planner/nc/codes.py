@@ -98,8 +98,6 @@ CHARACTERS: dict[str, str] = {
     "$": "this command to the control is not supported: it may move ($J does); write what it moves as G0 or G1",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
     '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
-    "@": "polar coordinates are not supported; write x and y",
-    "^": "polar coordinates are not supported; write x and y",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
     ",": "corner roundings and chamfers (,R and ,C) are not supported: write the arc or the line; a decimal comma is written as a "

@@ -234,6 +234,7 @@ class Interpreter:
         if not block.foreign:
             self._check_parked(block)
             go_to_switches(self.state, self.table, block, self.findings)
+            moves.take_polar(self.state, block)
             self._one_shot(block)
             self.table.keep_origin(self.state)
             self.mover.execute(block)

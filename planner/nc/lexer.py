@@ -3,9 +3,10 @@
     line    = [/] word* [comments]        word = letter number        number = [+|-] digits [. digits] [e +|- digits]
     comment = ( anything but a parenthesis )   or   ; to the end of the line
 
-Beyond RS274NGC a % at the start of a line may have a name after it, :1000 is O1000, $ inside a line is a
-letter (M3 $1), *71 at the end of a line is a checksum, and a number may have an exponent with its sign: -8.775e-05;
-E needs two digits or more, since X1E-2 is a coordinate and an extruder's word.
+@ and ^ are letters, of polar coordinates. Beyond RS274NGC a % at the start of a line may have a name after
+it, :1000 is O1000, $ inside a line is a letter (M3 $1), *71 at the end of a line is a checksum, and a number
+may have an exponent with its sign: -8.775e-05; E needs two digits or more, since X1E-2 is a coordinate and an
+extruder's word.
 
 A word takes 13 bytes: letter, value and place in the source. What cannot be read becomes a word too, with the
 letter `FAULT` and a code as its value, and the rest of its line is left out. Numbers are rounded as
@@ -29,11 +30,11 @@ LINE_MAX = 4096
 FAULT = 0
 BOM = b"\xef\xbb\xbf"
 NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
-_WORD = re.compile(rb"[A-Za-z%$:]" + NUMBER)
+_WORD = re.compile(rb"[@-Z^a-z%$:]" + NUMBER)
 # Characters by their codes: what a compiled loop compares bytes with.
 _NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
-_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR, _STAR = 79, 69, 101, 58, 36, 42
+_LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR, _STAR, _AT, _Z, _CARET = 79, 69, 101, 58, 36, 42, 64, 90, 94
 _POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
 _MANTISSA_MAX = 2**53 // 10 - 1  # room for one more digit below 2^53
 
@@ -161,7 +162,7 @@ _CHARACTER, _NUMBER, _COMMENT_OPEN, _COMMENT_NESTED, _LONG = (int(code) for code
 def _count(source):  # pragma: no cover - compiled
     letters, lines = 0, 1
     for c in source:
-        if 97 <= c <= 122 or 65 <= c <= 90 or c in (_PERCENT, _COLON, _DOLLAR):
+        if 97 <= c <= 122 or _AT <= c <= _Z or c in (_PERCENT, _COLON, _DOLLAR, _CARET):
             letters += 1
         elif c == _NEWLINE:
             lines += 1
@@ -256,7 +257,7 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
                 continue
             if starts and c == _COLON and _digit_follows(source, i + 1):
                 c = _LETTER_O
-            if not (65 <= c <= 90 or (c == _DOLLAR and not starts)):
+            if not (_AT <= c <= _Z or c == _CARET or (c == _DOLLAR and not starts)):
                 letter[words], value[words], at[words] = FAULT, _CHARACTER, i
                 words += 1
                 reading = False

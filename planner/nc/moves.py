@@ -96,6 +96,31 @@ class ArcFault(WordFault):
         self.otherwise = otherwise
 
 
+def take_polar(state: State, block: Block) -> None:
+    """X and Y in place of @ and ^, LinuxCNC's distance from the programmed zero and angle about it [degrees];
+    under G91 both are steps. What is not given stays. Raises WordFault where they mean nothing."""
+    if not block.has("@^"):
+        return
+    word, (x, y) = block.first_of("@^"), state.programmed()[:2] / state.unit
+    if block.has("XY") or block.g.get("one-shot") not in (None, 40) or state.normal != 2:
+        text = "polar coordinates (@ ^) stand in moves in G17, without X and Y, and not beside G10, G28, G30, G52, G53, G92"
+        raise WordFault(word, text)
+    if not (x or y) and not (state.absolute and "^" in block.value):
+        text = "at the programmed zero the angle of @ and ^ is not known"
+        raise WordFault(word, f"{text}; write G90 and both of them")
+    if not state.absolute and block.value.get("L", 1.0) != 1.0:
+        raise block.fault("polar steps (G91, @ ^) with L are not supported; write the holes out", "L")
+    radius, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
+    radius = block.value.pop("@", radius if state.absolute else 0.0) + (0.0 if state.absolute else radius)
+    angle = math.radians(
+        block.value.pop("^", angle if state.absolute else 0.0) + (0.0 if state.absolute else angle)
+    )
+    to = radius * math.cos(angle) * (2.0 if state.diameters else 1.0), radius * math.sin(angle)
+    came = (0.0, 0.0) if state.absolute else (x * (2.0 if state.diameters else 1.0), y)
+    for letter, there, here in zip("XY", to, came, strict=True):
+        block.value[letter], block.at[letter] = there - here, word
+
+
 def is_move(state: State, block: Block) -> bool:
     """True if the block moves: by more than a motion code, except for an arc, which lacks its words."""
     arc = state.motion in (2, 3) and ("motion" in block.g or block.has("IJKR"))

@@ -258,4 +258,41 @@ def compensated(rng: Rng) -> str:
     return "\n".join(lines) + "\nM2\n"
 
 
-KINDS = {"compensated": compensated, "cycles": cycles, "offsets": offsets, "feeds": feeds, "lathe": lathe}
+def polar(rng: Rng) -> str:
+    """Polar coordinates in lines, arcs and cycles, absolute and as steps, in moved and rotated systems."""
+    lines = ["G21 G0 X3 Y4 Z5", "F120 G99"]
+    absolute = True
+
+    def place() -> str:
+        both = f"@{number(rng, 1, 20) if absolute else number(rng, 0.1, 3)} ^{number(rng, -400, 400)}"
+        return pick(rng, both, both.split()[0], both.split()[1], " ".join(reversed(both.split())))
+
+    for _ in range(rng.integers(5, 20)):
+        choice = rng.integers(12)
+        if choice <= 4:
+            height = f" Z{number(rng, -2, 2)}" if rng.random() < 0.3 else ""
+            lines.append(f"G{rng.integers(2)} {place()}{height}")
+        elif choice == 5:
+            lines.append(f"G{rng.integers(2, 4)} {place()} R{number(rng, 60, 90)}")
+        elif choice == 6 and absolute:
+            lines.append(f"G81 {place()} Z-3 R2\n{place()}\n{place()}\nG80")
+        elif choice == 7:
+            lines.append(pick(rng, "G92 X5 Y3", "G92.1", "G52 X1 Y2", "G10 L2 P1 X3 Y1"))
+        elif choice == 8:
+            lines.append(f"G92.1\nG10 L2 P1 X2 Y5 R{number(rng, -180, 180)}")
+        elif choice == 9:
+            lines.append("#1=[3+2]\nG0 @#1 ^[#1*7]" if absolute else f"G0 {some_axes(rng, letters='XY')}")
+        else:
+            absolute = not absolute
+            lines.append("G90" if absolute else "G91")
+    return "\n".join(lines) + "\nM2\n"
+
+
+KINDS = {
+    "polar": polar,
+    "compensated": compensated,
+    "cycles": cycles,
+    "offsets": offsets,
+    "feeds": feeds,
+    "lathe": lathe,
+}

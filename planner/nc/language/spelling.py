@@ -26,7 +26,7 @@ LINE = tree.Named("_line", True)  # LinuxCNC's name for the number of the line, 
 @cache
 def _pattern(names: tuple[str, ...]) -> re.Pattern[str]:
     known, begin = "|".join(sorted(names, key=len, reverse=True)), "".join({name[0] for name in names})
-    text = rf"(?P<number>{_NUMBER})|(?P<text><[^<>#()\n]+>)|(?P<name>(?i:(?=[{begin}])(?:{known})))|(?P<letter>[A-Za-z])"
+    text = rf"(?P<number>{_NUMBER})|(?P<text><[^<>#()\n]+>)|(?P<name>(?i:(?=[{begin}])(?:{known})))|(?P<letter>[@A-Z^a-z])"
     return re.compile(rf"{text}|(?P<sign>\*\*|.)", re.DOTALL)
 
 

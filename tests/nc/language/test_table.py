@@ -116,6 +116,7 @@ READ: dict[str, list[tuple[str, dict]]] = {
     "G6.2 NURBS": [
         (FIRST + "G1 X0 F600\nG6.2 P4 K0 X0 Y0\nK0 X5 Y9\nK0 X9 Y9\nK0 X15 Y0\nK1\nK1\nK1\nK1", MILL)
     ],
+    "`@`, `^`": [(FIRST + "G1 X4 F600\n@5 ^30\nG91 ^20", MILL)],
     "lathe: G7 G8": [("G21 G18 G7 G0 X9 Y0 Z0\nG1 X5 F600\nG8 X9", MILL)],
     "lathe: drilling": [(TURN + "G83 Z-20. Q3000 F0.1\nG80", LATHE)],
     "G68 G69": [

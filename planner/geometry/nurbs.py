@@ -15,10 +15,9 @@ from planner.base.arrays import FloatArray, freeze
 from planner.base.errors import InputError
 from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
-from planner.nc.points import program_of_points
+from planner.nc.points import CURVE, program_of_points
 from planner.nc.program import Kind, Program, SplineTable
 
-SOURCE = "NURBS"  # what messages call the program
 # Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured
 # [fraction of the chord].
 CHORDS_MIN, HALVINGS = 4, 40
@@ -128,7 +127,7 @@ class Nurbs:
         if not 0 < feed < np.inf:
             raise InputError(f"feed {feed} mm/s; it must be positive and finite")
         points = self.at(self.stations(sagitta))
-        return program_of_points(points, np.full(len(points) - 1, feed), None, SOURCE, self.axes)
+        return program_of_points(points, np.full(len(points) - 1, feed), None, CURVE, self.axes)
 
     def exact_program(self, feed: float) -> Program:
         """The curve itself as a program of one block, as G6.2 is read: every method plans it.
@@ -144,6 +143,6 @@ class Nurbs:
         pieces = cubic_pieces(homogeneous(self.points, self.weights), self.knots, self.degree)
         points, weights = pieces[..., :-1] / pieces[..., -1:], pieces[..., -1]
         ends = points[[0, -1], [0, -1]]
-        program = program_of_points(ends, np.full(1, feed), None, SOURCE, self.axes)
+        program = program_of_points(ends, np.full(1, feed), None, CURVE, self.axes)
         splines = SplineTable(block=np.zeros(len(pieces)), points=points, weights=weights)
         return dataclasses.replace(program, kind=np.full(1, Kind.SPLINE), splines=splines)

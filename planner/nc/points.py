@@ -2,22 +2,24 @@
 are no NC program.
 
 The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid
-moves, and `tolerance` [mm] or null. Numbers are written so that they read back exactly.
+moves, `tolerance` [mm] or null, and `curves`, the columns of a `SplineTable`, where moves are none that go
+straight. Numbers are written so that they read back exactly.
 """
 
+import dataclasses
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.nc.program import Kind, PathControl, Program
+from planner.nc.program import Kind, PathControl, Program, SplineTable
 
 AXES = ("x", "y", "z")
-SOURCE = "<points>"
+SOURCE, CURVE = "<points>", "NURBS"  # what messages call programs of points and of curves
 _FORMAT = "points"
+_CURVES = tuple(field.name for field in dataclasses.fields(SplineTable))
 
 
 def program_of_points(
@@ -53,16 +55,24 @@ def program_of_points(
 
 
 def points_file(program: Program) -> bytes:
-    """The file of a program that `program_of_points` made."""
+    """The file of a program that `program_of_points` made, with curves or without."""
+    splines = program.splines
     tolerance = float(program.tolerance[0])
-    entries = {
+    entries: dict[str, Any] = {
         "format": _FORMAT,
         "axes": "".join(program.axes),
         "tolerance": None if np.isnan(tolerance) else tolerance,
         "feed": [value if np.isfinite(value) else None for value in program.feed.tolist()],
         "points": [program.start.tolist(), *program.end.tolist()],
     }
+    if len(splines):
+        entries["curves"] = {name: getattr(splines, name).tolist() for name in _CURVES}
     return (json.dumps(entries) + "\n").encode("ascii")
+
+
+def is_points(program: Program) -> bool:
+    """Whether `points_file` keeps a program: it is one of points or curves, of linear axes."""
+    return program.source in (SOURCE, CURVE) and program.axes in (AXES, AXES[:2])
 
 
 def are_points(data: bytes) -> bool:
@@ -71,15 +81,8 @@ def are_points(data: bytes) -> bool:
 
 
 def own_text(program: Program) -> bytes | None:
-    """The NC text of a program, or a plotter's, if it was given as a text, or read from a file that is still
-    there; None for points."""
-    data = program.text
-    if data is None:
-        try:
-            data = Path(program.source).read_bytes()
-        except (OSError, ValueError):
-            return None
-    return None if are_points(data) else data
+    """The NC text of a program, or a plotter's; None for points."""
+    return None if program.text is None or are_points(program.text) else program.text
 
 
 def read_points(data: bytes, source: str) -> Program:
@@ -89,12 +92,38 @@ def read_points(data: bytes, source: str) -> Program:
         position = np.asarray(entries["points"], dtype=np.float64)
         feed = np.array([np.inf if value is None else value for value in entries["feed"]], dtype=np.float64)
         tolerance = None if entries["tolerance"] is None else float(entries["tolerance"])
-        known = entries["format"] == _FORMAT and entries["axes"] == "".join(AXES)
+        axes = tuple(entries["axes"])
+        known = entries["format"] == _FORMAT and axes in (AXES, AXES[:2])
+        curves = SplineTable(**entries["curves"]) if "curves" in entries else None
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
-    good = known and position.ndim == 2 and position.shape[1] == len(AXES) and len(position) > 1
+    good = known and position.ndim == 2 and position.shape[1] == len(axes) and len(position) > 1
     good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
     if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
         text = "begins like a file of points, and is none: format points, axes xyz, points (n+1, 3), n feeds above 0 or null"
         raise InputError(text, source=source)
-    return program_of_points(position, feed, tolerance, source)
+    program = program_of_points(position, feed, tolerance, source, axes)
+    if curves is None:
+        return program
+    if not _join(curves, position):
+        text = "begins like a file of points, and is none: its curves do not begin and end at its points"
+        raise InputError(text, source=source)
+    kind = program.kind.copy()
+    kind[curves.block] = Kind.SPLINE
+    return dataclasses.replace(program, kind=kind, splines=curves)
+
+
+def _join(curves: SplineTable, position: FloatArray) -> bool:
+    """Whether the pieces of curves go from one to the next of the points (n+1, A), or of their own."""
+    block, ends = curves.block, curves.points[:, [0, -1]]
+    if not len(block) or ends.shape[2] != position.shape[1] or not np.isfinite(curves.weights).all():
+        return False
+    if (np.diff(block) < 0).any() or block[0] < 0 or block[-1] >= len(position) - 1:
+        return False
+    inner = np.diff(block) == 0
+    first, last = np.append(True, ~inner), np.append(~inner, True)
+    return (
+        np.array_equal(ends[1:, 0][inner], ends[:-1, 1][inner])
+        and np.array_equal(ends[first, 0], position[block[first]])
+        and np.array_equal(ends[last, 1], position[block[last] + 1])
+    )

@@ -204,7 +204,7 @@ class Program:
     reading      : the settings it was read with
     tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
-    text         : the program itself, if it was given as a text; None for those of a file, and for points
+    text         : what it was read from; None for points and curves of Python
     """
 
     source: str

@@ -60,8 +60,7 @@ def read_program(
         return dataclasses.replace(parse_program(text, machine, reading), text=data)
     assert path is not None
     data = load(path)
-    program = parse_program(data, machine, reading, source=source_name(path))
-    return dataclasses.replace(program, text=data) if str(path) == STDIN else program
+    return dataclasses.replace(parse_program(data, machine, reading, source=source_name(path)), text=data)
 
 
 def source_name(path: str | Path) -> str:

@@ -1,8 +1,8 @@
 """The files of a plan, and the plan in numbers.
 
 `trajectory.parquet`, `.csv` or `.npz` (`planner.report.trajectory_file`), `planned.ngc` if the program is an
-NC text (`planner.report.planned`), the program itself if no other file has it, `summary.json`, and pictures
-if asked for. They take their places together (`planner.report.replace`), and trajectory and summary carry the
+NC text (`planner.report.planned`), the program itself with what it calls, `summary.json`, and pictures if
+asked for. They take their places together (`planner.report.replace`), and trajectory and summary carry the
 same `run_id`.
 """
 
@@ -18,11 +18,19 @@ from typing import TYPE_CHECKING, Any
 
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.nc.points import SOURCE, own_text, points_file
+from planner.nc.points import are_points, is_points, own_text, points_file
 from planner.planning.job.at_tip import joints_of
-from planner.report.judging import KEPT, KEPT_POINTS, KEPT_TEXT
 from planner.report.planned import LeftOut, planned_program
-from planner.report.replace import CSV_METADATA, SUMMARY, check_output, checksums, refuse_inputs, replacing
+from planner.report.replace import (
+    CSV_METADATA,
+    OUTPUTS,
+    PROGRAM,
+    SUMMARY,
+    check_output,
+    checksums,
+    refuse_inputs,
+    replacing,
+)
 from planner.report.summary import json_ready, summary, tool_point_summary, uniform, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
 from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
@@ -31,6 +39,7 @@ if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
 
 PLANNED = "planned.ngc"
+KEPT = "program"  # the program in the directory of its plan, with the suffix of its file
 
 
 def write_plan(
@@ -59,7 +68,9 @@ def write_plan(
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
     directory = Path(directory)
     run_id = uuid.uuid4().hex
-    kept = {name for name in (PLANNED, *KEPT) if _is_source(plan, directory / name)}
+    beside = program_to_keep(plan)
+    kept = {name for name in (PLANNED, *beside) if _is_source(plan, directory / name)}
+    kept |= {name for name, text in beside.items() if _holds(directory / name, text)}
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
         trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
@@ -75,8 +86,8 @@ def write_plan(
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
-        for name, text in program_to_keep(plan).items():
-            (new / name).write_bytes(text)
+        for name in beside.keys() - kept:
+            (new / name).write_bytes(beside[name])
         if plots:
             from planner.report.plots import write_figures
 
@@ -103,11 +114,26 @@ def write_plan(
 
 
 def program_to_keep(plan: Plan) -> dict[str, bytes]:
-    """The program of a plan as a file, by name, if it was given as a text or as points: no other file has it.
-    Empty otherwise."""
-    if plan.program.text is not None:
-        return {KEPT_TEXT: plan.program.text}
-    return {KEPT_POINTS: points_file(plan.program)} if plan.program.source == SOURCE else {}
+    """The program of a plan, and the files that it calls, by their names in the directory of the plan: what
+    reads the plan again needs no others. The program is the first; there is none that Python made of more
+    than points and curves."""
+    program = plan.program
+    if program.text is None:
+        return {f"{KEPT}.json": points_file(program)} if is_points(program) else {}
+    files = {kept_name(program.source, program.text): program.text}
+    for called in {frame.source for frame in program.frames} - {program.source}:
+        with suppress(OSError):
+            if (name := Path(called).name) not in (*OUTPUTS, SUMMARY):
+                files.setdefault(name, Path(called).read_bytes())
+    return files
+
+
+def kept_name(source: str, text: bytes = b"") -> str:
+    """What the program of that file, or of that text, is called in the directory of its plan: "program.mpf"
+    of "part.MPF"."""
+    suffix = ".json" if are_points(text) else Path(source).suffix.lower()
+    named = PROGRAM.fullmatch(KEPT + suffix) and not source.startswith("<")
+    return KEPT + (suffix if named else ".ngc")
 
 
 def check_places(
@@ -122,15 +148,16 @@ def check_places(
     """Raise InputError if `write_plan` could not write into a directory.
 
     That is so if one of its files is among the `inputs` (program and machine), or exists and no run wrote it.
-    A `planned.ngc` that is the program itself stays as it is and is no reason.
+    A file that is the program itself stays as it is and is no reason.
     """
     names = [f"trajectory.{file_format}", SUMMARY]
     names += [CSV_METADATA] * (file_format == "csv") + ["toolpath.png", "profiles.png"] * plots
     names += ["report.html"] * report
     refuse_inputs([directory / name for name in names], inputs)
-    with suppress(InputError):
-        refuse_inputs([directory / PLANNED], inputs[:1])
-        names.append(PLANNED)
+    for name in (PLANNED, kept_name(str(inputs[0]))):
+        with suppress(InputError):
+            refuse_inputs([directory / name], inputs[:1])
+            names.append(name)
     check_output(directory, names, force=force)
 
 
@@ -145,6 +172,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "run_id": run_id,
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "program": plan.program.source,
+            "kept": next(iter(program_to_keep(plan)), None),
             "assumptions": plan.program.assumptions,
             "method": plan.method,
             "geometry": plan.geometry,
@@ -179,3 +207,8 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
 def _is_source(plan: Plan, file: Path) -> bool:
     """Whether the plan's program was read from that file, which must then not be replaced."""
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
+
+
+def _holds(file: Path, text: bytes) -> bool:
+    """Whether a file is one that no run has to write: it is there with that text, perhaps a user's own."""
+    return file.is_file() and file.read_bytes() == text

@@ -21,8 +21,6 @@ from planner.planning.job.at_tip import Judged, judged
 from planner.report.trajectory_reader import TrajectoryFile
 from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
 
-KEPT = (KEPT_TEXT, KEPT_POINTS) = ("program.ngc", "program.json")  # programs that no other file has
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Judgement:
@@ -80,13 +78,14 @@ class FileSays:
     reading: Reading = AS_USUAL  # how its program was read
     # the file of its program; "<text>" and the like where it had none; None where the file does not say
     program: str | None = None
+    kept: str = ""  # the name of the program beside it
     wrong: tuple[str, ...] = ()  # names of entries that no plan writes so
 
     @classmethod
     def of(cls, metadata: Mapping[str, Any]) -> FileSays:
         """From the metadata of a file; entries of another type than expected count as missing."""
         machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
-        free, program = metadata.get("not_limited", []), metadata.get("program")
+        free, program, kept = metadata.get("not_limited", []), metadata.get("program"), metadata.get("kept")
         known = isinstance(free, list) and all(isinstance(n, str) and n in NOT_LIMITED_NAMES for n in free)
         number = float(tolerance) if is_number(tolerance) else math.nan  # type: ignore[arg-type]
         positive = 0.0 < number < math.inf
@@ -101,17 +100,21 @@ class FileSays:
             not_limited=tuple(n for n in free if isinstance(n, str)) if isinstance(free, list) else (),
             reading=Reading.saved(metadata.get("reading")),
             program=program if isinstance(program, str) else None,
+            kept=Path(kept).name if isinstance(kept, str) else "",
             wrong=tuple(name for name, fits in right.items() if not fits),
         )
 
     def program_at(self, trajectory: Path) -> Path:
-        """Where the program is that the file names. Raises InputError if it names none, or if that is not
-        there."""
-        found = None if self.program is None else Path(program_file(trajectory.parent, self.program))
-        if found is None or not os.path.isfile(found):
-            where = "names no program" if found is None else f"names the program {found}, which is not there"
+        """Where the program is: beside the file, or else where it was planned. Raises InputError if the file
+        names none, or if that is in neither place."""
+        beside = trajectory.parent / self.kept
+        if self.kept and os.path.isfile(beside):
+            return beside
+        if self.program is None or not os.path.isfile(self.program):
+            named = f"{self.kept or self.program}, which is not there"
+            where = "names no program" if self.program is None else f"names the program {named}"
             raise InputError(f"{where}: planner verify {trajectory} JOB", source=str(trajectory))
-        return found
+        return Path(self.program)
 
     def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
         """The metadata in words, and whether they were used."""
@@ -141,13 +144,6 @@ class FileSays:
             for name in self.not_limited
             if name in broken and name not in unjudged
         ]
-
-
-def program_file(directory: Path, source: str) -> str:
-    """Where a plan's program is: its `source`, or in the plan's directory if it was given as a text or as
-    points."""
-    kept = [directory / name for name in KEPT if (directory / name).exists()]
-    return str(kept[0]) if kept and source.startswith("<") else source
 
 
 def is_number(value: Any) -> bool:

@@ -53,17 +53,17 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
 
     planned : what the blocks are planned to take, if it is known already
 
-    Raises LeftOut if the file has changed since it was planned, or if the result does not read back as the
-    same motion, for example because a line would become too long.
+    Raises LeftOut if a file that it calls has changed since, or if the result does not read back as the same
+    motion, for example because a line would become too long.
     """
     assert plan.trajectory is not None
     source, data = plan.program.source, own_text(plan.program)
     if data is None:
-        raise LeftOut(f"the program is points, which have no F words, or {source} is no longer there")
+        raise LeftOut("the program is points, which have no F words")
     if any(event.text == "M220" for event in plan.program.events if event.text[0] == "M"):
         raise LeftOut("its F words count by a factor that the program sets (M220)")
     if not _reads_as(data, plan, feeds=True):
-        raise LeftOut(f"{source} does not read as the program that was planned; has it changed?")
+        raise LeftOut(f"{source} does not read as the program that was planned; has what it calls changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
     feeds = _as_programmed(feeds_of(planned, plan.toolpath, plan.machine, len(plan.program)), plan.toolpath)
     if is_plotter_file(data, plan.program.source):

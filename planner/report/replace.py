@@ -1,8 +1,8 @@
 """Output files that take their place when all of them are written, `summary.json` last.
 
 The files of a run are written into a hidden directory inside the output directory, forced to disk, and
-renamed into their places in the order of `OUTPUTS`; files of the run before that the new one lacks go in
-between. A kill before the renames leaves the old set, after them the new one, and between two of them whole
+renamed into their places, first those of `OUTPUTS` in their order; files of the run before that the new one
+lacks go in between. A kill before the renames leaves the old set, after them the new one, and between two of them whole
 files of two runs, which can be seen: the `run_id` of the trajectory is then not that of `summary.json`, or
 one of the two is missing.
 
@@ -17,6 +17,7 @@ import hashlib
 import itertools
 import json
 import os
+import re
 import shutil
 import sys
 import uuid
@@ -30,20 +31,19 @@ if sys.platform != "win32":
 
 SUMMARY = "summary.json"
 CSV_METADATA = "trajectory.meta.json"
-# Every name that a run may write, in the order in which they take their places.
+# Names that a run may write beside those of the program, in the order in which they take their places.
 OUTPUTS = (
     CSV_METADATA,
     "trajectory.parquet",
     "trajectory.csv",
     "trajectory.npz",
     "planned.ngc",
-    "program.ngc",
-    "program.json",
     "toolpath.png",
     "profiles.png",
     "report.html",
-    SUMMARY,
 )
+# The program among the files of a run. Those that it calls have any names: they are replaced, and never removed.
+PROGRAM = re.compile(r"program\.\w{1,8}")
 PAGE_MARK = '<meta name="generator" content="feedrate-planner">'
 PULSES = ("t", "axis", "direction", "count", "line")
 CSV_HEADS = (PULSES, ("method", "outcome", "cycle_time_s", "ratio_to_best"))
@@ -116,7 +116,8 @@ def replacing(directory: Path, *, kept: Container[str] = (), force: bool = False
             for name in names:
                 _sync(new / name)
             _refuse_foreign(directory, names, vouched, force)
-            for name in OUTPUTS:
+            others = {*names, *filter(PROGRAM.fullmatch, (name for name, _ in vouched))} - {*OUTPUTS, SUMMARY}
+            for name in (*OUTPUTS, *sorted(others), SUMMARY):
                 if name == SUMMARY:
                     _sync(directory)
                 if name in names:

@@ -69,6 +69,8 @@ def test_commands_of_trajectories_take_the_directory_of_a_plan(tmp_path: Path) -
     alone = run("verify", out)
     assert alone.exit_code == 0, alone.output
     (tmp_path / "part.nc").unlink()
+    assert run("verify", out).exit_code == 0, "the directory has its program"
+    (out / "program.nc").unlink()
     lost = run("verify", out)
     assert lost.exit_code == 2
     assert "which is not there: planner verify" in lost.output

@@ -199,3 +199,11 @@ def test_faults_are_told_in_the_words_of_the_file() -> None:
     ):
         machine.dt = 0.002  # type: ignore[misc]
     assert machine.model_copy(update={"dt": 0.002}).dt == 0.002
+
+
+@pytest.mark.parametrize("name", ["ender3", "voron"])
+def test_built_in_printers_have_an_extruder(name: str) -> None:
+    text = "G21\nG90\nM82\nG92 E0\nG1 X30 F3000\nG1 X60 E2 F1200\nG1 E-1 F1500\nG1 X0\n"
+    program = planner.read_program(text=text, machine=name)
+    assert program.extruded.tolist() == [0.0, 2.0, -3.0, 0.0]
+    assert not [said for said in program.assumptions if "E word" in said]

@@ -55,15 +55,27 @@ def test_blocks_have_their_planned_feed(job: Path, tmp_path: Path) -> None:
 
 def test_a_program_that_is_no_file(tmp_path: Path) -> None:
     assert "planned.ngc" not in write_plan(make_plan(), tmp_path / "out")
-    assert "square.ngc is no longer there" in notes(tmp_path / "out")[0]
+    assert "which have no F words" in notes(tmp_path / "out")[0]
 
 
 @pytest.mark.parametrize("now", ["G1 X1 F3000\n", SQUARE.replace("3000", "2999"), "", "G1 X\n"])
 def test_a_program_that_has_changed(job: Path, tmp_path: Path, now: str) -> None:
-    plan = plan_of(job)
+    """The files are those of the program that was planned, whatever its file holds by now."""
+    plan, before = plan_of(job), job.read_bytes()
     job.write_text(now)
+    write_plan(plan, tmp_path / "out")
+    assert (tmp_path / "out" / "program.ngc").read_bytes() == before
+    assert (tmp_path / "out" / "planned.ngc").read_bytes() == before
+
+
+def test_what_it_calls_has_changed(tmp_path: Path) -> None:
+    job, called = tmp_path / "job.nc", tmp_path / "O2.nc"
+    job.write_text("O1\nG21 G90 F600\nM98 P2\nM30\n")
+    called.write_text("O2\nG1 X10\nM99\n")
+    plan = planner.plan(job, "mill", method="stop")
+    called.write_text("O2\nG1 X12\nM99\n")
     assert "planned.ngc" not in write_plan(plan, tmp_path / "out")
-    assert "does not read as the program that was planned" in notes(tmp_path / "out")[0]
+    assert "has what it calls changed?" in notes(tmp_path / "out")[-1]
 
 
 def test_a_line_that_would_grow_too_long(tmp_path: Path) -> None:

@@ -15,13 +15,14 @@ from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.language.detect import without_leader
 from planner.nc.points import own_text
-from planner.nc.program import FEED_MOVES, Program, plain
+from planner.nc.program import FEED_MOVES, Kind, Program, plain
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC
 from planner.nc.text import program_text
 from planner.nc.writer import FEED_MIN, round_down
 from planner.planning.job.plan import Plan
 
+CURVE = "G6.2"  # of a curve without a text, which no control is given: chords stand for it
 SAME_PLACE = 1e-6  # of an end point that was written with seven decimals and read back [mm]
 
 
@@ -88,13 +89,13 @@ def _of_points(program: Program) -> tuple[bytes, Program]:
     Raises InputError for points of other axes than x, y and z.
     """
     if len(program.axes) > len("xyz"):
-        raise InputError(
-            "points of rotary or second axes have no program; export their setpoints", source=program.source
-        )
+        said = "points of rotary or second axes have no program; export their setpoints"
+        raise InputError(said, source=program.source)
     lines = ["G21 G90 G17 G94", "G0 " + _words(program.start)]
     for end, kind, feed in zip(program.end, program.kind.tolist(), program.feed.tolist(), strict=True):
         f_word = f" F{round_down(max(feed, FEED_MIN) * SECONDS_PER_MINUTE)}" if kind in FEED_MOVES else ""
-        lines.append(f"{'G1' if f_word else 'G0'} {_words(end)}{f_word}")
+        code = CURVE if kind == Kind.SPLINE else "G1" if f_word else "G0"
+        lines.append(f"{code} {_words(end)}{f_word}")
     own = dataclasses.replace(program, line=np.arange(3, 3 + len(program)))
     return "\n".join([*lines, "M2", ""]).encode(), own
 
@@ -102,7 +103,7 @@ def _of_points(program: Program) -> tuple[bytes, Program]:
 def _words(place: np.ndarray) -> str:
     return " ".join(
         f"{letter}{plain(round(float(value), DECIMALS + 3) + 0.0)}"
-        for letter, value in zip("XYZ", place, strict=True)
+        for letter, value in zip("XYZ", place, strict=False)  # points may have no z
     )
 
 

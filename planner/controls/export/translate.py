@@ -216,7 +216,7 @@ class Translator(Switches):
             end, start = line.points[k + 1], line.points[k]
             words = [
                 f"{letter}{plain(round(float((end[a] - offset[a]) / unit), decimals) + 0.0)}"
-                for a, letter in enumerate("XYZ")
+                for a, letter in enumerate("XYZ"[: len(end)])
                 if end[a] != start[a]
             ]
             self.move += 1

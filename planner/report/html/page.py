@@ -58,10 +58,8 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
     columns, about = _columns(plan)
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
-    about["summary"] = {"told": plan_rows(plan)} | (said or summary(plan))
-    return page_of(
-        "report", "planned", plan.program.source, about, columns, PICTURE=path_picture(plan, PICTURE)
-    )
+    about["summary"] = told = {"told": plan_rows(plan)} | (said or summary(plan))
+    return page_of("report", "planned", told["program"], about, columns, PICTURE=path_picture(plan, PICTURE))
 
 
 # Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start

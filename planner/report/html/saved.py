@@ -13,11 +13,11 @@ from planner.base.errors import InputError
 from planner.feedrate.solution import Status
 from planner.machine import machine_from_dict
 from planner.motion.chain_setpoints import tip_of_setpoints
-from planner.nc.points import are_points
-from planner.nc.reader import load, parse_program
+from planner.nc.points import own_text
+from planner.nc.reader import read_program
 from planner.planning.job.at_tip import chain_of
 from planner.planning.job.plan import Plan
-from planner.report.judging import FileSays, is_number, judge, program_file
+from planner.report.judging import FileSays, is_number, judge
 from planner.report.replace import SUMMARY
 from planner.report.summary import json_ready
 from planner.report.trajectory_reader import read_trajectory, trajectory_file
@@ -28,9 +28,8 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     """The plan that a directory holds, judged anew; its summary; and the text of its program, None for
     points.
 
-    The program is read from where it was planned, or from the directory if it was given as a text or as
-    points. The plan lacks what files do not hold: the profile at the grid points and the prices (those are in
-    the summary).
+    The program is that in the directory. The plan lacks what files do not hold: the profile at the grid
+    points and the prices (those are in the summary).
 
     Raises InputError if a file is missing or damaged, or if the trajectory is not that of the program.
     """
@@ -43,14 +42,12 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
     if says.wrong or says.machine is None:
         wrong = ", ".join(f"{name} is {str(read.metadata.get(name))[:40]}" for name in says.wrong[:1])
         raise InputError(f"its metadata are not those of a plan: {wrong}; plan again", source=str(file))
-    source = program_file(directory, summary["program"])
-    text = load(source)
     machine = machine_from_dict(says.machine, source=f"{file} (its own machine)")
-    program = parse_program(text, machine, says.reading, source=source)
+    program = read_program(says.program_at(file), machine, says.reading)
     if len(program) != summary["blocks"]:
         raise InputError(
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",
-            source=source,
+            source=program.source,
         )
     found = judge(read, program, machine, tolerance=says.tolerance, not_limited=says.not_limited)
     motion, toolpath, machine = found.motion, found.toolpath, found.machine
@@ -77,7 +74,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         notes=tuple(summary["notes"]),
         timings=summary["timings_s"],
     )
-    return plan, summary, None if are_points(text) else text
+    return plan, summary, own_text(program)
 
 
 # What the summary of a plan has, and of which kind.

@@ -87,16 +87,8 @@ def save(
 ) -> list[Path]:
     """`Plan.save`."""
     plan.require()
-    place = Path(directory)
-    source = Path(plan.program.source)
-    check_places(
-        place,
-        [source] if source.is_file() else [],
-        file_format=trajectory,
-        plots=plots,
-        report=report,
-        force=force,
-    )
+    place, source = Path(directory), Path(plan.program.source)
+    check_places(place, [source], file_format=trajectory, plots=plots, report=report, force=force)
     names = write_plan(plan, place, file_format=trajectory, plots=plots, report=report, force=force)
     return [place / name for name in names]
 

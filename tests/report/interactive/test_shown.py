@@ -121,6 +121,7 @@ def test_the_table_is_that_of_the_trajectory_file(plan: Plan, tmp_path: Path) ->
     files = plan.save(tmp_path / "out", report=True)
     assert sorted(one.name for one in files) == [
         "planned.ngc",
+        "program.ngc",
         "report.html",
         "summary.json",
         "trajectory.parquet",

@@ -75,6 +75,8 @@ class FanucParser(FanucControl):
 
     def take_plain(self, rows: tree.PlainRows) -> None:
         """Rows without a statement, used labels between them, and G66 calls after those that move."""
+        if self.source.file and (self.source.words_of(rows)[0] == ord("%")).all():
+            return  # of a file that is called it is no end of the program
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
             return

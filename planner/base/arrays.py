@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 FloatArray = NDArray[np.float64]
-# Axes that a vector in a record of a kernel has room for: a kernel is compiled for each kind of record, half a
-# minute of them for another number of axes.
+# Axes that a vector in a record of a kernel has room for: a kernel is compiled for each kind of record.
 ROOMS = (3, 9)
 
 
@@ -27,8 +26,7 @@ def read_only(array: Array) -> Array:
 def freeze(
     record: object, names: str, dtype: type, shape: tuple[int | None, ...], *, finite: bool = True
 ) -> None:
-    """Convert fields of a frozen dataclass to contiguous read-only arrays of a shape such as (3, None), in
-    place.
+    """Convert fields of a frozen dataclass to contiguous read-only arrays of a shape like (3, None).
 
     An array that has the type already is not copied (trajectories fill gigabytes): the record then shares
     memory with the caller's array, which the caller must not change any more.

@@ -107,8 +107,7 @@ def whole(function: Callable[..., Any], settings: dict[str, Any], cache: KernelC
 
 
 class KernelCache(caching.NullCache):
-    """numba's cache of a whole, in files with a checksum from folders that nobody else can write
-    (kernel_files.py).
+    """numba's cache of a whole, in files with a checksum from safe folders (kernel_files.py).
 
     function : of Python
     content  : `content_of` it; None for one that is not kept

@@ -6,8 +6,7 @@ There are three:
 * an unsolved problem  a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
 * a bug of ours        an assertion or an uncaught exception.
 
-Packages that only some solvers and outputs need are imported when they are needed, and asked for by name
-where they are missing.
+Packages that only some solvers and outputs need are imported when needed, asked for if missing.
 """
 
 import importlib

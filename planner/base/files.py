@@ -26,8 +26,7 @@ def readable(text: str) -> str:
 
 
 def require_ending(path: str | Path) -> None:
-    """Raise InputError if `path` is a device, a socket or a named pipe; the pipes of a shell under `STREAMS`
-    are fine.
+    """Raise InputError if `path` is a device, a socket or a named pipe but those of a shell (`STREAMS`).
 
     Raises OSError where there is no such file.
     """

@@ -1,5 +1,4 @@
-"""numba's `njit` for the planner's kernels: `from planner.base.kernels import njit` instead of `from numba
-import njit`.
+"""numba's `njit` for the planner's kernels, in place of `from numba import njit`.
 
 A kernel is a function that is compiled when it is first called with arguments of some types (compiling.py),
 and kept on the disk (kernel_files.py), with a digest of what it computes. numba is imported when the first
@@ -40,9 +39,8 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
             return of_function(value)
         if isinstance(value, ModuleType):
             return value.__name__
-        if hasattr(
-            value, "_defn"
-        ):  # one of numba's intrinsics (lanes.py): it belongs together with all of its file
+        # one of numba's intrinsics (lanes.py): it belongs together with all of its file
+        if hasattr(value, "_defn"):
             return _text_of(value._defn.__code__.co_filename)
         if isinstance(value, type):
             return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"

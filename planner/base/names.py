@@ -1,5 +1,4 @@
-"""The registry of every name that a user may type: methods, geometries, corner shapes, solvers, and the
-aliases of each.
+"""The registry of every name that a user may type: methods, geometries, corners, solvers, aliases.
 
 The command line makes its choices from these tables, `planner.planning.methods.registry` makes the methods,
 and the messages name them. Nothing heavy is imported here: a method is named by its module and class, which
@@ -22,8 +21,7 @@ GEOMETRIES = (AUTO, SPLINE, SINGLE_CORNERS)
 # The shapes of single corners.
 BEZIER, FIR, KINEMATIC = "bezier", "fir", "kinematic"
 CORNER_SHAPES = (BEZIER, FIR, KINEMATIC)
-# Every way to smooth a path, as `corner` of a method takes it: a geometry of splines, or the shape of single
-# corners.
+# Every way to smooth a path, as `corner` of a method takes it: splines, or a shape of single corners.
 SMOOTHINGS = (AUTO, SPLINE, *CORNER_SHAPES)
 # How much work a plan is worth (planning/optimal/effort.py).
 QUICK, NORMAL, BEST = "quick", "normal", "best"
@@ -119,8 +117,7 @@ def users_of(setting: str) -> tuple[str, ...]:
 
 
 def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None]:
-    """The geometry, and the shape of single corners where it is `corners`; each argument is None where
-    nothing was asked for.
+    """The geometry, and the shape of single corners where it is `corners`; None: nothing was asked for.
 
     A corner shape alone means single corners of that shape, and `corners` alone means Bezier corners. The
     names `auto` and `spline` are taken as corners too.

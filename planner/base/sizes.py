@@ -1,5 +1,4 @@
-"""The sizes at which the code changes its way: long jobs go in parts, on other routes, or with less effort
-than short ones.
+"""The sizes at which the code changes its way: long jobs go in parts, other routes, or less effort.
 
 What only long jobs go through only long jobs would try. So all these sizes are settings, with two values
 each: the usual one and a small one, with which nearly every job goes the large way. The environment variable
@@ -10,8 +9,7 @@ module is imported, and holds for the processes that are started from there.
 
     parts  : the same computation, cut otherwise or on other threads: the same result to rounding
     routes : other windows and ranges of the same optimisation: another way to the same optimum
-    effort : what is not tried, or less finely, because the job is large: a slower motion by what is written
-             beside the size
+    effort : what is not tried, or less finely, for large jobs: slower by what is written beside the size
     shown  : what a page or a table has no room for
 
 A size beyond which something is refused is no setting: there is no large way behind it.
@@ -48,8 +46,7 @@ class Sizes:
     idle_rows: int = _size(PARTS, 2_000, 20)  # the same at first, and as long as nothing moves
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
 
-    # Threads: they take 1 ms to begin. A point takes 2 us on a grid and some us to solve; a span 20 us to
-    # relax.
+    # Threads: they take 1 ms to begin; a point takes some us, a span 20 us to relax.
     grid_shared: int = _size(PARTS, 5_000, 10)  # points of a grid that are worth a thread
     intervals_shared: int = _size(PARTS, 5_000, 10)  # of its intervals, to be sampled
     points_shared: int = _size(PARTS, 3_000, 0)  # fewer are solved by one thread

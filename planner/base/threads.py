@@ -34,8 +34,7 @@ def side_by_side(
 ) -> None:
     """Run all of `work` in as many threads as there may be, in this order; returns when all is done.
 
-    stop    : called after an error or an interrupt, which is then raised: makes what is still running end
-              soon
+    stop    : called after an error or an interrupt, which is then raised: ends what still runs soon
     waiting : called in this thread, about once in `PERIOD`
     """
     # not loaded by commands that solve nothing

@@ -1,5 +1,4 @@
-"""Units and symbols. Inside the package everything is in mm, s and rad; conversions happen only at the edges,
-with the names below.
+"""Units and symbols: all in mm, s, rad; conversions happen only at the edges, with the names below.
 
 s         arc length along the path [mm]            feed      ds/dt [mm/s]
 feed_sq   feed squared [mm2/s2]                     acc_s     d2s/dt2 [mm/s2]

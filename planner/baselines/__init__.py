@@ -1,2 +1,1 @@
-"""Motions by closed forms, which the papers give: FIR filters (000, 001) and look-ahead over corners
-(003)."""
+"""Motions by the papers' closed forms: FIR filters (000, 001), look-ahead over corners (003)."""

@@ -24,8 +24,7 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.corners.blend import ScaledShape, Shape
 
-# Up to here retreat times advance is largest at the middle of the corner, which the error bound needs
-# (tested).
+# Up to here retreat times advance is largest in the middle, which the error bound needs (tested).
 SIGMA2_MAX = 1.5
 PRODUCT_MAX = 3.0  # ... and up to here for sigma1 sigma2
 

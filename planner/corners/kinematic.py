@@ -48,8 +48,7 @@ from planner.corners.blend import Shape
 from planner.corners.fir import fir_breaks
 from planner.machine import Machine
 
-# A direction that changes by less is taken to change by so much [-]: below the rounding of unit vectors, and
-# all ratios stay finite.
+# A smaller change of direction is taken to be this [-]: below rounding, and all ratios stay finite.
 CHANGE_MIN = 1e-12
 
 

@@ -35,9 +35,8 @@ def share_legs(wanted: FloatArray, ease: FloatArray, length: FloatArray) -> Floa
     d = np.zeros_like(wanted)
     for _ in range(ROUNDS):
         free = np.maximum(length - d[:-1] - d[1:], 0.0)
-        can = np.maximum(
-            wanted - d, 0.0
-        )  # what a corner could still use: its wish, and what its legs have left
+        # what a corner could still use: its wish, and what its legs have left
+        can = np.maximum(wanted - d, 0.0)
         can[:-1] = np.minimum(can[:-1], free)
         can[1:] = np.minimum(can[1:], free)
         grow = can.copy()

@@ -56,11 +56,9 @@ class CornerShape(Protocol):
         ...
 
 
-# A leg whose free part is shorter than this fraction of it is closed by scaling up one of its corners [-];
-# grid intervals of the size of rounding would otherwise be left between corners that share a leg.
+# A leg whose free part is a smaller fraction of it is closed by scaling up one of its corners [-].
 CLOSE = 1e-4
-# Curvatures are the same below this fraction of the larger one [-]: printed arc centres are good to 1e-4 of a
-# small radius.
+# Curvatures are the same below this fraction of the larger one [-]: arc centres are printed to 1e-4.
 SAME_CURVATURE = 1e-6
 
 
@@ -134,9 +132,8 @@ class SmoothPath:
         stop = np.flatnonzero(self.joint == Joint.STOP)
         legs = np.repeat(pieces, np.diff(stop))
         joints = np.append(True, legs)  # with the joint behind each leg
-        parted = self.toolpath.with_joints(
-            self.legs.first[stop], Joint.STOP
-        )  # the path may stop where the program does not
+        # the path may stop where the program does not
+        parted = self.toolpath.with_joints(self.legs.first[stop], Joint.STOP)
         toolpath = parted.part(np.repeat(legs, np.diff(self.legs.first)))
         columns = {name: getattr(self, name)[joints] for name in ("joint", "d", "params", "scale")}
         columns |= {name: getattr(self, name)[joints] for name in ("tol", "tol_ap", "normal_max")}

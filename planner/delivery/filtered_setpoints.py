@@ -31,13 +31,11 @@ from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.timing import MotionInTime, sample_motion
 
-# Places of the filtered motion in a period, and in the shortest filter: more where every setpoint makes a
-# kink.
+# Places of the filtered motion in a period, and in the shortest filter: where setpoints make kinks.
 PER_PERIOD, PER_FILTER, PER_FILTER_HELD = 4, 8, 32
 AT_ONCE = SIZES.convolved_at_once
 Terms = tuple[tuple[int, int, float], ...]
-# Of each kind the shape of the position, and that of the velocity times dt if it counts; where the middle of
-# both is [periods].
+# Of each kind the shape of position and, if it counts, velocity times dt; the middle of both [periods].
 SHAPES: dict[str, tuple[float, Terms, Terms]] = {
     "linear": (0.0, ((-1, 1, 1.0), (0, 1, -2.0), (1, 1, 1.0)), ()),
     "hold": (0.5, ((0, 0, 1.0), (1, 0, -1.0)), ()),
@@ -63,9 +61,8 @@ class FilteredSetpoints:
         self.phases = max(PER_PERIOD, int(np.ceil(places / min(lengths))))
         middle, place, slope = SHAPES[interpolation]
         self.middle = middle + sum(lengths) / 2.0
-        self.reach = (
-            int(np.ceil(sum(lengths))) + 1
-        )  # setpoints before a time that count, but the one behind it
+        # setpoints before a time that count, but the one behind it
+        self.reach = int(np.ceil(sum(lengths))) + 1
         # (phases, reach + 2) weights of the setpoint behind a time and of those before it
         age = np.arange(self.phases)[:, None] / self.phases + np.arange(-1, self.reach + 1)
         self.place = self._half(place, lengths, age, even=True)

@@ -38,8 +38,7 @@ STOPS_AT_ONCE = SIZES.stops_at_once
 # at most by the second [-]: together by up to 240, which leaves 1/57,600 of any filter's error.
 ROUNDS, FACTOR_LEAST, FACTOR_MOST = 60, 1.003, 1.5
 FLOOR_STEP = 1.0 / 32.0  # of Td: by so much a rest grows that was too short, twice as much each time again
-# What the path leaves of the tolerance for filters counts as this fraction at least [-], or the first step
-# would be too large.
+# What the path leaves for filters counts as this fraction at least [-], or steps would be too large.
 ROOM_LEAST = 0.1
 
 

@@ -21,8 +21,7 @@ from planner.motion.slowed import FAR, Place, Slowed, reach, without_stands
 from planner.motion.timing import MotionInTime
 from planner.verifier import OF_CHORDS, Kind, Verdict
 
-# So often a motion is mended and judged again, at other times each time: an excess may be larger between the
-# places looked at before.
+# So often a motion is mended and judged again, each time at other times.
 ROUNDS = 6
 # Rounds may find a few other places each time, between those that were looked at: from this round on all of the
 # motion is slower, by so many times what its worst place asks for, if that is no more than `LITTLE` [-].
@@ -30,8 +29,7 @@ EVERYWHERE, TWICE, LITTLE = 4, 2.0, 1e-3
 MOST_SLOWER = 2.0  # [-]
 # What is slowed down is slowed down by this much more [-], and so many times that each time again.
 MORE, MORE_AGAIN = 1e-5, 4.0
-# Of an error of which it is not known how much the path itself has the share is taken to be none at first; it
-# is slowed down by so many times that in each further round [-].
+# Of an error whose share of the path is unknown: slowed down by so many times that in each further round [-].
 AGAIN = 2.0
 # A place reaches so many periods to both sides: that far what is judged is made of [-].
 PERIODS = 3.0

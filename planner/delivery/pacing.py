@@ -17,8 +17,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.motion.axis_motion import AxisMotion
 from planner.motion.timing import Motion
 
-# Velocities and accelerations below this fraction of the motion's largest are none [-]: rounding of long sums
-# of pulses is 1e-12 of them.
+# Velocities and accelerations below this fraction of the largest are none [-]: rounding of sums.
 STANDING = 1e-7
 
 Timed = Motion | AxisMotion
@@ -30,8 +29,7 @@ class MotionRuns:
     """G runs of a motion between its standstills."""
 
     first: Array  # (G,) index of the first piece of the run
-    # (G,) index of the first piece behind it: a standstill, the first piece of the next run, or the number of
-    # pieces
+    # (G,) index of the first piece behind it: a standstill, the next run, or the number of pieces
     last: Array
     begin: FloatArray  # (G,) [s]
     end: FloatArray  # (G,) [s]

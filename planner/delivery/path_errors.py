@@ -26,8 +26,7 @@ SPARE = 2e-3  # of the tolerance, what measuring at other times may find more [-
 PIECE_ANGLE = np.pi / 8.0  # by which a piece of an arc turns at most [rad]
 WIDER = 16.0
 NOT_PASSED = 2.0 * WIDER  # budgets that a vertex counts as missed by which the motion does not come to [-]
-# Steps of Newton's method without the curvature's share, from the foot on a chord that is CHORD_FRACTION of a
-# budget off.
+# Steps of Newton's method without the curvature's share, from the foot on a chord.
 NEAREST_STEPS = 3
 
 Places = Iterable[tuple[FloatArray, FloatArray]]  # times (T,) [s] and positions (T, A) [mm], in parts

@@ -39,26 +39,20 @@ from planner.motion.timing import CHUNK, MotionInTime, in_chunks
 from planner.motion.trajectory import Trajectory, joined
 from planner.motion.vertex_times import STANDING, passing_times_of
 
-# Phases of the samples that are looked at, and places of a period at which motions near their rests are
-# tabulated. Halving the step changes the worst miss by less than 1 % (corners of 30 to 170 degrees, 1 to 20
-# ms).
+# Phases of the samples that are looked at, and places of a period at which motions near rests are tabulated:
+# halving the step changes the worst miss by less than 1 %.
 PHASES, PLACES = 16, 64
 # A motion is looked at so many times in a period to find its vertices.
 PER_PERIOD = 8
-# Where a chord could cut the place of a rest off, the rest lasts so long at least [s]: then it is a piece of
-# the motion of its own, and who looks at the pieces, at whatever times, sees it.
+# A rest that a chord could cut off lasts so long at least [s]: a piece that who looks at pieces sees.
 LEAST_REST = 1e-6
-# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between the phases
-# and places above.
+# Chords may miss a vertex by this fraction of its tolerance [-]; the rest is for what lies between.
 USED = 0.99
-# Above that by so little they need no other round [-]: what is left of an excess gets less with every one,
-# and another place, where it is the verdict that finds too much, waits until there is none.
+# An excess above that by so little needs no other round [-]: it gets less with every one.
 ABOVE = 2e-3
-# Of an excess a corner's tolerance is reduced by so many times [-]: rounding and chord share it, and the
-# rounding has half where dt is long, eq. (20).
+# By how many times an excess a corner's tolerance is reduced [-]: rounding has half of it, eq. (20).
 REDUCED_BY = 1.5
-# Of an excess inside a block by so many times: its chords have a share of the tolerance only, and some
-# methods use it in steps.
+# The same inside a block, whose chords have a share of the tolerance only.
 REDUCED_INSIDE = 2.0
 # A corner is stopped at instead where less than this fraction of its tolerance would be left to it [-].
 LEFT_MIN = 0.1
@@ -245,8 +239,7 @@ def with_less_tolerance(
     beside    : take from the arcs beside the corners too, whose chords may be what misses them
     """
     allowed = USED * programmed.tolerance
-    # where the path turns slowly chords have all of the tolerance, eq. (20): what is too much there, the
-    # verdict says
+    # where the path turns slowly chords have all of the tolerance, eq. (20): the verdict says the rest
     over = (far > allowed + ABOVE * programmed.tolerance) & (programmed.joint != Joint.SMOOTH)
     if not over.any():
         return None

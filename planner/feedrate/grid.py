@@ -9,8 +9,7 @@ holds the speed limit, decelerates at b:
 
 With these points added the profile on the grid *is* the optimum, however long the element.
 
-A jerk-limited profile rounds the switches off: on an element of length L, with limits a and j along it, in
-about
+A jerk-limited profile rounds switches off: on an element of length L, with limits a and j, in about
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
@@ -36,9 +35,8 @@ from planner.feedrate.sampling.samples import insert_points, straight
 from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 
-# Two switches nearer to each other than this share of their interval are one [-]: a peak that just touches
-# the limit. A point nearer to an end of its interval is that end: rounding put points of tiny intervals
-# there, 4e-16 mm apart beside a jump of a limit of one's own.
+# Nearer switches than this share of their interval are one [-]: a peak that just touches the limit. A point
+# nearer to an end is that end: rounding put points of tiny intervals there.
 SWITCH_MIN = 1e-9
 
 # Spacing of points for jerk-limited profiles (module text) [tau].

@@ -1,5 +1,4 @@
-"""The Lagrangian of the jerk-limited problem, interval by interval: what a small change of the problem does
-to the shortest time.
+"""The Lagrangian of the jerk-limited problem by interval: what changes of the problem do to the time.
 
     L = sum_i  h_i + sum_r lam_ir g_ir + pi_i (x_i + (2 u_i + p_i) ds_i + p_i (2 u_i + p_i) h_i^2/12 - x_{i+1})
 
@@ -30,9 +29,8 @@ from planner.feedrate.solution import FeedrateSolution
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lagrangian:
-    """value (P,) of every interval [s], and what it changes by per relative change of the limits:
-    acceleration, jerk (A,) of the axes, all of these together by interval, rows (P,), and feed_sq_max (P,)
-    [s]."""
+    """value (P,) of every interval [s], and its change per relative change of the limits: acceleration, jerk
+    (A,), all of these by interval, rows (P,), and feed_sq_max (P,) [s]."""
 
     value: FloatArray
     acceleration: FloatArray

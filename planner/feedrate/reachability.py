@@ -33,8 +33,7 @@ from planner.base.kernels import njit
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# Newton steps at most; each step drops at least one of the 4A + 2 rows for good, so this is never reached
-# with A <= 6.
+# Newton steps at most; each drops one of the 4A + 2 rows for good: never reached with A <= 6.
 NEWTON_STEPS = 60
 # Rows whose |a u| stays below this share of their limit, for every u that the other limits allow, bound x
 # alone [-]. Not a threshold on a itself: beside an axis with a limit a million times larger even |r'_k| =

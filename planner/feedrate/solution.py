@@ -1,5 +1,4 @@
-"""The result of a feedrate solver: a status with a sentence, and a profile or NaN, never a plausible
-number."""
+"""The result of a feedrate solver: a status with a sentence, and a profile or NaN."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prices:
-    """The prices of the limits: derivatives of the cycle time with respect to them, never positive, on the
-    solved grid.
+    """The prices of the limits: derivatives of the cycle time by them, never positive, on the solved grid.
 
     velocity, acceleration, jerk : (A,) dT/d(axis limit) [s per mm/s, mm/s2, mm/s3]
     feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity
@@ -100,14 +98,11 @@ class FeedrateSolution:
     sentence: str  # what happened and, on failure, what to do
     solver: str  # repr of the solver
     feed_sq: FloatArray  # (P,) x [mm2/s2]; all NaN unless solved, like the next three
-    # (P,) acceleration along the path just after each point [mm/s2]; 0 at the last point of a piece that ends
-    # at rest
+    # (P,) acceleration along the path just after each point [mm/s2]; 0 at the end of a piece at rest
     acc_s: FloatArray
-    # (P,) jerk along the path on the interval to the right of each point [mm/s3]; 0 everywhere at second
-    # order
+    # (P,) jerk along the path to the right of each point [mm/s3]; 0 everywhere at second order
     jerk_s: FloatArray
-    # (P,) time on that interval [s]; 0 where a piece ends; inf where a second-order profile rests at both
-    # ends
+    # (P,) time there [s]; 0 where a piece ends; inf where a second-order profile rests at both ends
     duration: FloatArray
     solve_time: float  # [s]
     iterations: int = 0  # of an iterative solver; the largest of all pieces
@@ -200,8 +195,7 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] of the interval to the right of each point at constant acceleration, 2 h / (feed_i +
-    feed_{i+1}).
+    """(P,) time [s] to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
 
     0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
 
@@ -237,8 +231,7 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
         yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_limit, 0.0)
     inner = np.flatnonzero(problem.interval)
     jerk = solution.jerk_s[inner]
-    # Where there is no jerk, no duration is needed: it is infinite where a second-order profile rests at both
-    # ends.
+    # Without jerk no duration is needed: it is infinite where a second-order profile rests at both ends.
     gained = jerk * np.where(jerk == 0.0, 0.0, solution.duration[inner])
     ends = (
         (inner, u[inner], problem.d2_right, problem.d3_right),

@@ -5,8 +5,7 @@
     third order    own                 our interior-point kernel (feedrate/jerk/)
                    ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
 
-A solver is its settings; wherever a name is taken, a solver with settings of one's own is, too. It has one
-method:
+A solver is its settings; one with other settings is taken wherever a name is. It has one method:
 
     solve(problem, progress) -> FeedrateSolution      a profile with multipliers, or a status and a sentence that says what to do
 
@@ -35,8 +34,7 @@ class ThirdOrderSolver(Protocol):
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Solve all pieces of the problem, which start and end at rest; failures are a status, not an
-        exception.
+        """Solve all pieces of the problem, from rest to rest; failures are a status, not an exception.
 
         progress : called with the share of the points that is done [-]
         """

@@ -1,5 +1,4 @@
-"""The package toppra as a second solver of the same problem: written by others, to compare the own kernel
-with.
+"""The package toppra as a second solver of the same problem, to compare the own kernel with.
 
 toppra (H. Pham, MIT) solves one linear programme in (u, x) per grid point and pass with Seidel's method. It
 is given exactly the rows of `FeedrateProblem`: for every interval the left and the right end (|a u + b x| <=
@@ -45,11 +44,9 @@ from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it must be small against 1e8 (module
-# text).
+# Largest x in toppra's eyes [-]: 1e-8 must be small against it, and it against 1e8 (module text).
 FEED_SQ_SCALE = 1e6
-# The limit in every row [-]: the geometric mean of 1 and `FEED_SQ_SCALE`, so that neither the coefficients of
-# u nor those of x are near the 1e-10 at which rows count as parallel.
+# The limit in every row [-], the mean of 1 and `FEED_SQ_SCALE`: no coefficient is near 1e-10 then.
 ROW_SCALE = 1e3
 # Relative slack under which an end speed counts as allowed: rounding, as in the own kernel [-].
 ROUNDING = 1e-9
@@ -174,8 +171,7 @@ def _rows(
     x_max = problem.feed_sq_limit[points] / feed_sq
     a, b = a * (ROW_SCALE * acc), b * (ROW_SCALE * feed_sq)
     both = np.vstack([np.eye(2 * axes), -np.eye(2 * axes)])
-    # Bounds of u that the rows imply, twice over: without them Seidel's walk along a row with a = 0 ends at
-    # its own "infinity".
+    # Bounds of u that the rows imply, twice over: or a walk along a row with a = 0 ends at "infinity".
     with np.errstate(divide="ignore"):
         u_max = 2.0 * ((ROW_SCALE + np.abs(b) * x_max[:, None]) / np.abs(a)).min(axis=1)
     u_bounds = np.stack([-u_max, u_max], axis=1)
@@ -187,9 +183,7 @@ def _rows(
 def _import_toppra() -> Any:
     """The package, imported when it is first needed: 0.9 s, because it loads pyplot."""
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # its sources hold escapes that newer Pythons warn of when they compile them
+        warnings.simplefilter("ignore")  # of escapes in its sources, by newer Pythons
         return import_needed("toppra", "solver toppra")
 
 

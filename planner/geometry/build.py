@@ -32,9 +32,8 @@ from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.bezier import homogeneous
 from planner.nc.program import MOVES, Kind, PathControl, Program
 
-# Turning angle below which two tangents are the same [rad]. Coordinates of 1e3 mm carry 1e-13 mm of rounding,
-# so a segment of 1e-4 mm has a direction good to 1e-9; at 1e-8 rad the velocity jump is 1e-6 mm/s at 100
-# mm/s, far below any drive's resolution.
+# Turning angle below which two tangents are the same [rad]: coordinates of 1e3 mm have 1e-13 mm of rounding,
+# and at 1e-8 rad the velocity jumps by 1e-6 mm/s at 100 mm/s, below any drive's resolution.
 COLLINEAR_ANGLE = 1e-8
 # Coordinates beyond this have lost the micrometre in float64 products and are certainly a mistake [mm].
 COORDINATE_MAX = 1e9
@@ -45,8 +44,7 @@ ZERO_LENGTH = 1e-9
 def toolpath_from_program(program: Program, machine: Machine, tolerance: float | None = None) -> Toolpath:
     """Lay out the blocks of a program as segments and joints.
 
-    tolerance : contour tolerance [mm] that takes precedence over G64 P of the program and over the machine;
-                None to use those
+    tolerance : contour tolerance [mm] in place of the program's G64 P and the machine's; None for those
 
     Raises InputError for a program that moves nowhere, a tolerance below `TOLERANCE_MIN` or beyond
     `COORDINATE_MAX`, an axis that moves and that the machine lacks, and coordinates beyond `COORDINATE_MAX`.

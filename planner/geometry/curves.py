@@ -1,5 +1,4 @@
-"""Curves: rational Bezier cubics as segments of a toolpath, over a parameter x that is all but their arc
-length.
+"""Curves: rational Bezier cubics as segments of a toolpath, over all but their arc length x.
 
 A segment of length L is C(u), u in [0, 1], of nc/bezier.py with 1 for its outer weights. Corners and grids
 want a parameter in mm with

@@ -11,8 +11,7 @@ joints
 
     r <= amount / (length - 2 eps for each of the two that is no full stop)
 
-Alone it moves from rest to rest in the shortest time (base/point_to_point.py), at the F of its line at most,
-while the other axes wait.
+Alone it moves from rest to rest in the shortest time (base/point_to_point.py), at F at most.
 """
 
 from dataclasses import dataclass, replace

@@ -4,8 +4,7 @@ A leg is one arc, one segment of a curve, or all collinear lines that follow one
 joined because where a CAM system cut a straight line into blocks must not change the motion: a corner may
 reach back over several short blocks of the same line.
 
-The kernels see one numpy record per leg (`leg_dtype`): a tuple of ten arrays would cost ten reference counts
-per call.
+The kernels see one numpy record per leg (`leg_dtype`): arrays would cost reference counts.
 """
 
 from dataclasses import dataclass
@@ -17,8 +16,7 @@ from planner.base.kernels import njit
 from planner.geometry.curves import curve_point, curve_tangent
 from planner.geometry.toolpath import Joint, Toolpath
 
-# Joined lines may turn by this much in all [rad]: a leg of a metre then stays within 1e-4 mm / 8 of its
-# blocks.
+# Joined lines may turn by this much in all [rad]: a leg of a metre is within 1e-4 mm / 8 of its blocks.
 JOINED_ANGLE = 1e-7
 
 
@@ -26,8 +24,7 @@ JOINED_ANGLE = 1e-7
 class Legs:
     """R legs of a toolpath and the R+1 joints between them."""
 
-    # (R+1,) leg r holds the segments first[r] : first[r+1]; also the toolpath's joint index at the leg's
-    # start
+    # (R+1,) leg r holds the segments first[r] : first[r+1]; also the joint at the leg's start
     first: Array
     offset: FloatArray  # (M,) place of each segment's start on its leg [mm]
     length: FloatArray  # (R,) range of the leg's parameter x [mm]
@@ -55,8 +52,7 @@ class Legs:
 
 
 def leg_dtype(axes: int) -> np.dtype:
-    """Record of one leg over `axes` axes, with `room` for more; formulas and meaning of the fields:
-    geometry/toolpath.py.
+    """Record of a leg over `axes` axes, with `room` for more; its fields: geometry/toolpath.py.
 
     On a curve, which is `round` as well, start, direction, center and e1 are its control points, the first
     numbers of e2 and drift the weights of the inner two, and radius and rate those of an arc that turns as

@@ -18,8 +18,7 @@ from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
 from planner.nc.points import CURVE, program_of_points
 from planner.nc.program import Kind, Program, SplineTable
 
-# Chords: how many a span has to begin with, halvings at most, places at which their deviation is measured
-# [fraction of the chord].
+# Chords: how many of a span to begin with, halvings at most, places where they are measured [fraction].
 CHORDS_MIN, HALVINGS = 4, 40
 MEASURED = (0.25, 0.5, 0.75)
 # The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
@@ -88,8 +87,7 @@ class Nurbs:
         return points
 
     def stations(self, sagitta: float) -> FloatArray:
-        """(k,) parameters, all knots among them, between which the chords leave the curve by at most
-        `sagitta` [mm].
+        """(k,) parameters, all knots among them, between which chords are off by `sagitta` [mm] at most.
 
         Raises InputError unless that is positive.
         """

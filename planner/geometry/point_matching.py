@@ -34,9 +34,8 @@ SAME_PLACE = 1e-6  # [mm] the least digit that NC programs carry
 SAME_FEED = 1e-6  # [-] a feed above another by less is the same: rounding
 # Vertices may be missed by so many budgets [-]: a vertex passed at 1.01 must not hold up what follows.
 MISSED = 2.0
-# Price of a vertex missed by more than its budget [budget^2]: more than that of all points around it. Small
-# moves inside the tolerance would else be entered before their first vertex is reached, at their own, higher
-# feed.
+# Price of a vertex missed by more than its budget [budget^2]: more than of all points around it, or small
+# moves inside the tolerance would be entered before their first vertex, at their higher feed.
 TOO_FAR = 1e6
 FIRST_WIDER, WIDEST = 1.05, 100.0  # budgets are widened by the first, then doubled, up to the second [-]
 ANYWHERE = 1e12  # the same where no point is to be lost
@@ -76,8 +75,7 @@ def chain_of(toolpath: Toolpath) -> PathChain:
 class SegmentsInOrder:
     """Which segment of the toolpath each point of a motion is at, for points that come chunk by chunk.
 
-    Which link a point is at is settled as soon as all assignments that are still possible agree on it; until
-    then its chunk is kept.
+    A point's link is settled when all possible assignments agree on it; its chunk is kept until then.
     """
 
     def __init__(self, toolpath: Toolpath):

@@ -27,11 +27,9 @@ from planner.geometry.spline import Spline, span_point
 from planner.geometry.toolpath import Toolpath
 
 LOOKED_AT = 5  # places on a span at which its bend is looked at
-# Between points of an arc that are passed in order [rad]: an arc inside the tolerance may not be passed
-# backwards.
+# Between points of an arc passed in order [rad]: an arc may not be passed backwards.
 ARC_ANGLE = np.pi / 8
-# Bisections of two chords for the nearest place: to 1e-15 of them where the feed changes, elsewhere to a
-# thousandth.
+# Bisections of two chords for the nearest place: where the feed changes, and elsewhere.
 FINE, COARSE = 50, 10
 
 

@@ -1,5 +1,4 @@
-"""The record of the programmed path: M segments (lines, arcs, helices, curves) and the M+1 joints around
-them.
+"""The record of the programmed path: M segments (lines, arcs, helices, curves), M+1 joints.
 
 Segment i runs from joint i to joint i+1. Every segment is a curve over its own parameter x in [0, length_i]:
 
@@ -44,8 +43,7 @@ class Joint(IntEnum):
 
 
 # Turning angle above which the path turns right back [rad]: 175 degrees. The corner speed of paper 002 eq.
-# (19), (20) is sqrt(1.5 X eps) cot(theta/2): 0.044 of sqrt(1.5 X eps), at X = 2000 mm/s2 and eps = 0.05 mm
-# only 0.5 mm/s.
+# (19), (20) is sqrt(1.5 X eps) cot(theta/2), 0.044 of sqrt(1.5 X eps) there.
 REVERSAL_ANGLE = np.deg2rad(175.0)
 
 
@@ -94,13 +92,10 @@ class Toolpath:
     theta           : (M+1,) turning angle at the joint [rad]; 0 at both ends
     tolerance       : (M+1,) contour tolerance eps at the joint [mm]
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
-    held            : (M,) True where the feed is to be reached and held: cut in step with the spindle
-                      (geometry/run_in.py)
-    exact           : (M,) True where the path is to be followed exactly (G61, G61.1); no corner at its ends
-                      is rounded
+    held            : (M,) True where the feed is to be reached and held: threads (geometry/run_in.py)
+    exact           : (M,) True where the path is followed exactly (G61, G61.1); no corner there is rounded
     zero_length     : (Z,) blocks that move nowhere, kept as events
-    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths and one
-                      norm measures them
+    radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths
     extrusion       : what the extruder does along it; None without one
     inside          : (M,) `along` over the smaller tolerance of the segment's ends [-], where joints were
                       given less of it (delivery/periods.py); None for 1

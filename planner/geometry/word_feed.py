@@ -21,8 +21,7 @@ def allowed_along(toolpath: Toolpath, segment: Array, tangent: FloatArray) -> Fl
     """(n,) feed along the path in all axes [mm/s] at which what F goes by moves at F.
 
     segment : (n,) of the toolpath
-    tangent : (n, A) dr/ds of a path beside it, whose parts in linear and in rotary axes may differ from those
-              of the segment
+    tangent : (n, A) dr/ds of a path beside it, with other parts in linear and rotary axes
     """
     groups = feed_groups(toolpath.axes)
     by = goes_by(toolpath)

@@ -26,11 +26,9 @@ from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
 from planner.motion.trajectory import COLUMNS, Trajectory
 
-# Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-]; the better one is
-# then good to rounding.
+# Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-].
 QUADRATURE_ROUNDING = 1e-9
-# Smallest step of the quadrature [fraction of the piece]; near a kink it is worth its square of the piece's
-# length.
+# Smallest step of the quadrature [fraction of the piece]; near a kink it is worth its square.
 SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0

@@ -1,5 +1,4 @@
-"""The extruder beside a motion: its place, velocity, acceleration and jerk at any time, from what it does
-along the path.
+"""The extruder beside a motion: place, velocity, acceleration and jerk, from what it does on the path.
 
 Between two joints with programmed places E0 and E1 (geometry/extrusion.py), which the motion passes at the
 lengths s0 and s1 of its own path, with r = (E1 - E0)/(s1 - s0)

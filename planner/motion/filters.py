@@ -1,5 +1,4 @@
-"""FIR filters: moving averages in series, what they make of a velocity pulse, and how long they should be
-(paper 000, eq. 1-10).
+"""FIR filters: moving averages in series, what they make of pulses, how long they should be (paper 000).
 
 A moving average of length T has unit area; n of them in series have the kernel h = m_1 * ... * m_n on [0,
 Td], Td = sum T_i. With S = integral of h and R = integral of S (step and ramp response), a pulse of length L
@@ -7,8 +6,7 @@ and speed V, Tv = L/V, that starts at t = 0 leaves the filters as the velocity
 
     V [S(t) - S(t - Tv)]                                                            for every Tv > 0     (eq. 5 holds for Tv >= Td)
 
-All three are piecewise polynomials; with the sums T_s of all subsets s of the lengths, and m = 1, 2, 3 for h,
-S, R,
+All three are piecewise polynomials; with sums T_s of the lengths' subsets s, m = 1, 2, 3 for h, S, R,
 
     (1 / (T_1 ... T_n)) sum_s (-1)^|s| (t - T_s)_+^(n + m - 2) / (n + m - 2)!
 
@@ -33,8 +31,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 
-# Lengths of filters in periods of a mode are rounded up unless they exceed a multiple by less than this
-# fraction of a period [-].
+# Lengths in periods of a mode are rounded up unless they exceed a multiple by less than this fraction [-].
 PERIOD_ROUNDING = 1e-9
 
 
@@ -76,8 +73,7 @@ class Filters:
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, and its general form
-        for Tv < Td).
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, for Tv < Td too).
 
         speed    : V [mm/s]
         duration : Tv [s], any
@@ -126,8 +122,7 @@ def lengths_from_limits(V: FloatArray, A: FloatArray, J: FloatArray) -> tuple[Fl
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] lengthened to whole multiples of the periods [s] of one or two modes (eq. 10), at the
-    least sum of both.
+    """T1 >= T2 (S,) [s] lengthened to multiples of the periods [s] of one or two modes (eq. 10).
 
     With one mode one filter is made a multiple of its period, the other stays as it is.
 

@@ -1,5 +1,4 @@
-"""How much of the limits that are no axis' own a motion uses at its samples: for the planner, which slows a
-motion down where it must.
+"""How much of the limits that are no axis' own a motion uses at its samples: for the planner.
 
 The judge has code of its own for each of them (verifier/limits.py, verifier/user_limits.py).
 """
@@ -34,9 +33,8 @@ def _normal(motion: Trajectory) -> FloatArray:
 
 
 def slowest(motion: Trajectory) -> FloatArray:
-    """(n,) times between samples at which the motion is slowest, as far as its acceleration is constant [s]:
-    there it turns most quickly, and its normal acceleration can have peaks that are over before the next
-    sample."""
+    """(n,) times between samples at which the motion is slowest, by constant acceleration [s]: there it
+    turns most quickly, and its normal acceleration can have peaks."""
     v, a = _linear(motion)
     square = np.sum(a * a, axis=1)
     step = np.divide(-np.sum(v * a, axis=1), square, out=np.full(len(v), np.inf), where=square > 0.0)

@@ -30,20 +30,17 @@ from planner.corners.elements import (
     to_arc_length,
 )
 
-# Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below the rounding of
-# coordinates, so that accelerations by differences of nearby positions are as good as the columns.
+# Arc length is inverted to this share of the interval [-]: 1e-14 mm on 0.1 mm, below rounding.
 LENGTH_ROUNDING = 1e-13
-# The polynomial's slope is off by at most 14 times what its values are off by [share of the interval]: the
-# shape of their error, q^4 (1-q)^4, is steeper by 4 at most, and what it is multiplied with is smooth. Where
-# they are off by less than this, a step by its slope leaves less than `LENGTH_ROUNDING`.
+# The polynomial's slope is off by at most 14 times what its values are off by [share of the interval], the
+# shape of their error q^4 (1-q)^4; where they are off by less a step leaves less than `LENGTH_ROUNDING`.
 ONE_STEP = 8e-8
 S_ROUNDING = 2.0**-52  # of s itself [-], which is not an error of the polynomial
 COEFFICIENTS = 8  # of an interval's polynomial, with how far it is off
 POINTS_SHARED = SIZES.intervals_shared
 # Steps by the curve at most; halves alone take 43 for `LENGTH_ROUNDING`.
 REFINE_STEPS = 60
-# A step leaves about the cube of the miss, so that below this share of the interval no further check is
-# needed [-].
+# A step leaves about the cube of the miss: below this share of the interval no check is needed [-].
 CUBE_ROOT_ROUNDING = 4e-5
 
 

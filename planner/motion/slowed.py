@@ -4,8 +4,7 @@ With theta the time of the motion q as it was and tau the time in which it is ru
 
     dtau/dtheta = p(theta) = 1 + sum_i d_i phi(x_i),     phi(x) = (1 + x) e^-x,
 
-x_i the distance in theta from the place i, in units of its reach w_i, 0 inside. With r = dtheta/dtau = 1/p
-the motion has
+x_i the distance in theta from place i, in reaches w_i, 0 inside. With r = dtheta/dtau = 1/p it has
 
     velocity      q' r
     acceleration  q'' r^2 + q' r_1,                       r_1 = dr/dtau   = -p'/p^3
@@ -43,8 +42,7 @@ from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 
 FAR = 42.0  # reaches: (1 + FAR) e^-FAR is 2e-17
-# Newton's method for theta: its error gets less by the factor p(1)/p(2) - 1 a step at least, and is squared
-# near the end.
+# Newton's method for theta: its error is less by p(1)/p(2) - 1 a step at least, and squared near the end.
 STEPS, SETTLED = 60, 4e-16
 
 
@@ -77,8 +75,7 @@ class _Pace(NamedTuple):
 
 
 def without_stands(stands: FloatArray, times: FloatArray) -> tuple[FloatArray, Array]:
-    """Times of a motion with stands, in the time of the motion without them (n,) [s], and whether it stands
-    then (n,).
+    """Times of a motion with stands, in the time of that without (n,) [s], and whether it stands (n,).
 
     times  : (n,) [s]
     stands : (m, 2) when it rests, in the time without them, and for how much longer [s]; ascending
@@ -96,8 +93,7 @@ class Slowed:
 
     motion: MotionInTime  # as it was
     places: tuple[Place, ...]  # where it is slower
-    # (n, 2) when it rests [s], at the pace it has here without these rests, and for how much longer [s];
-    # ascending
+    # (n, 2) when it rests [s], at the pace here without these rests, and how much longer [s]; ascending
     stands: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def _pace(self, theta: FloatArray) -> _Pace:

@@ -1,5 +1,4 @@
-"""From a speed profile along the path to a time law, and from that to samples in time: the solution itself,
-integrated exactly.
+"""From a speed profile along the path to a time law, and to samples: the solution, integrated exactly.
 
 The time law s(t) is pieces of constant jerk, dwells included. Of a solution there is one piece per grid
 interval (of no jerk for second-order profiles, whose acceleration u along the path is constant there):
@@ -12,8 +11,7 @@ With feed, u and jerk, per axis, with r', r'', r''' at s(t):
     acceleration  r' u + r'' feed^2
     jerk          r' jerk + 3 r'' feed u + r''' feed^3            (inside a piece of the law; at its ends u may jump)
 
-Samples lie at k dt and, last, at the end of the program, so the last period is usually shorter. Dwells hold
-the position.
+Samples lie at k dt and at the end of the program; the last period is usually shorter.
 """
 
 from __future__ import annotations
@@ -124,8 +122,7 @@ def _dwells(samples: PathSamples) -> FloatArray:
 
 # Where a piece of the law is looked at [share of the piece].
 WATCHED = np.array([0.05, 0.5, 0.95])
-# Pieces shorter than this get no samples of their own [s]: the rounding of times puts them into their
-# neighbours, and what happens there moves nothing (2e5 mm/s3 for 1e-9 s are 1e-13 mm/s).
+# Shorter pieces get no samples [s]: rounding puts them into their neighbours, and nothing moves there.
 SHORTEST_PIECE = 1e-9
 # More samples than this are refused: a day at 1 ms, and with three axes 14 GB of files.
 SAMPLES_MAX = 1e8

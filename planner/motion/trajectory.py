@@ -18,8 +18,7 @@ COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "bl
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trajectory:
-    """T samples over A axes. The last sample is the programmed end; the period before it may be shorter than
-    dt.
+    """T samples over A axes, the last at the programmed end; the period before it may be shorter than dt.
 
     axes         : axis letters
     dt           : interpolation period [s]
@@ -33,8 +32,7 @@ class Trajectory:
     block        : (T,) index of the block of the program
     line         : (T,) NC line of that block
     radius       : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
-    extruder     : (T, 4) place [mm of filament], velocity, acceleration and jerk of the extruder; (0, 4)
-                   without one
+    extruder     : (T, 4) place, velocity, acceleration and jerk of the extruder [mm of filament]; or (0, 4)
     """
 
     axes: tuple[str, ...]

@@ -20,8 +20,7 @@ from planner.base.search import nearest
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.motion.trajectory import Trajectory
 
-# By how much the length run between two vertices may differ from the block's [tolerances]: 2 on either side,
-# and as much again for where the vertex before was found.
+# By how much the length run between two vertices may differ from the block's [tolerances].
 SLACK = 8.0
 # A motion rests where it is slower than this fraction of its fastest [-]: rounding.
 STANDING = 1e-9
@@ -32,8 +31,7 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
 
     motion : sampled so often that between samples it runs straight to within the tolerance
 
-    A motion that stands still as often as the path has full stops passes the joints between two of them
-    between its standstills.
+    A motion with as many standstills as full stops passes the joints between two of these between them.
     """
     stop = np.flatnonzero(toolpath.joint == Joint.STOP)
     begin, end = _standing(motion)
@@ -84,8 +82,7 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())
     rest = np.repeat(np.arange(len(begin)), count)
     near = rest[nearest(motion.t[still], times[toolpath.joint == Joint.STOP])]
-    # one rest for each stop, in their order: where a block is as short as the tolerance, the rest nearest in
-    # time may be the next one's
+    # one rest for each stop, in order: of a short block the rest nearest in time may be the next one's
     stop = np.arange(len(near))
     spare = len(begin) - len(near)
     at = np.minimum(np.maximum.accumulate(near - stop), spare) + stop if spare >= 0 else near

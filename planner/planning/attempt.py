@@ -16,8 +16,7 @@ class Tried:
     """The outcome of the attempts so far."""
 
     best: Plan | None = None  # the fastest plan; None before there is one
-    # the time-optimal motion on a path, and in time with its limits kept between grid points, not delivered
-    # yet; None before
+    # the time-optimal motion on a path, its limits kept between grid points, not delivered; None before
     path: tuple[OnPath, Motion] | None = None
     slower: Plan | None = None  # of a search whose motion passes only when it is run slower in places
     joint: bool = False  # whether the best is of the joint search

@@ -1,5 +1,4 @@
-"""The attempts of methods `optimal` and `second-order` at a motion, in the order in which they are made
-(planning/page.py).
+"""The attempts of methods `optimal` and `second-order` at a motion, in their order (planning/page.py).
 
 The joint search ends where it ends from any start nearby, so it begins on splines with a motion that need not
 be fit for delivery. Where it does not end it begins once more from one that is, which stays where it fails
@@ -33,8 +32,7 @@ if TYPE_CHECKING:
     from planner.planning.joint_search import Others
 
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not
-# searched [-]: on 30,000 lines of dense chords the search took half of the computing and found nothing; on a
-# random job of ten blocks it found 9e-4.
+# searched [-]: on 30,000 lines of dense chords that found nothing; on ten blocks it found 9e-4.
 LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 SAME_TIME = 1e-4  # less is the gap of the solvers [-]
 # Steps that a motion has on a leg at least (joint/guess.py).
@@ -146,8 +144,7 @@ class Retry(NamedTuple):
     steps : in the trace, as they begin
     when  : and what
     most  : at most so often
-    worth : how much longer plans are without it in whose trace it shows, on the mean and at worst [-], or
-            what it saves from failing
+    worth : how much longer plans are without it, on the mean and at worst [-], or what it saves from failing
     """
 
     steps: tuple[str, ...]

@@ -1,5 +1,4 @@
-"""The joint search of a job: from a motion along a smoothed path to path and feed found together (joint/),
-run by run.
+"""The joint search of a job, run by run: from a motion on a path to path and feed found together.
 
 A run is what lies between two full stops. Runs are searched side by side, long ones first, their windows in
 groups (joint/groups.py); what is found does not depend on that, nor on the number of threads. The motion
@@ -48,8 +47,7 @@ from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
 from planner.sensitivity.records import GridHistory
 
-# What a search in long steps takes, and those that go on from there in shorter and shorter ones, against each
-# other [-].
+# What a search in long steps takes, and those in shorter and shorter ones, against each other [-].
 SEARCHES = (1.0, 1.2, 2.3)
 # Share of the time without prices from which that is said, and from which there are none [-].
 UNPRICED, UNPRICED_MOST = 0.01, 0.5
@@ -104,13 +102,11 @@ def joint_plan(
     motion: Motion | None = None,
     start: Start | None = None,
 ) -> Joint:
-    """The plan of the joint search from a motion on a path; in long steps, as effort `quick` has it, where
-    shorter ones do not pass.
+    """The plan of the joint search from a motion on a path; in long steps where shorter do not pass.
 
     search : how finely, and up to which size
     others : what there is where the search does not end, or the verdict finds something
-    motion : that on the path where it keeps its limits between grid points too: it stays where the search
-             does not end; else None
+    motion : that on the path with its limits kept: it stays where the search does not end; else None
     start  : that of a search before, with what it found in long steps
     """
     stays = motion is not None

@@ -63,8 +63,7 @@ class Start(RunsInTime):
         along = dataclasses.replace(self.seen, **columns)
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
-        # Blocks so short that the motion is nearest to both of their ends at the same time share the time of
-        # their neighbours.
+        # Blocks whose ends the motion is nearest to at the same time share the time of their neighbours.
         apart = LEAST_APART * (end - begin) / len(run)
         seen = np.append(True, np.diff(t) > apart)
         seen[1:] &= t[1:] < end - apart

@@ -38,22 +38,18 @@ from planner.planning.job.trace import Log
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.result import prices_of
 
-# Runs on which the verdict finds something are planned each by itself where they are no more than this share
-# of all [-].
+# Runs on which the verdict finds something are planned by themselves where they are no more of all [-].
 ALONE_SHARE = 0.1
-# Of motions in closed form, whose accelerations bound what filters do to them, less of the
-# tolerance for the path may be faster (`Method.ways`).
+# Of motions in closed form less of the tolerance for the path may be faster (`Method.ways`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
 
 
 class Method(ABC):
     """A way to plan a job. Its repr is its row label in every table.
 
-    ways    : for machines with filters: pairs (share of the tolerance, share of the filters' lengths that
-              closed forms use), see `Job.with_share`; they are tried beside (1, 1), and the fastest plan is
-              taken
-    measures_filters : whether filters make its motions slower only where they are measured to leave the
-                       tolerance
+    ways    : for machines with filters: pairs (share of the tolerance, of filters' lengths in closed forms,
+              `Job.with_share`), tried beside (1, 1); the fastest plan is taken
+    measures_filters : whether filters slow it down only where it is measured to leave the tolerance
     keeps_tangential : whether its motions keep the machine's limits of the tangential acceleration and jerk
     """
 
@@ -144,8 +140,7 @@ def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:
 def within_tolerance(job: Job, method: Method) -> Plan:
     """The plan of a job, of which the chords between samples keep the tolerance too (delivery/periods.py).
 
-    A motion that takes longer than `job.most` is not planned again: with less tolerance it would hardly be
-    faster.
+    A motion that takes longer than `job.most` is not planned again.
     """
     made = method.plan_job(job)
     if made.verdict is None or (made.verdict.passed and (inside(made) or not method.keeps_tolerance)):

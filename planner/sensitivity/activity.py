@@ -15,8 +15,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.sensitivity.records import GridHistory
 
-# An interval is held by a limit that it comes this close to [share of the limit]. Time-optimal motions with
-# jerk limits are that close to some limit for nearly all of their time.
+# An interval is held by a limit that it comes this close to [share of the limit].
 HELD = 1e-2
 NONE, REST = "none", "rest"
 

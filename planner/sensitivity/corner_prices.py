@@ -28,8 +28,7 @@ from planner.feedrate.solution import FeedrateSolution
 from planner.machine import Machine
 from planner.sensitivity.prices import DEAREST, STEP
 
-# Joints on either side of a corner whose sizes it can change: neighbours share legs, one more in each round
-# (corners/sharing.py).
+# Joints on either side of a corner whose sizes it can change (corners/sharing.py).
 REACH = 12
 
 
@@ -72,8 +71,7 @@ class RoundedPath:
         return self.change(self.machine, step) / step
 
     def alone(self, together: FloatArray) -> FloatArray:
-        """(M+1,) dT/d(tolerance) at each joint of the toolpath alone [s/mm], 0 at those that are not among
-        the dearest.
+        """(M+1,) dT/d(tolerance) at each joint alone [s/mm], 0 but at the dearest.
 
         together : (R+1,) what `by_tolerance` gives
 

@@ -1,5 +1,4 @@
-"""The active limits where geometry and feed were found together: step by step, from the search's steps
-(joint/shares.py).
+"""The active limits where path and feed were found together, by the search's steps (joint/shares.py).
 
 A limit, or the tolerance, is active in a step that comes within `HELD` of it; several count in full each.
 Shown is the one that has the largest price there. Where the motion of the start stays, it is what held that.

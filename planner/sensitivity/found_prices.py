@@ -31,8 +31,7 @@ from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, more_of, price
 from planner.sensitivity.records import PlacePrices, PriceList
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
-# By how much a plan made again is faster or slower for no other reason [share of the time]
-# (benchmarks/solvers/found_prices.py).
+# By how much a plan made again differs for no other reason [share] (benchmarks/solvers/found_prices.py).
 UNREST = 2e-4
 SLOWEST = 1e-6  # instead of standstill, in ratios [mm/s]
 TIED = 1e-2  # what a limit has to cost of a step's time to hold it [-]; of those that do not it is some 1e-5
@@ -42,8 +41,7 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + 5 + M) of joint/price.py, and the same without feed and velocities where
-                           these hold together
+    step, alone          : (N, 3 A + 5 + M) of joint/price.py, without feed and velocities held together
     room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
     """
 
@@ -182,10 +180,8 @@ def _budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices]) -> lis
 class _OfTolerance:
     """dT/d(tolerance) [s/mm].
 
-    together : (M+1,) at the joints, where it is raised at all of them; what steps pay goes to the nearer end
-               of their leg
-    alone    : (M+1,) of a joint alone, with the segments beside it whose budget, the larger of their joints',
-               grows; 0 of full stops
+    together : (M+1,) at the joints, raised at all; what steps pay goes to the nearer end of their leg
+    alone    : (M+1,) of a joint alone, with the segments beside it whose budget grows; 0 of full stops
     """
 
     def __init__(self, toolpath: Toolpath, machine: Machine, runs: list[RunPrices]):

@@ -1,5 +1,4 @@
-"""The prices of the limits: by how much the cycle time of a time-optimal plan changes with each of them, and
-which corners are dear.
+"""The prices of the limits: how the cycle time changes with each of them, and which corners are dear.
 
 The solver's multipliers price what is directly in the feedrate problem: axis limits and programmed feed
 (feedrate/lagrangian.py). The tolerance works through the path: more of it makes corners larger. So do
@@ -41,8 +40,7 @@ from planner.sensitivity.records import PriceList
 
 # By how much a plan on splines, made again, is faster or slower for no other reason [share of the time].
 UNREST = 1e-3
-# How much less than foretold more of a limit may save on rounded corners [-]: soon another limit holds there, and
-# the path does not adapt (benchmarks/solvers/prices.py).
+# How much less than foretold more of a limit may save on rounded corners [-] (benchmarks/solvers/prices.py).
 LESS = 0.5
 CHORDS = 0.2  # what chords between samples may use of the tolerance before what is saved is a hint [-]
 

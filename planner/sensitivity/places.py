@@ -8,8 +8,7 @@ For a finite change, straight lines in one over the limit are taken, as for the 
     feed    -2 sum mu_i (1 - sqrt(X_i / X'_i))             X, X' the bounds of feed^2 without and with more of the programmed feed
     limits  (sum lam g + 2 sum mu_i) (1 - 1/(1 + more))     all bounds at once: of feed, velocity, acceleration and jerk
 
-with multipliers lam of the rows g and mu of the bounds. A neighbour that cannot follow makes the true saving
-smaller.
+with multipliers lam of the rows g and mu of the bounds; neighbours that cannot follow save less.
 """
 
 import dataclasses
@@ -60,8 +59,7 @@ def by_place(
 def bounds_with(
     samples: PathSamples, machine: Machine, name: str, share: float, rest: FloatArray | None = None
 ) -> FloatArray:
-    """(P,) bounds of feed^2 with a share more of the programmed feed or of an axis velocity, by its `name`
-    [mm2/s2].
+    """(P,) bounds of feed^2 with a share more of the feed or of an axis velocity, by `name` [mm2/s2].
 
     rest : the bounds by all other limits, from `bounds_but_speeds`, if they are known
     """

@@ -33,13 +33,11 @@ from planner.sensitivity.records import SAVED_MIN, DearCorners, PlacePrices, Pri
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and of the tolerance [mm]
-# Relative steps of differences [-]: far above rounding, far below what bends a curve, and so small that no leg
-# between rounded corners is opened or closed by it.
+# Relative steps of differences [-]: far above rounding, and so small that no leg is opened or closed.
 STEP = 1e-6
 DEAREST = 10  # corners that are listed
 TOLERANCE = "tolerance"
-# T goes with limit^-n where a limit holds all of the motion, n [-]: lengths alone with speed, with
-# acceleration, with jerk.
+# T goes with limit^-n where a limit holds all of it, n [-]: lengths with speed, acceleration, jerk.
 POWER = {
     **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
     **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0, DRIVE_POWER.name: 1.0 / 3.0},

@@ -15,16 +15,14 @@ PRICES_SHOWN = 4  # of a price list, in a line
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GridHistory:
-    """The profile at the grid points of the solver, and the limits that are active at each of them
-    (sensitivity/activity.py).
+    """The profile at the solver's grid points, and the limits that are active there (activity.py).
 
     t, s, feed   : (P,) time [s], arc length [mm], feed [mm/s]
     active       : (P,) index in `active_names` of the limit that is shown for the interval to the right of
                    each point: of those that are active there the one with the largest price, or the closest
     reached      : (P, K) which of the K of `active_names` are active there
     active_names : names of limits, then "none" and "rest"
-    share        : (K,) fraction of the cycle time in which each is active [-]; those that are active together
-                   count in full each
+    share        : (K,) fraction of the cycle time in which each is active [-]; together they count in full
     """
 
     t: FloatArray
@@ -74,8 +72,7 @@ class PlacePrices:
 
     feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
     limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
-    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves time; None where it is
-                not known
+    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves; None if unknown
     """
 
     feed: FloatArray
@@ -91,16 +88,14 @@ class PlacePrices:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PriceList:
-    """The prices of limits and tolerance: derivatives of the cycle time T, negative where more of a limit
-    saves time.
+    """The prices of limits and tolerance: derivatives of the cycle time T, negative where more saves.
 
     limits    : dT/d(axis limit) by name, "velocity.x" ... "jerk.z" [s per mm/s, mm/s2, mm/s3]; of limits of
                 one's own dT/d(least bound on the path), in their own units, with the bound elsewhere in
                 proportion
     feed      : dT/d(ln feed override) [s]
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
-    saved     : time saved by `MORE_LIMIT` more of each axis limit and of the "feed", and by `MORE_TOLERANCE`
-                more "tolerance" [s]
+    saved     : time saved by `MORE_LIMIT` more of limits and feed, `MORE_TOLERANCE` more "tolerance" [s]
     ranges    : least and most time that a new plan may save [s]
     hints     : names whose saving is told by its range only; `saved` is its middle, and a hint only
     corners   : the corners with the largest savings; None where they are not known

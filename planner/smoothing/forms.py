@@ -6,8 +6,7 @@ from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.sites import control_first, run_knots
 
-# Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, which are of degree
-# 4.
+# Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, degree 4.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 

@@ -35,8 +35,7 @@ from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
 from planner.smoothing.corridor import Corridor, part_of, run_corridor
 from planner.smoothing.sites import Sites, Splines, sites_of_run, used_share
 
-# Control points on the path leave a corner by sin(theta/2) sqrt(h^2/2) sqrt(2/pi) = 0.28 theta h, so by 0.56
-# of the tolerance.
+# Control points on the path leave a corner by 0.28 theta h, so by 0.56 of the tolerance.
 FITTING = 2.0
 # Neighbouring spans then differ by a third at most.
 GROWTH = 0.3
@@ -65,8 +64,7 @@ def spacing(place, turn, tol, longest):
     h = np.empty(m)
     begin = 0
     total = 0.0
-    # windows that end at turn k: shrink from the left until they fit; every turn inside takes the window's
-    # length
+    # windows that end at turn k shrink from the left until they fit; turns inside take their length
     for k in range(m):
         h[k] = min(longest, FITTING * tol[k] / max(turn[k], TURN_MIN))
     for k in range(m):

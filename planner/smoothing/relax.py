@@ -41,12 +41,10 @@ from planner.smoothing.windows import (
 )
 
 ITERATIONS = 60  # of the interior-point method per window; 10 to 20 are the rule
-# An energy below this share of the first one [-] is none: on a straight way inside the corridor it falls to
-# rounding, which would then decide what the spline is.
+# An energy below this share of the first one [-] is none: on a straight way it falls to rounding.
 STRAIGHT = 1e-4
 USED = 0.9995  # of the tolerance that sites may use at first [-]: the relaxation starts strictly inside of it
-# Of tightening, in windows around the sites that need it; 2 are the rule. A run that needs more gets no
-# spline.
+# Of tightening, in windows around the sites that need it. A run that needs more gets no spline.
 ROUNDS = 20
 SPANS_SHARED = SIZES.relaxed_shared
 
@@ -66,8 +64,7 @@ class Relaxed(NamedTuple):
 
     certified: Array  # (Q,)
     control: FloatArray  # (n, A)
-    # (S,) what the certificate leaves of the tolerance, of the last try: negative where it fails [mm]; inf of
-    # runs that did not fit
+    # (S,) what the certificate leaves of the tolerance: negative where it fails [mm]; inf of others
     left: FloatArray
 
 

@@ -22,8 +22,7 @@ from planner.smoothing.windows import REACH
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
-# Gap of the first shape, share of its integral of squared third derivatives [-]: that is only a guess of what
-# the motion wants.
+# Gap of the first shape, share of its integral of squared third derivatives [-]: only a guess.
 RELATIVE_GAP = 0.1
 
 
@@ -31,13 +30,11 @@ RELATIVE_GAP = 0.1
 class SplineShape:
     """The splines of a path with what is needed to change their shape within the tolerance."""
 
-    # runs, corridor and splines: what the splines replace, the corridor along which they are laid, and the
-    # splines
+    # what the splines replace, the corridor along which they are laid, and the splines
     runs: SplineRuns
     corridor: Corridor
     splines: Splines
-    # (S,) what the certificate leaves of the part of the tolerance that a shape may use [mm]; negative where
-    # a run has none
+    # (S,) what the certificate leaves of the tolerance a shape may use [mm]; negative without one
     left: FloatArray
     reserve: float  # the part of the tolerance that it leaves to chord and filter errors [mm]
 

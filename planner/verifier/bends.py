@@ -20,13 +20,11 @@ from planner.verifier.kernel import kernel
 
 CENTER, E1, E2, DRIFT = range(4)  # in `frame` of `ProgramPieces`
 RADIUS, RATE = range(2)  # in `turn`
-# Of the largest angle of a piece that pieces of curves turn by on the mean [-]: their parameter turns them
-# unevenly.
+# Of the largest angle of a piece that pieces of curves turn by on the mean [-]: they turn unevenly.
 CURVE_TURN = 0.7
 PLACES = 64  # on a curve, at which its turning is looked at
 STARTS = 5  # places on a piece of which the nearest is where Newton's method starts
-# Nearly all random pieces settle within these steps; another place is on the path, too, only not the nearest
-# one.
+# Nearly all random pieces settle within these steps; another place is on the path too.
 NEWTON_STEPS = 8
 SETTLED = 1e-13  # a step of Newton's method below this fraction of the piece is none [-]
 
@@ -57,8 +55,7 @@ def curve_points(points: FloatArray, weight: FloatArray, u: FloatArray) -> tuple
 
 
 def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
-    """(K,) into how many pieces of even steps each curve is cut, so that they turn by `CURVE_TURN` of `angle`
-    on the mean.
+    """(K,) into how many pieces of even steps each curve is cut, to turn by `CURVE_TURN` of `angle` each.
 
     points, weight : (K, 4, A), (K, 2) of the curves as of `curve_points`
     angle          : [rad]
@@ -98,9 +95,8 @@ def nearest_on_bend(pieces: Any, i: int, q: FloatArray) -> float:
     x = _at_polar_angle(pieces, i, q) if pieces.piece[i]["arc"] >= 0 else _nearest_start(pieces, i, q)
     for _ in range(NEWTON_STEPS):
         _, g, slope = _apart(pieces, i, q, x)
-        if (
-            slope <= 0.0
-        ):  # q is beyond the centre of curvature: one of the ends is nearest, which x already is
+        # q is beyond the centre of curvature: one of the ends is nearest, which x already is
+        if slope <= 0.0:
             break
         better = min(max(x - g / slope, x0), x1)
         moved = abs(better - x)

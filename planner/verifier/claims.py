@@ -42,8 +42,7 @@ class Claims:
     """How each figure of a verdict is known.
 
     known   : by the name of a limit, `CONTOUR` or `VERTEX`
-    open_mm : by how much the errors of contour and vertices may be larger than what was seen [mm]; None if that is not
-              known
+    open_mm : by how much the errors of contour and vertices may be larger than was seen [mm]; None if unknown
     between : what is assumed between the rows of a file; "" for the motion of a plan
     """
 

@@ -1,5 +1,4 @@
-"""The record of eq. 18-20 at the programmed corners: what the motion does there, beside what the papers let
-it do.
+"""The record of eq. 18-20 at the programmed corners: the motion beside what the papers let it do.
 
 Checked is eq. 18, the corner's tolerance with the chord error in it. The speed is compared. Eq. 19 with the
 motion's own curvature follows from the limits of the axes' acceleration (error_allocation.py): it is not
@@ -15,22 +14,18 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 
 # A corner passed at less than this fraction of what eq. 20 and the programmed feed allow counts as a stop
-# [-]: samples 1 ms apart show a motion that rests on a corner as up to 0.025 mm/s at 2e5 mm/s3, where eq. 20
-# allows 10 to 30 mm/s.
+# [-]: samples show a motion that rests there as 0.025 mm/s, where eq. 20 allows 10 to 30 mm/s.
 STANDS = 0.01
-# Where the path turns by more [rad] the paper's own corner is next to a cusp, with a speed of 0.044 sqrt(1.5 X
-# eps) and less: eq. (20) says nothing there, and a motion that turns back passes at next to no speed without
-# a rest.
+# Where the path turns by more [rad] the paper's corner is next to a cusp, 0.044 sqrt(1.5 X eps) and slower:
+# eq. (20) says nothing there, and a motion that turns back passes slowly without a rest.
 CUSP = np.deg2rad(175.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CornerCheck:
-    """One row per programmed corner in the program's order: a joint that turns and at which the program does
-    not stop.
+    """One row per programmed corner, in order: a joint that turns and at which the program does not stop.
 
-    All of a row but line, position, theta, budget and feed_paper is NaN where the motion could not be looked
-    at.
+    All but line, position, theta, budget and feed_paper is NaN where the motion was not looked at.
 
     line             : (C,) source line of the block that ends there
     position         : (C, A) the programmed vertex [mm]
@@ -38,19 +33,14 @@ class CornerCheck:
     budget           : (C,) eps [mm]
     time             : (C,) when the motion is nearest to the vertex [s]
     feed_planned     : (C,) its speed there [mm/s]
-    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf where it
-                       runs straight or stands
-    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner: polynomial Bezier pair between long
-                       straight legs [mm/s]
+    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf if straight
+    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner between long straight legs [mm/s]
     feed_programmed  : (C,) the smaller one of the two blocks [mm/s]
     speed_ratio      : (C,) largest feed_planned / feed_closed_form of all readings of the motion [-]
-    miss             : (C,) distance of the vertex from the motion [mm]; from the chords of its samples where
-                       there is nothing else
+    miss             : (C,) distance of the vertex from the motion [mm]; of samples alone from their chords
     chord_error      : (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
-    budget_ratio     : (C,) the largest of miss + chord_error and the distance from the delivered chords, over
-                       eps [-]
-    delivered_speed, delivered_budget : (C,) both ratios as the samples and the chords between them show them,
-                                        alone [-]
+    budget_ratio     : (C,) the larger of miss + chord_error and the delivered chords' distance, over eps [-]
+    delivered_speed, delivered_budget : (C,) both ratios by the samples and their chords alone [-]
     judged           : False if the limit behind eq. (19) is reported only
     """
 

@@ -1,5 +1,4 @@
-"""The papers' check at every programmed corner, whatever made the motion: eq. (18)-(20) of paper 002 on the
-motion's own curvature.
+"""The papers' check at every programmed corner: eq. (18)-(20) of paper 002 on the motion's curvature.
 
 At the motion's point nearest to the vertex, in the program's order (matching.py knows when), let v be the
 speed, t = v/|v|, a_n the part of the acceleration a across t, n = a_n/|a_n|, kappa = |a_n| / v^2 the motion's
@@ -95,8 +94,7 @@ def check_corners(
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    readings : of the samples and, where there is a motion, of the motion between them; they know when each
-               vertex is passed
+    readings : of the samples and, where there is one, of the motion between them; with the times of vertices
     motion : what the samples were taken from; None to look at the samples alone
     limits : what accelerations that were derived from positions can be off by
     judged : False if the limit of acceleration is reported only
@@ -210,8 +208,7 @@ def _overdrawn(check: CornerCheck, k: int) -> str:
 def _nearest_sample(
     trajectory: Trajectory, near_time: FloatArray, vertex: FloatArray, machine: Machine, limits: Limits
 ) -> tuple[_Reading, FloatArray]:
-    """The nearer of the two samples around each vertex' nearest chord, which ends at near_time; and the
-    period between them [s].
+    """The nearer sample at each vertex' nearest chord, which ends at near_time; the period there [s].
 
     Accelerations derived from the positions are means of the motion's, which keep its limits. What the
     positions' rounding r makes of them over the period h, at most 4 r / h^2, is taken off.

@@ -117,11 +117,9 @@ def _exact_pieces(toolpath: Toolpath, pieces: ProgramPieces) -> Array:
 
 
 def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces:
-    """The pieces with the budgets of the module's text on those that are `exact` (N,), and at the vertices at
-    their ends.
+    """The pieces with the budgets of the module's text on `exact` (N,) ones, and at their end vertices.
 
-    bow : largest distance of a motion from its chord over a period [mm]; inf or NaN where the acceleration is
-          not judged
+    bow : largest distance of a motion from its chord [mm]; inf or NaN where acceleration is not judged
     """
     piece, joint = pieces.piece.copy(), pieces.joint.copy()
     piece["budget"][exact] = PLACE_ROUNDING

@@ -1,5 +1,4 @@
-"""The faults of a motion (`Fault`), and where and when it exceeds what it is judged by (`Excess`): data for
-who made it."""
+"""The faults of a motion (`Fault`), and where and when it exceeds something (`Excess`): data."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
@@ -79,8 +78,7 @@ def placed(axes: tuple[str, ...], position: FloatArray) -> str:
 # What an error of the chords between samples alone can break.
 OF_CHORDS = frozenset({Kind.CONTOUR, Kind.VERTEX, Kind.CORNER_BUDGET})
 
-# The quantities of limits.py by `Spans.column`, and the power of how much slower a motion is by which each
-# gets less.
+# The quantities of limits.py by `Spans.column`, and by which power of a slower pace each gets less.
 NAMES = ("velocity", "acceleration", "jerk", "feed", "normal_acceleration", "power")
 POWERS = (1, 2, 3, 1, 2, 3)
 APART = 3  # samples: those that are not further apart are of one span

@@ -1,5 +1,4 @@
-"""The extruder of a 3-D printer, from its delivered places E(t): its limits, and whether it is where the
-program wants it.
+"""The extruder of a 3-D printer, from its delivered places E(t): its limits, and where it should be.
 
 velocity      |dE|/h over each period, which no motion within the limit exceeds.
 

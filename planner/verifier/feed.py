@@ -1,7 +1,6 @@
 """Feed: never above the F word of the block on which the motion is (switches.py).
 
-Every chord of length c over a period h is cut at these places, and its parts c_i, each on a block with the
-feed F_i, take at least
+Every chord c over a period h is cut at these places; its parts c_i, of feed F_i, take at least
 
     sum c_i / F_i  <=  h,        the ratio of the check is  sum c_i / (F_i h).
 

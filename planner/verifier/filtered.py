@@ -1,5 +1,4 @@
-"""The delivered setpoints behind the machine's own filters: `[fir]`, moving averages in the drive or the
-control behind them.
+"""The delivered setpoints behind the machine's own filters, `[fir]`: moving averages in the drive.
 
 Between the setpoints the machine moves as its file says (`Signal`). A moving average of length T makes of
 that signal x(t) the mean of the last T seconds,
@@ -26,8 +25,7 @@ verdict of a plan and that on its file have the same numbers here.
 
 What the machine does between two setpoints, as the judge sees it: the signal that its filters get.
 
-With the setpoints p0 and p1 at the ends of a period of length h, their velocities v0 and v1, and the share w
-of the period,
+With setpoints p0 and p1 at the ends of a period h, velocities v0 and v1, and its share w,
 
     linear   p0 + w (p1 - p0)
     cubic    p0 + w (b + w ((3 c - 2 b - d) + w (b + d - 2 c))),   b = h v0, d = h v1, c = p1 - p0:  the cubic of both ends
@@ -56,8 +54,7 @@ from planner.verifier.verdict import AfterFilters
 
 NOTE = "after the filters"
 STEPS_PER_PERIOD, STEPS_PER_FILTER = 4, 8  # of the times at which filters are evaluated (module text)
-# In the shortest filter, where setpoints jump: the mean has a kink for each then, which chords between times
-# cut off.
+# In the shortest filter, where setpoints jump: the mean then has kinks, which chords cut off.
 STEPS_OF_HELD = 32
 CHUNK = SIZES.filtered_at_once
 
@@ -65,8 +62,7 @@ CHUNK = SIZES.filtered_at_once
 def filtered(
     trajectory: Trajectory, interpolation: str, filters: tuple[float, ...], dt: float
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Times (T,) and positions (T, A) of setpoints behind moving averages, chunk by chunk, from their start
-    until they are empty.
+    """Times (T,), positions (T, A) of setpoints behind moving averages, in chunks, until they are empty.
 
     interpolation : between the setpoints, as in the machine file
     filters       : their lengths [s], one or more
@@ -148,9 +144,8 @@ def after_filters(
     )
 
 
-# By how much the way between setpoints may leave a motion whose acceleration steps from nothing to a within a
-# period h, over a h^2: a chord by 1/8, and the cubic of both ends by 1/32 (less where the acceleration
-# changes steadily).
+# By how much the way between setpoints may leave a motion whose acceleration steps by a within a period h,
+# over a h^2: chords, and cubics of both ends (less where the acceleration changes steadily).
 CHORD_BOW, CUBIC_BOW = 1.0 / 8.0, 1.0 / 32.0
 
 

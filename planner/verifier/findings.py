@@ -15,9 +15,8 @@ from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import BACK, DIFFERENCE, Limits, Worst
 
-# A stop between two samples shows as speed and distance just at what the acceleration allows. Hours into a
-# motion times are good to 1e-12 s only, and 1.00004 of it was seen at 16,000 s; a motion that does not stop
-# exceeds it by far more.
+# A stop between two samples shows as speed and distance just at what the acceleration allows, and hours into
+# a motion times are good to 1e-12 s only; a motion that does not stop exceeds it by far more.
 STOP_ROUNDING = 1e-3
 
 
@@ -129,8 +128,7 @@ def largest_chord_error(readings: list[Observed]) -> float:
 def end_error(
     readings: list[Observed], toolpath: Toolpath, rounding: FloatArray
 ) -> tuple[float, list[Fault]]:
-    """Distance of the first and last sample from where the program starts and ends [mm], and what is wrong
-    with it.
+    """Distance of the first and last sample from where the program starts and ends [mm], and the faults.
 
     rounding : (A,) largest error of a position by its digits [mm]
     """

@@ -1,5 +1,4 @@
-"""The state of knowledge about the numbers of a trajectory: which of them were delivered, and to how many
-digits."""
+"""The state of knowledge about a trajectory: which numbers were delivered, and to how many digits."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -22,8 +21,7 @@ class Given:
 
     columns           : derivatives that were delivered; the others were derived from the positions by whoever
                         read them, and only the positions are judged for them
-    position_rounding : (A,) largest error of a position by the digits it is written with [mm, rad], or () for
-                        none
+    position_rounding : (A,) largest error of a position by its digits [mm, rad], or () for none
     time_rounding     : the same of every time [s]
     end_rounding      : the same of the last time alone [s]: the others may lie on a grid, and be known by it
     extruder_rounding : largest error of the extruder's place by its digits [mm of filament]
@@ -50,8 +48,7 @@ WHOLE = Given()
 def fit_axes(
     trajectory: Trajectory, given: Given, toolpath: Toolpath
 ) -> tuple[Trajectory, Given, tuple[str, ...]]:
-    """The trajectory and what is given of it, with the program's axes in its order, and what was done, in
-    sentences.
+    """The trajectory and what is given of it, with the program's axes in its order; and what was done.
 
     An axis of the program that it does not move may be missing: it stands where the program has it. An axis
     that the program does not have may be there if it stands still, and is left out.

@@ -1,5 +1,4 @@
-"""Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry along the
-program.
+"""Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry.
 
     joints   the limits of x, y, z as those of limits.py: on the delivered columns, and on divided differences of the positions
     tip      brought back by the chain of kinematics.py, positions alone, and judged like any motion: rotary limits, feed, contour,
@@ -42,8 +41,7 @@ from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verifier.verdict import LimitCheck, Verdict
 from planner.verifier.worst import BACK, SampleBlock, Worst
 
-# Limits that the tip's own coordinates get, which are not judged: so many times the largest of the joints
-# [-].
+# Limits of the tip's own coordinates, which are not judged: so many times the largest of the joints [-].
 NOT_JUDGED = 100.0
 
 
@@ -73,8 +71,7 @@ def verify_joints(
         machine, setpoints, machine.kinematics.tool_length if tool_length is None else tool_length
     )
     given = Given() if given is None else given
-    # of machines with a limit of the normal acceleration that limit is not one of the tip: it moves with the
-    # workpiece
+    # a limit of the normal acceleration is not one of the tip, with whose workpiece it moves
     tip = verify(
         carried.motion(setpoints),
         toolpath,

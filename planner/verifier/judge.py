@@ -43,8 +43,7 @@ def verify(
     toolpath    : the programmed path (lines, arcs, helices) with feeds, tolerances and stops
     motion      : what the samples were taken from, to be judged between them too, at times chosen here
                   (reading.py); None to judge the samples alone
-    seed        : of those times; a motion that was changed because of a verdict needs a verdict with another
-                  seed
+    seed        : of those times; another one if the motion was changed because of a verdict
     given       : which columns of the trajectory were delivered, and with how many digits
     not_limited : quantities of `NOT_LIMITED_NAMES` that are reported and not judged
     progress    : called now and then with the fraction done (0 to 1)

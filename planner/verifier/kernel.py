@@ -7,8 +7,7 @@ from planner.base.kernels import njit
 
 
 def kernel(inline: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The compiler's settings for all kernels of the verifier. They work on arrays that their caller owns and
-    allocate nothing.
+    """The settings for all kernels of the verifier, which work on their caller's arrays, allocating nothing.
 
     Counting references to those arrays at every call was four fifths of the running time, hence `_nrt=False`;
     so was passing them on the stack, hence `inline` for the innermost functions, which the interpreter then

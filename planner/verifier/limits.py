@@ -2,8 +2,7 @@
 
 Twice per axis: on the delivered columns, and on divided differences of the delivered positions (worst.py).
 
-The columns must belong to the positions. With |acceleration| <= A over a period h, and |jerk| <= J where jerk
-is limited,
+The columns must belong to the positions. With |acceleration| <= A over a period h, |jerk| <= J (or inf),
 
     |dx/h - (v0 + v1)/2| <= min(A h / 4, J h^2 / 12),      |dv/h - (a0 + a1)/2| <= J h / 4
 

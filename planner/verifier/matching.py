@@ -20,8 +20,7 @@ than eps, reversals and thousands of pieces within eps are told apart by order a
 The error reported for a sample is its distance from the nearest of the pieces that it can belong to; the
 error of a vertex is its distance from the chords run while the piece before it was possible.
 
-Where nothing within eps is possible any more, the matching goes on as follows, so that a fault is measured,
-not only found:
+Where nothing within eps is possible any more, it goes on as follows, so that a fault is measured:
   1. a vertex passed at up to twice its budget is taken as passed (a corner cut too deep; the motion itself is
   near the path); 2. the budget is widened, up to twice, to the least that lets the motion go on (a contour
   error); 3. the first piece ahead within eps is taken, what lies between is lost (a block left out); 4. the

@@ -16,9 +16,7 @@ from planner.machine import ROTARY_AXES
 from planner.verifier.bends import apart_on_bend, arc_points, curve_counts, curve_points, reach_bend
 from planner.verifier.kernel import kernel
 
-PIECE_ANGLE = (
-    np.pi / 8
-)  # largest turning of an arc piece [rad]: one of its points is passed every 22.5 degrees
+PIECE_ANGLE = np.pi / 8  # largest turning of an arc piece [rad]: a point is passed every 22.5 degrees
 # Relative allowance on every limit: values computed in float64, files written with 7 digits.
 RATIO_ROUNDING = 1e-6
 # [mm] allowance on distances: rounding of coordinates up to 1e3 mm after 1e6 mm of path is 1e-10.
@@ -49,8 +47,7 @@ class ProgramPieces(NamedTuple):
     costs at every call.
 
     vertex : (N+1, A) [mm]
-    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real, if it is a joint of the
-             program
+    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real: of the program
     piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone;
              x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a
              line, -2 - row of a curve; segment
@@ -219,8 +216,7 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
 def both_apart(
     pieces: ProgramPieces, piece: Array, position: FloatArray, axes: tuple[str, ...]
 ) -> FloatArray:
-    """(2,) largest distance of the linear axes, and of the rotary ones, from the path [mm]; zeros without
-    axes of both kinds.
+    """(2,) largest distance of linear, and of rotary axes from the path [mm]; zeros without both kinds.
 
     The contour error is one of all axes in one norm, angles at a radius. Its vector, from the nearest point
     of the path to the motion, has a part in the linear axes, the error of the tip where the kinematics carry

@@ -50,8 +50,7 @@ class Reader:
     dt, cells  : the machine's period [s], and into how many cells it is divided (`motion_between`)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
-    between    : into how many parts the machine's way from sample to sample is divided, and whether it is a
-                 cubic
+    between    : into how many parts the machine's way between samples is divided; whether it is a cubic
     """
 
     def __init__(
@@ -102,9 +101,8 @@ class Reader:
         samples: Iterator[Trajectory],
         progress: Callable[[float], None],
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes. Three tasks side by side: the next part of the
-        motion is evaluated, the one before is read, and the samples beside it. What is seen does not depend
-        on the threads."""
+        """Read the motion, and the samples as far as it goes, side by side: its next part is evaluated, the
+        one before is read, and the samples beside it. What is seen does not depend on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
         between = Watch(
@@ -148,8 +146,7 @@ class Reader:
 class Comparison:
     """Looks at the asked motion beside the delivered samples; `end` is where it ends [s].
 
-    Between two of its times h apart the motion is within a h^2 / 8 of the chord, where the delivered sample
-    must be.
+    Between two of its times h apart the motion is within a h^2 / 8 of the chord, where samples must be.
     """
 
     def __init__(self, axes: tuple[str, ...], end: float):
@@ -234,9 +231,8 @@ class AnyMotion(Protocol):
 def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:
     """How many cells a period dt [s] needs for a tolerance [mm] at an acceleration [mm/s2] of all axes."""
     gap = float(np.sqrt(8.0 * BOW * tolerance / acceleration))
-    return int(
-        min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD)
-    )  # neighbouring times are up to two cells apart
+    # neighbouring times are up to two cells apart
+    return int(min(max(PER_PERIOD, np.ceil(2.0 * dt / gap)), MOST_PER_PERIOD))
 
 
 def motion_between(

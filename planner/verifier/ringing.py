@@ -1,7 +1,6 @@
 """How much the machine's vibration modes ring: during the motion, and when it is over.
 
-Each axis carries an oscillator that is shaken by the setpoints p(t), at rest before. Its deflection y, its
-position less p, obeys
+Each axis carries an oscillator shaken by the setpoints p(t). Its deflection y, its place less p, obeys
 
     y'' + 2 z w y' + w^2 y = -p''(t),        w = 2 pi frequency,  z = damping ratio, 0 <= z < 1.
 
@@ -33,9 +32,7 @@ from planner.verifier.pieces import kernel
 
 STEP = 0.2  # [rad] of the mode's phase between two looks: a peak is missed by less than 1 - cos(0.1) = 0.5 %
 MOST_STEPS = 1000  # in a period; 10 us of computing for an axis
-DEFLECTION, SLOPE, MOST = range(
-    3
-)  # of an axis in a mode: where it is, how fast, and the largest deflection so far
+DEFLECTION, SLOPE, MOST = range(3)  # of an axis in a mode: place, speed, the largest deflection so far
 STATE = 3  # numbers of a state
 
 

@@ -10,8 +10,7 @@ to
 
 and is judged only if what was seen and the bow together are within the tolerance.
 
-Digits. Positions good to r and times good to d (at the speed v) make the n-th difference at the period h good
-to
+Digits. Positions good to r and times good to d (at the speed v) make n-th differences good to
 
     2^n (r + v d) / h^n,
 
@@ -23,8 +22,7 @@ a h^2 / 2, and j h^3 / 6 where jerk is limited; its velocity is zero there, and 
 acceleration too. A file whose last samples are missing shows that here, although its end may be as near to
 the program's as the tolerance asks.
 
-Seconds. No program takes 200 times as long as at its programmed feed, but for a column in milliseconds or
-less.
+Seconds. No program takes 200 times as long as at its feed, but for times in milliseconds or less.
 """
 
 import numpy as np
@@ -43,13 +41,11 @@ from planner.verifier.stops import STILL
 from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
-# A time column in another unit [-]: the motion takes so many times as long as at the programmed feed, at
-# samples so many of the machine's periods apart. Acceleration makes it 1 to 50 times as long, milliseconds at
-# least 1000 times.
+# A time column in another unit [-]: so many times as long as at the programmed feed, samples so many periods
+# apart. Acceleration makes a motion 1 to 50 times as long, milliseconds at least 1000 times.
 TOO_SLOW, TOO_SPARSE = 200.0, 10.0
 TIME_UNITS = ((1e5, 1e6, "microseconds"), (TOO_SLOW, 1e3, "milliseconds"))
-# A clock that jitters has periods up to so many times the longest one that is right [-]; a sample that is
-# missing makes one of two.
+# Periods of a jittering clock are up to so many times the longest right one [-]; a missing sample makes 2.
 JITTER = 1.5
 # The rounding of differences is mentioned if it is more than this share of a limit [-].
 WORTH_A_WORD = 1e-3
@@ -73,13 +69,11 @@ def check_unit_of_time(trajectory: Trajectory, toolpath: Toolpath, machine: Mach
 
 
 class Delivered:
-    """A summary of the delivered samples, chunk by chunk: periods that are not dt, both ends, and the way run
-    [mm].
+    """A summary of the delivered samples: periods that are not dt, both ends, and the way run [mm].
 
     longest : periods up to `JITTER` times it are right [s], of a motion that is known by its samples alone
               and judged at their own times; None where every period has to be dt
-    ends : t, position, velocity and acceleration of the first two samples and the last two, of fewer than
-           four all
+    ends : t, position, velocity and acceleration of the first and last two samples, of fewer than four all
     """
 
     def __init__(self, dt: float, given: Given, longest: float | None = None):
@@ -135,12 +129,10 @@ class Delivered:
 def density(
     trajectory: Trajectory, machine: Machine, limits: Limits, budget: float, seen: float | None
 ) -> tuple[list[Fault], list[str]]:
-    """Faults and notes about what is not known between samples that are further apart than the machine's
-    period.
+    """Faults and notes about samples that are further apart than the machine's period.
 
     budget : smallest tolerance of the program [mm]
-    seen   : largest distance of samples and chords from the path, and of vertices from them [mm]; None if it
-             is not known
+    seen   : largest distance of samples, chords and vertices from each other [mm]; None if it is not known
     """
     h = float(np.diff(trajectory.t).max(initial=0.0))
     if h <= machine.dt * (1.0 + RATIO_ROUNDING) + PERIOD_ROUNDING:

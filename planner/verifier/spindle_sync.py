@@ -1,5 +1,4 @@
-"""Moves in step with the spindle: threads. Between run-in and run-out the tool must be where the turns of the
-spindle want it.
+"""Moves in step with the spindle: threads. Between run-in and run-out the turns say where the tool is.
 
 From rest to the feed F, with the limits a and j of the axes along a straight move, no motion needs more than
 
@@ -10,8 +9,7 @@ with one c for the move, to the contour tolerance eps: at every sample there
 
     | s - F t - c |  <=  eps,      c the mean of the largest and the smallest s - F t.
 
-A speed of (1 - 1e-3) F is a fault on a thread longer than 2000 eps. A move shorter than 2 d (1 + `MORE`) is
-not judged.
+A speed of (1 - 1e-3) F is a fault on threads longer than 2000 eps; shorter moves are not judged.
 """
 
 import numpy as np

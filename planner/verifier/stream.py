@@ -69,8 +69,7 @@ class Observed:
 
 
 class Watch:
-    """The findings on a motion, chunk by chunk in order. Samples not later than those already read (overlap)
-    are left out.
+    """The findings on a motion, chunk by chunk in order; samples already read (overlap) are left out.
 
     parts : into how many a period is divided to be matched
     cubic : between samples the motion runs on cubics, not on chords

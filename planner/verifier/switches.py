@@ -55,17 +55,12 @@ CHORD = np.dtype(
         ("error", "f8"),
     ]
 )
-# In `state`: the first vertex that is not settled; first and behind the last of the chords that are kept;
-# marks used.
+# In `state`: the first vertex not settled; first and behind the last of the chords kept; marks used.
 OPEN, HEAD, TAIL, USED = range(4)
-SURE, TRAVELLED, JUDGED = range(
-    3
-)  # in `along`: to where the open vertex is not passed for sure, length run, judged to [mm]
-# Price of a full stop passed where the motion does not rest [budgets]: more than that of all vertices around
-# it.
+SURE, TRAVELLED, JUDGED = range(3)  # in `along`: the open vertex is not passed, length run, judged to [mm]
+# Price of a full stop passed where the motion does not rest [budgets]: more than of all vertices around.
 RUN_THROUGH = 1e3
-# How much more firmly the place of a full stop is held than that of other vertices that are passed together
-# with it [-].
+# How much more firmly the place of a full stop is held than others passed together with it [-].
 FIRM = 1e9
 AROUND = 8.0  # way between the nearest places of motion and chords, of their distance from the vertex (module text) [-]
 ROOM = 4096  # chords and marks there is room for at first
@@ -82,8 +77,7 @@ class Bounds(NamedTuple):
 class Chords(NamedTuple):
     """Samples whose feed is still to be judged, the first one as the beginning of a chord.
 
-    t, place, error : (n,) [s]; length of the chords from the start [mm]; largest error of the position by
-                      rounding and digits [mm]
+    t, place, error : (n,) [s]; length of chords from the start [mm]; largest rounding error [mm]
     speed           : (n,) as delivered [mm/s], NaN where it was not
     piece, position : (n,), (n, A) where each is, to be told
     """
@@ -235,9 +229,8 @@ def _look(
             switch[i]["cost"] = cost
         kept.mark[state[USED] + i - first] = better
         before = switch[i]["cost"]
-    if (
-        last == first and kept.mark[state[USED]]
-    ):  # nearer than ever, and no other vertex: what was before does not matter
+    # nearer than ever, and no other vertex: what was before does not matter
+    if last == first and kept.mark[state[USED]]:
         at = state[HEAD] = 0
         kept.mark[0], state[USED], along[SURE] = True, 0, chord[0]
     row = kept.chord[at]

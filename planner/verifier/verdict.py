@@ -22,8 +22,7 @@ class LimitCheck:
     position : (A,) [mm]
     line     : NC line of the block there
     limited  : False if the quantity is reported only ("not limited by this method")
-    note     : how the value was obtained: "column", "differences of position", and "between the samples" for
-               the dense motion
+    note     : "column", "differences of position", with "between the samples" for the dense motion
     """
 
     name: str
@@ -64,8 +63,7 @@ class ThreadCheck:
 
     line: int  # NC line
     feed: float  # at which the move is to be cut [mm/s]
-    # the largest distance from there, between run-in and run-out [mm]; 0 where there are no samples between
-    # them
+    # the largest distance from there, between run-in and run-out [mm]; 0 without samples there
     error_mm: float
     allowed_mm: float  # the contour tolerance [mm]
 
@@ -105,8 +103,7 @@ class Verdict:
     """The findings of `verify`.
 
     passed           : True if every check holds, apart from quantities that are "not limited"
-    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, the normal acceleration
-                       (if the machine limits it)
+    limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, normal acceleration
     claims           : how each figure is known (claims.py)
     contour          : the largest distance of the motion from the path, as far as it could be followed,
                        against the tolerance there
@@ -120,22 +117,16 @@ class Verdict:
                        as for contour_error_mm
     angle_error_deg  : its rotary part [deg]; the tool's direction is off by no more
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
-    lost_after       : NC line of the last block along which the motion could be followed; None if it follows
-                       the whole program
-    end_error_mm     : distance of the first sample from the start of the program, or of the last from its
-                       end, the larger one [mm]
-    chord_error_mm   : largest bound |normal acceleration| dt^2 / 8 of the bow over one period [mm]; contained
-                       in the contour error
+    lost_after       : NC line of the last block along which the motion could be followed; None if all
+    end_error_mm     : distance of the first or the last sample from the program's ends, the larger [mm]
+    chord_error_mm   : largest |normal acceleration| dt^2 / 8 over a period [mm]; part of the contour error
     order            : True if the blocks are passed in the order of the program, and none is left out
     lost             : indices of blocks that the motion never visits
     lost_lines       : their NC lines
-    threads          : moves in step with the spindle, in the order of the program, each with how far it is
-                       out of step
+    threads          : moves in step with the spindle, in order, each with how far it is out of step
     faults           : each failure: what, by how much, when, where, NC line; `str` of one is its sentence
-    excesses         : spans of time in which limits or the tolerance are exceeded, as far as their times are
-                       known
-    after_filters    : errors of the motion behind the filters of the machine; None for a machine without
-                       filters
+    excesses         : spans of time in which limits or the tolerance are exceeded, as far as known
+    after_filters    : errors of the motion behind the machine's filters; None without filters
     ringing          : what each vibration mode of the machine does; reported, not judged
     notes            : what could not be judged exactly, and why
     """

@@ -101,8 +101,7 @@ def position_error(block: SampleBlock, limits: Limits) -> FloatArray:
 def differences(
     t: FloatArray, values: FloatArray, error: FloatArray, turn: float | None = None
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """n! times the n-th divided differences for n = 1, 2, 3, and their error, each at the last of its samples
-    and 0 before.
+    """n! times the n-th divided differences, n = 1, 2, 3, and their error, at the last of its samples.
 
     values : (n, K) at the times t (n,) [s]; error: (n, K) of them
     turn   : what values may jump by because they start again; None if they do not

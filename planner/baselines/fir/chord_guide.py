@@ -21,12 +21,10 @@ from planner.corners.elements import ElementIntervals, element_point, to_arc_len
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
-# Deviation of the chords from the path [fraction of the tolerance]: costs half of it in feed. And their
-# turning from one to the next [rad]: they are as long as their arcs then to 0.1^2/24 = 4e-4.
+# Deviation of chords from the path [fraction of the tolerance], their turning to the next one [rad].
 SAGITTA, TURN = 0.01, 0.1
-# Times for which a lower feed may have to hold on beside its block, in which chords are cut there [s]: from 2
-# ms to 0.35 s, as filters come, each 1.6 times the one before, by which a chord may be slow for longer than
-# it should.
+# Times for which a lower feed may have to hold on beside its block, where chords are cut [s]: 2 ms to 0.35 s,
+# as filters come.
 CUTS = 2e-3 * 1.6 ** np.arange(12)
 STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 
@@ -38,14 +36,11 @@ class ChordGuide(Guide):
     feed: FloatArray = per_leg(finite=False)
     programmed: FloatArray = per_leg(finite=False)  # (R,) programmed feed, inf for rapids [mm/s]
     kappa: FloatArray = per_leg()  # (R,) largest curvature of the path at the chord [1/mm]
-    # (R,) speed that the axes' accelerations allow on a circle of that curvature [mm/s] (par. 13); inf if
-    # straight
+    # (R,) speed that the axes' accelerations allow on a circle of it [mm/s] (par. 13); inf if straight
     v_acc: FloatArray = per_leg(finite=False)
     v_jerk: FloatArray = per_leg(finite=False)  # (R,) the same for their jerks (par. 17)
     tol: FloatArray = per_leg()  # (R,) what filters and interpolation may use of the tolerance [mm]
-    corner: Array = per_leg(
-        np.int64
-    )  # (R,) joint whose rounded corner the chord belongs to, ascending, or -1
+    corner: Array = per_leg(np.int64)  # (R,) joint whose corner the chord belongs to, ascending, or -1
     sin_half: FloatArray = per_leg()  # (R,) sine of half the turning angle there [-]
     whole: FloatArray = per_leg()  # (R,) tolerance, with what the rounding uses of it [mm]
     segment: Array = per_leg(np.int64)  # (R,) segment of the toolpath
@@ -81,8 +76,7 @@ def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
 
 
 def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """Speeds (R,) [mm/s] up to which the chords keep the programmed feeds behind filters T1, T2 (S,) [s] of
-    the runs.
+    """Speeds (R,) [mm/s] at which chords keep the programmed feeds behind filters T1, T2 (S,) [s] of runs.
 
     Where the filtered motion is at s, the command has been within V Td/2 of it if it ran there at V at most;
     so a feed V that is lower than those beside it has to hold on V Td/2 before and behind.

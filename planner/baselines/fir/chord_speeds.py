@@ -14,8 +14,7 @@ Should that not come to an end, everything gets slower with the filters at twice
 that are given, all speeds are lowered instead of making the filters longer. Both end: slower motions have
 smaller errors, accelerations and jerks.
 
-Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2: paper 001's, and what to
-begin with.
+Feed limits on a path of curvature kappa = 1/rho behind two moving averages T1, T2, paper 001's:
 
     v_acc  = sqrt(a rho)                          normal acceleration                                        (par. 13)
     v_jerk = (j rho^2)^(1/3)                      jerk of a point on a circle                                (par. 17)
@@ -55,19 +54,15 @@ from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
 PATIENCE = 40
-# Chords that are commanded within this fraction of Td of the one to blame get slower with it [-]: fewer take
-# more rounds.
+# Chords commanded within this fraction of Td of the one to blame get slower with it [-].
 AROUND = 0.1
-# T1, and the product T1 T2, get longer at most by these factors, beyond which no command exceeds the limits
-# [-].
+# T1, and T1 T2, get longer at most by these factors, beyond which no command exceeds the limits [-].
 MARGINS_MAX = np.array([2.0, 4.0])
-# So many largest speeds are tried, from the feed down to this fraction of it [-], or to what legs of the mean
-# length reach from rest to rest.
+# So many largest speeds are tried, down to this fraction of the feed, or what legs reach from rest to rest.
 SPEEDS, LOWEST = 18, 0.17
 # Steps in which a speed is lowered until the mean of the path allows it, and what one may leave of it [-].
 MEAN_STEPS, MEAN_STEP_MIN = 12, 0.3
-# A mean's speed is good enough when it exceeds nothing by more than this [-]: the motion is measured
-# afterwards.
+# A mean's speed is good enough when it exceeds nothing by more [-]: the motion is measured afterwards.
 MEAN_OVER = 0.02
 
 
@@ -124,8 +119,7 @@ class ChordSpeeds(SpeedPlan):
 
 
 def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], FloatArray]:
-    """`SPEEDS` plans with lower and lower largest speeds, not yet slowed down, and the times (n, S) [s] that
-    they promise the S runs.
+    """`SPEEDS` plans with lower and lower largest speeds, and the times (n, S) [s] they promise S runs.
 
     guide : its dwells are not looked at
     """
@@ -171,8 +165,7 @@ def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray)
 
 
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm], to second order (par. 24); inf where
-    the path is straight.
+    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm] (par. 24); inf if straight.
 
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
@@ -181,8 +174,7 @@ def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) ->
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filtered point lags by the angle phi [rad] (par. 26); inf where the path
-    is straight.
+    """(n,) speed [mm/s] at which the filtered point lags by phi [rad] (par. 26); inf if straight.
 
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
@@ -226,8 +218,7 @@ def first_speeds(
 ) -> FloatArray:
     """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
 
-    What either the curvature beside a chord or the mean of the path allows, and corners for as long as the
-    gap takes.
+    What the curvature beside a chord or the mean of the path allows, and corners for their gap.
 
     most         : (R,) largest speeds [mm/s]
     acceleration : (A,) limits of the axes [mm/s2]
@@ -259,9 +250,8 @@ def _v_mean(
     v, open_ = most.copy(), np.arange(len(at))
     for _ in range(MEAN_STEPS):
         k = open_
-        reach = np.minimum(
-            v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k])
-        )  # the path ends at a run's ends
+        # the path ends at a run's ends
+        reach = np.minimum(v[k] * x[k], np.minimum(here[k] - begin[k], end[k] - here[k]))
         D = guide_point(guide, here[k] - reach) + guide_point(guide, here[k] + reach) - 2.0 * middle[k]
         by_error = w[k] * np.linalg.norm(D, axis=1) / guide.tol[at[k]]
         over = np.maximum(by_error, (np.abs(D) / acceleration).max(axis=1) / x[k] ** 2)

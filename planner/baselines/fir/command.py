@@ -23,8 +23,7 @@ class VelocityPulses(NamedTuple):
 
 
 class Command(NamedTuple):
-    """N steps of constant velocity over A axes, in S runs: first[k] .. first[k+1] - 1, the last of them a
-    standstill.
+    """N steps of constant velocity over A axes, in S runs from first[k] on, each ending in a standstill.
 
     Column A of velocity and position is the length along the guide and its rate: filtered like the axes it
     tells where on the guide the motion belongs.

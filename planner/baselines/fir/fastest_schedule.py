@@ -23,19 +23,16 @@ from planner.corners.fir import overlap_time
 from planner.machine import Machine
 from planner.motion.filters import damped_period, lengths_from_limits, suppressing
 
-# Margins that are tried, each with speeds from the fastest leg's down to what the shortest leg is best run at from
-# rest to rest, the powers of a ratio [-]: with larger limits there are others, and these stay. The most promising
-# speeds of each margin are made into motions.
+# Margins that are tried, each with speeds that are powers of a ratio [-], from the fastest leg's down to what
+# is best for the shortest from rest to rest; the most promising ones are made into motions.
 MARGINS = (1.0, 1.2, 1.4, 1.6, 2.0)
 RATIO, SETTLED = 1.1, 3
 BESIDE = RATIO ** np.array([0.0, -0.5, 0.5])
-# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-]. At last
-# they are tried at all corners, as a corner may be so slow that a stop is faster.
+# Full stops are tried where the command waits for this fraction of the filters' delay or longer [-].
 STOPS = (1.0, 0.0)
 WAIT_ROUNDING = 1e-9  # of that fraction
-# In a corner the acceleration changes by 2 s V/T1 at most, and the chord over a period dt leaves the motion
-# by dt^2/8 of it. T1 is at least so long that this is the given fraction of the tolerance [-]: what is left
-# is for the filters.
+# The chord over a period dt leaves a corner, whose acceleration changes by 2 s V/T1, by dt^2/8 of that: T1 is
+# so long that this is at most the given fraction of the tolerance [-].
 CHORD_FRACTION = 0.5
 # Two filters suppress two modes, those of the lowest frequencies.
 MODES = 2

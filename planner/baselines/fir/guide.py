@@ -24,8 +24,7 @@ from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Fraction of the tolerance that the chords of arcs may use [-]. The filters' error on an arc grows with
-# feed^2, so that this costs half of it in feed.
+# Fraction of the tolerance that chords of arcs may use [-]: the filters' error grows with feed^2.
 CHORD_FRACTION = 0.05
 
 
@@ -84,8 +83,7 @@ def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
 
 
 def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
-    """All columns of a record, by name, with some rows taken from another; the joint at the end of a run
-    belongs to the next one.
+    """All columns of a record by name, some rows of another; the joint at a run's end is the next run's.
 
     rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
     chosen : a record of these rows alone
@@ -119,8 +117,7 @@ def check_profile_filters(times: tuple[float, float] | None) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guide(ABC):
-    """R legs over A axes, R+1 joints, S runs; joints first[k] .. first[k+1] belong to run k, its ends are
-    full stops.
+    """R legs over A axes, R+1 joints, S runs; run k: joints first[k] .. first[k+1], ends are full stops.
 
     The legs of a guide are straight: legs of the program, or chords of a smooth path.
     """
@@ -202,9 +199,7 @@ class LegGuide(Guide):
 
     lines: Toolpath  # the toolpath with its arcs as chords
     joint_at: Array = per_joint(np.int64)  # (R+1,) index of each joint among those of `lines`
-    slower: Array = per_leg(
-        np.bool_
-    )  # (R,) True where the program asks for less than on another leg of the run
+    slower: Array = per_leg(np.bool_)  # (R,) True where another leg of the run is programmed faster
     a_max: FloatArray = per_leg()  # (R,) acceleration along the leg that the axes allow [mm/s2]
     j_max: FloatArray = per_leg()  # (R,) jerk along the leg that the axes allow [mm/s3]
     tol: FloatArray = per_joint()  # (R+1,) contour error budget at the joint [mm]

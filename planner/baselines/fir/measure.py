@@ -27,8 +27,7 @@ from planner.baselines.fir.superpose import Filtered
 from planner.corners.budget import chord_rate, largest_normal
 from planner.machine import LINEAR_AXES, Machine
 
-# Normal acceleration, which is not linear on a piece, is looked at this many times on either half of it, and
-# may use this fraction of its limit [-]: the rest is for what it rises to between two looks.
+# Normal acceleration is looked at so often on half a piece, and may use this fraction of its limit [-].
 NORMAL_STEPS, NORMAL_SPARE = 16, 0.98
 # Bisections for the time at which the motion passes a joint: to 1e-9 of the piece.
 BISECTIONS = 30

@@ -29,8 +29,7 @@ Where the command waits (paper 000, eq. 10-15, as corrected in docs/papers.md A.
 
     p - P = -R(Tk - tau) w1 + R(tau) w2,     0 <= tau <= Tk.
 
-For V1 = V2 = V the vertex P is missed by (s = sin(theta/2), theta the turning angle: with the interior angle
-it would be cos)
+For V1 = V2 = V the vertex P is missed by (s = sin(theta/2), theta the turning angle)
 
     eps = 2 V s R(Tk/2) = Tk^3 V s / (24 T1 T2)                         Tk <= 2 T2                     (eq. 14)
                           (4 T2^2 - 6 T2 Tk + 3 Tk^2) V s / (12 T1)     beyond
@@ -82,8 +81,7 @@ def corner_error(
 def overlap_within(
     tol: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray, dt: float
 ) -> FloatArray:
-    """(n,) overlap Tk [s] whose corner error, together with the chord error of samples at dt [s], stays
-    within `tol` (n,) [mm].
+    """(n,) overlap Tk [s] whose corner error and chord error at dt [s] are within `tol` (n,) [mm].
 
     At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of
     it. What is left for the corner is reckoned with the overlap that the whole tolerance would allow, the
@@ -99,8 +97,7 @@ def overlap_within(
 def overlap_beside(
     overlap: FloatArray, neighbour: FloatArray, duration: FloatArray, delay: FloatArray
 ) -> FloatArray:
-    """(n,) the overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td [s]; both ends get the same unless one
-    needs less.
+    """(n,) the overlap shortened until Tk_i + Tk_{i+1} <= Tv + Td [s], both ends alike if they need it.
 
     overlap, neighbour : (n,) Tk at this end of the leg and at the other [s]
     duration, delay    : (n,) Tv of the leg and Td of the filters [s]
@@ -142,8 +139,7 @@ def overlap_within_limits(
 
 # More joints than this to one side of a flow joint are taken together.
 FLOW_JOINTS = 24
-# Steps in which the speed of a flow joint is lowered, and what one may leave of it [-]: the error falls with
-# the square of the speed at least, so that few are needed.
+# Steps in which the speed of a flow joint is lowered, and what one may leave of it [-].
 FLOW_STEPS = 40
 FLOW_STEP_MIN = 0.3
 

@@ -1,5 +1,4 @@
-"""Paper 000's command: a speed on every leg, a wait or a largest speed at every joint; and how it gets
-slower.
+"""Paper 000's command: a speed on every leg, a wait or largest speed at joints; how it gets slower.
 
 What is exceeded at time t comes from what was commanded within [t - Td, t]: legs that are short there get
 slower, joints that flow are passed more slowly, joints that wait wait longer. Everything falls with that: the
@@ -22,13 +21,11 @@ from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
 
-# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td at their own
-# speed [-]: others would make many pulses of fine paths.
+# Legs are cut where a speed limit ends on them only if they take longer than this fraction of Td [-].
 CUT_LEGS = 0.25
 # After so many rounds what still exceeds something stops at every joint.
 ROUNDS = 40
-# Each round slows down by so much more than the round before at least [-], for what hardly falls with the
-# speed.
+# Each round slows down by so much more at least [-], for what hardly falls with the speed.
 HASTE = 0.02
 
 
@@ -38,14 +35,11 @@ class Schedule(SpeedPlan):
 
     guide: LegGuide
     speed: FloatArray = per_leg()  # (R,) largest speed on each leg [mm/s]
-    passing: FloatArray = per_joint(
-        finite=False
-    )  # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
+    # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
+    passing: FloatArray = per_joint(finite=False)
     # (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
     overlap: FloatArray = per_joint()
-    holding: Array = per_leg(
-        np.bool_
-    )  # (R,) True for legs whose feed has to hold on V Td/2 beyond their ends too
+    holding: Array = per_leg(np.bool_)  # (R,) True for legs whose feed holds on V Td/2 beyond their ends
 
     def at_joints(self) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the run that each joint lies in (the last joint: of the last one)."""

@@ -1,11 +1,9 @@
-"""From first speeds to a motion that keeps tolerance and limits: filter, measure, slow down where something
-is exceeded, repeat.
+"""From first speeds to a motion that keeps tolerance and limits: filter, measure, slow down, repeat.
 
 How a plan gets slower is the paper's affair (`SpeedPlan.slower`); it must come to an end. Runs between full
 stops do not know of each other: each is done as soon as its motion exceeds nothing.
 
-Several plans, each with the time that it promises, are settled in the order of what they promise, for each
-run by itself.
+Plans with the times that they promise are settled in that order, for each run by itself.
 """
 
 from __future__ import annotations
@@ -25,13 +23,11 @@ from planner.baselines.fir.measure import Measured, measure
 from planner.baselines.fir.superpose import Filtered, superpose
 from planner.machine import Machine
 
-# More rounds than any plan takes until it is done: from their 40th on both papers' plans keep to what must
-# end.
+# More rounds than any plan takes: from their 40th on both papers' plans keep to what must end.
 ROUNDS = 120
 # What rounding may add to a ratio [-]; the verifier allows twice as much.
 RATIO_ROUNDING = 5e-7
-# One round slows down by the root of what is exceeded, since most of it falls with the square of the speed,
-# and a little more, but not to less than half [-].
+# A round slows down by the root of what is exceeded and a little more, but not to less than half [-].
 BEYOND, SLOWEST = 0.995, 0.5
 # A plan is settled if it promises to save this fraction of the time [-].
 WORTH = 2e-3
@@ -123,8 +119,7 @@ def slow_down(plan: P, machine: Machine) -> P:
 
 
 def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> P:
-    """The fastest of a few plans of one guide once they are slowed down, each run with what is most promising
-    for it.
+    """The fastest of a few plans of a guide once slowed down, each run with its most promising one.
 
     times : (K, S) what the K plans promise [s]; slowed down they take longer
     """

@@ -22,11 +22,9 @@ from planner.baselines.fir.command import Command
 from planner.geometry.toolpath import Toolpath
 from planner.motion.axis_motion import AxisMotion
 
-# Pieces shorter than this are left out, the jerk is that of the piece behind [s]: the order of edges that
-# close is rounding.
+# Shorter pieces are left out, the jerk is that behind [s]: the order of edges that close is rounding.
 SHORTEST_PIECE = 1e-12
-# Pieces from one superposition to the next, at least; or twice the edges that it sums, so that its cost stays
-# linear [-].
+# Pieces from one superposition to the next, at least; or twice the edges that it sums [-].
 ANCHOR_EVERY = 32
 
 
@@ -35,8 +33,7 @@ class Filtered(NamedTuple):
 
     t: FloatArray  # (L,) start of each piece [s]
     ends: FloatArray  # (L,) end of each piece [s]
-    # (4, L, A+1) position [mm], velocity [mm/s] and acceleration [mm/s2] there, and the jerk on the piece
-    # [mm/s3]
+    # (4, L, A+1) position [mm], velocity [mm/s], acceleration [mm/s2] there, and jerk [mm/s3]
     state: FloatArray
     first: Array  # (S+1,) first piece of each run
 

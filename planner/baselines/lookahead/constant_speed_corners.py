@@ -1,8 +1,7 @@
 """Corners at constant speed (paper 002): how fast each may be, and a smooth path as the chain of legs and
 corners for the look-ahead.
 
-At the constant speed v an axis has the velocity r'_k v, the acceleration r''_k v^2 and the jerk r'''_k v^3,
-so that over a corner
+At the constant speed v an axis has r'_k v, r''_k v^2 and r'''_k v^3, so that over a corner
 
     v <= v_k / max |r'_k|,   v <= (a_k / max |r''_k|)^(1/2),   v <= (j_k / max |r'''_k|)^(1/3)         for every axis k,
 
@@ -26,8 +25,7 @@ from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
 STEPS = 4  # in which a grid interval is sampled: peaks are then good to the fourth order (module text)
-# Limits along blocks that differ by less than this fraction are the same [-]: coordinates rounded to 1e-9 of
-# a block's length.
+# Limits along blocks that differ by less are the same [-]: coordinates are rounded.
 SAME = 1e-9
 
 
@@ -54,8 +52,7 @@ def constant_speeds(samples: PathSamples, machine: Machine) -> FloatArray:
 class CornerChain(NamedTuple):
     """A smooth path as n legs with joints: corners at constant speed, full stops, changes of limits."""
 
-    # (n,) records `LEG`: what is free between two joints, each with what the corners beside it took of their
-    # legs
+    # (n,) records `LEG`: what is free between two joints, and what the corners took of their legs
     legs: np.recarray
     passage: np.recarray  # (n+1,) records `WAY`
     joint: Array  # (n+1,) the path's joint if it is a corner, -1 otherwise

@@ -43,9 +43,8 @@ from planner.geometry.chords import arc_point
 from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Toolpath
 
-# A piece on an arc turns by at most so much [rad]: the spline then misses the arc by (5/384) 0.01^4 = 1e-10
-# of the radius; and by less where that is more than ARC_MISS [mm], a tenth of the least digit that programs
-# carry.
+# A piece on an arc turns by at most so much [rad]: the spline misses it by (5/384) 0.01^4 = 1e-10 of the
+# radius; by less where that is more than ARC_MISS [mm], a tenth of a program's least digit.
 ARC_PIECE, ARC_MISS = 0.01, 1e-7
 # Each of the seven phases on an arc has at least so many pieces, and so many more that the spline's
 # acceleration is good to this fraction of the limit, kappa v^2 for the largest speed v: its error is h^2/12
@@ -56,8 +55,7 @@ ARC_PIECES_MIN, ARC_ACCURACY = 16, 1e-4
 SHORTEST = 1e-16
 # Shortest piece on an arc [s]: the rounding of a radius of 10 mm, over its third power, is 1 mm/s3 of jerk.
 ARC_SHORTEST = 2e-5
-# Shortest time in which the acceleration on an arc comes to its limit, in pieces that short: over a step of
-# the acceleration a spline with long pieces leaves the arc, by a h^2/48 or so.
+# Shortest time in which acceleration on an arc comes to its limit, in such pieces: a step leaves the arc.
 ARC_RAMP = 5 * ARC_SHORTEST
 BISECTIONS = 50  # of a piece's duration, for where it passes the end of a block
 

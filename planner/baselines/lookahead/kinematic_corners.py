@@ -1,5 +1,4 @@
-"""The candidates of the look-ahead: for every corner of a path of straight legs the ways to take it, each at
-its largest speed.
+"""The candidates of the look-ahead: the ways to take every corner, each at its largest speed.
 
 A corner may use what the interpolation leaves of the tolerance. Between samples dt apart the motion bows from
 its chords by up to rate X, rate = dt^2/8 (plus sum T^2/24 where filters follow), with the largest
@@ -27,12 +26,10 @@ from planner.geometry.legs import Legs
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Machine
 
-# Arcs that are run whole get this fraction of their limits [-]: their cubic pieces exceed the arc's
-# accelerations by up to 2e-4 (corner_pieces.ARC_PIECE).
+# Arcs run whole get this fraction of their limits [-]: cubic pieces exceed them a little (ARC_PIECE).
 ARC_LIMITS = 1.0 - 3e-4
 
-# Speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared: not 0, by which is
-# divided; below any real one.
+# Speed^2 per length [mm/s2] that a corner counts with at least when a leg is shared: no division by 0.
 EASE_MIN = 1e-12
 
 
@@ -48,14 +45,12 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> np.recarray:
 def corner_passages(
     path: Legs, toolpath: Toolpath, legs: np.recarray, machine: Machine, start_stop: float
 ) -> list[np.recarray]:
-    """Zero entry acceleration, entry deceleration and perhaps a step of velocity at the vertex, (n+1,)
-    records `WAY` each.
+    """Zero entry acceleration, entry deceleration, perhaps a step of velocity, (n+1,) records `WAY` each.
 
     Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints
     without a corner are passed straight on by every candidate.
 
-    start_stop : step of velocity that the drives make from standstill [mm/s]; 0 for none, then there are two
-                 candidates
+    start_stop : step of velocity from standstill [mm/s]; 0 for none, then there are two candidates
     """
     at = path.first
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)

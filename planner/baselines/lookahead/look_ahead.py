@@ -1,5 +1,4 @@
-"""Look-ahead over legs and the corners between them: at which speed every corner is taken, or whether it is a
-stop.
+"""Look-ahead over legs and the corners between them: the speed of every corner, or a stop.
 
 A leg is what has the same limits along the path between two joints; at a joint there is a corner, or the
 limits change. Corners are candidates of a kind (ramps.JointKind); passed with the speed V a corner of that
@@ -45,17 +44,14 @@ from planner.baselines.lookahead.ramps import (
 # The choice may lack this fraction of a leg's length [-]: rounding of sums of lengths.
 LENGTH_ROUNDING = 1e-14
 BISECTIONS = 60  # of a speed's bracket: to its last digit
-# A speed in closed form is lowered by this until it is feasible with its rounding [-]: two units of its last
-# digit.
+# A speed in closed form is lowered by this until it is feasible [-]: two units of its last digit.
 SPEED_ROUNDING = 4e-16
 
 
 def look_ahead(legs: np.recarray, candidates: Sequence[np.recarray]) -> tuple[np.recarray, FloatArray]:
-    """The fastest choice of a candidate or a stop at every joint, and (n+1,) when the motion is past each
-    joint's corner [s].
+    """The fastest choice at every joint, and (n+1,) when the motion is past each joint's corner [s].
 
-    Joints that every candidate passes (`JointKind.PASS`) are no corners: they are passed as fast as the
-    corners beside them allow.
+    Joints that every candidate passes (`JointKind.PASS`) are no corners: others tell their speed.
 
     legs       : (n,) records `LEG`
     candidates : (n+1,) records `WAY` each; may overlap nowhere on a leg at their speeds (see `capped`)

@@ -23,8 +23,7 @@ from planner.base.point_to_point import PHASES
 from planner.corners.kinematic import entry_acceleration, phase_times
 
 ROUNDING = 1e-15  # of a leg's length [-]
-# What is left of a leg between two ramps is run at constant speed if it is at most this fraction of the leg
-# [-]: faster still would save less than this fraction of the leg's time, for four pieces of microseconds.
+# What is left of a leg between two ramps is run at constant speed if it is at most this fraction of it [-].
 SMALL_REST = 1e-6
 NEWTON_STEPS = 100  # safeguarded by bisection: never reached, as a bisection to the last digit takes 60
 
@@ -46,8 +45,7 @@ STOP, PASS, ZERO, ENTRY, CONSTANT = (int(kind) for kind in JointKind)  # numba r
 # A leg: length from joint to joint, with what corners take of it, > 0 [mm]; largest speed, acceleration and
 # jerk along it; of one that is run as an arc from rest to rest the turning [rad/mm], 0 on others.
 LEG = np.dtype([(name, np.float64) for name in ("length", "v", "a", "j", "turning")])
-# A way to pass a joint: its `JointKind`, the speed [mm/s], 0 at stops, of candidates the largest; and the
-# parameters of the kind.
+# A way to pass a joint: its `JointKind`, the speed [mm/s], 0 at stops, and parameters of the kind.
 WAY = np.dtype([("kind", np.int64), *((name, np.float64) for name in ("V", "p", "q", "r"))])
 
 

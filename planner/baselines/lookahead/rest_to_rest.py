@@ -1,5 +1,4 @@
-"""Blocks from rest to rest, the point-to-point reference of the papers: limits along a block from those of
-the axes, and the moves.
+"""Blocks from rest to rest, the papers' reference: limits along a block, and the moves.
 
 Lines and arcs are the closed form of base/point_to_point.py. The segments of a spline have limits of their
 own, so a spline is a chain of legs between two full stops, passed from one to the next at the speed that both
@@ -27,8 +26,7 @@ AT_REST = 1e-12  # an axis with a smaller component of a unit vector does not li
 
 
 def block_limits(toolpath: Toolpath, machine: Machine) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment such that every axis keeps its own,
-    wherever on the segment.
+    """Limits v, a, j (M,) [mm/s], [mm/s2], [mm/s3] along each segment so that every axis keeps its own.
 
     On a line the tightest axis decides: min_k limit_k / |u_k|. On an arc the direction turns, so the smallest
     limit of the axes that move, each over the largest component that a unit vector has there (`_components`),
@@ -118,8 +116,7 @@ def parts_of(toolpath: Toolpath, join_lines: bool = False) -> Parts:
     """The parts of a path of M segments. A move is a block, or a part of a spline between kinks and jumps of
     its curvature, at which a motion cannot go on without a jump of its acceleration.
 
-    join_lines : lines that go straight on are one move, so that it does not matter where a straight line is
-                 cut into blocks
+    join_lines : lines that go straight on are one move, wherever a line is cut into blocks
     """
     first = np.arange(len(toolpath) + 1)
     curve, on = toolpath.curve >= 0, np.zeros(len(first), bool)

@@ -16,22 +16,18 @@ from planner.feedrate.constraints.user_limits import user_inside, with_user_limi
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
 
-# The effective curvature is exact in the middle of an interval; at its quarters up to 4e-4 is missing on
-# grids of the default resolution (measured in tests/feedrate/sampling), which this share of the bounds makes
-# good [-].
+# Share of the bounds [-] for what effective curvatures miss beside the middle of an interval: up to 4e-4.
 CURVATURE_MARGIN = 5e-4
 
 
 def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
     """The feedrate problem of a sampled path on a machine; rest at both ends of every piece.
 
-    measured : the error of the machine's filters is measured afterwards (planning/optimal/behind_filters.py),
-               and bounded here on
+    measured : the error of the machine's filters is measured afterwards (behind_filters.py); bounded here on
     programmed
         arcs only
 
-    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse for
-    the path.
+    Raises InputError if the machine lacks an axis of the path, NotSolvedError if the grid is too coarse.
     """
     if samples.margin.max(initial=0.0) >= 1.0:
         worst = int(samples.margin.argmax())

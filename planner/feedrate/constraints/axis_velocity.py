@@ -1,7 +1,6 @@
 """The limits of the axis velocities:  |r'_k| feed <= v_k,  so x <= min_k (v_k / r'_k)^2.
 
-Between the points r' turns; the share of the interval's `margin` (feedrate/sampling/samples.py) makes that
-good.
+Between the points r' turns; the share of the interval's `margin` (samples.py) makes that good.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""The limit of the chord error: between two setpoints the machine runs along the chord, which cuts off the
-curve.
+"""The limit of the chord error: between two setpoints the machine cuts off the curve by the chord.
 
 It does where it runs "linear" from setpoint to setpoint and where it jumps ("hold"), all axes at once. A
 "cubic" of both ends is off by a quarter of that at most, where the normal acceleration steps from nothing to

@@ -1,5 +1,4 @@
-"""The extruder's limits of acceleration and jerk, along the path: one limit more where they may hold the
-motion.
+"""The extruder's limits of acceleration and jerk along the path: one limit more where they may hold it.
 
 Where the extruder feeds r mm of filament per mm of way (geometry/extrusion.py), its limits v, a, j are v/r,
 a/r and j/r along the path. That of the velocity is a feed (geometry/build.py). The others are limits of their

@@ -1,5 +1,4 @@
-"""A limit, as the planner sees it. Every limit is one object in a file of its own; `limits.py` lists them
-all.
+"""A limit, as the planner sees it. Every limit is an object in a file of its own, listed in `limits.py`.
 
 A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j
 acceleration and jerk along the path:
@@ -54,8 +53,7 @@ class Limit:
 
     name: ClassVar[str]  # as it is printed; of an axis limit with the axis behind it, see `AxisLimit.called`
     unit: ClassVar[str]  # of what is limited; rad stands for mm on rotary axes
-    # slower by lam, a motion has 1/lam^order of what is limited: 1 of speeds, 2 of accelerations and errors,
-    # 3 of jerks
+    # slower by lam, a motion has 1/lam^order of it: speeds 1, accelerations and errors 2, jerks 3
     order: ClassVar[int]
     key: ClassVar[str] = ""  # of the machine file, if its value stands alone there
 

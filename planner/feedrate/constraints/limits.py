@@ -4,8 +4,7 @@ A limit that is to be built in is a file like the ones imported here and a line 
 code of its own for it (verifier/limits.py), and tests/verifier/test_laws_of_limits.py a motion on which the
 two agree. One of a user's own needs none of that: machine/user_limit.py, docs/extending.md.
 
-`Limits` is what they are on a machine: the grid, the solvers along a path, the joint search and the prices
-take them from there.
+`Limits` is what they are on a machine: grid, solvers, joint search and prices take them from there.
 """
 
 from __future__ import annotations

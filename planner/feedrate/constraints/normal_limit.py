@@ -1,5 +1,4 @@
-"""The limit of the normal acceleration: kappa feed^2 <= A, in a path's corners and along its curves (paper
-002, eq. (19)).
+"""The limit of the normal acceleration, kappa feed^2 <= A, in corners and curves (paper 002, eq. (19)).
 
 A is the machine's (`Machine.normal_acceleration`, inf if it names none), and never more than what its axes
 give in the direction n of the path's normal, and what the error budget leaves of it (corners/budget.py).

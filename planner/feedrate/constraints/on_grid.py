@@ -1,5 +1,4 @@
-"""The input of the limits: a sampled path on a machine, the two sides of its points, and the error budget
-there.
+"""The input of the limits: a sampled path on a machine, the sides of its points, the error budget there.
 
 The budget is what the rounding leaves of the tolerance. Where the filters' error is bounded by its closed
 form, chords and filters share it in proportion to what they cost per unit of normal acceleration, dt^2/8 :
@@ -27,8 +26,7 @@ class Side:
     """The curve on one side of P points."""
 
     kappa: FloatArray  # (P,) effective curvature of the interval (feedrate/sampling/grid.py) [1/mm]
-    # tol_chord and tol_filter: (P,) parts of the error budget of chords and of filters [mm]; inf where
-    # filters are measured afterwards
+    # (P,) parts of the error budget of chords and of filters [mm]; inf where filters are measured afterwards
     tol_chord: FloatArray
     tol_filter: FloatArray
 

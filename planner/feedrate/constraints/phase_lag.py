@@ -1,10 +1,8 @@
-"""The limit of the phase lag behind filters: on a circle the filtered point runs behind by feed kappa times
-the filters' delay.
+"""The limit of the phase lag: on a circle the filtered point runs behind by feed kappa times the delay.
 
     feed kappa (sum_i T_i)/2 <= phi              paper 001 (par. 26)
 
-The machine file names phi, or none (`Fir.phase_lag_max`). The judge does not look at it: it is no error of
-the contour.
+The machine file names phi, or none (`Fir.phase_lag_max`). The judge does not look at it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The feedrate problem: the fastest speed profile along a sampled path.
 
-In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), with constant u on each of the N intervals of
-a piece:
+In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), u constant on each interval:
 
     minimise   T = sum_i 2 h_i / (sqrt(x_i) + sqrt(x_{i+1}))
     subject to x_{i+1} = x_i + 2 h_i u_i
@@ -62,12 +61,10 @@ class FeedrateProblem:
     bound_names           : names of the bounds on x ("feed", "velocity.x", "chord_error", ...)
     margin                : (P,) of the interval to the right, share of the acceleration limits [-]
     feed_sq_start, feed_sq_end : (G,) x at both ends of each piece; 0 = rest
-    limit_scale           : (P,) by what factor the motion has to be slower around each point (module text)
-                            [-]; 1 if not given
+    limit_scale           : (P,) by what factor motions have to be slower around points [-]; 1 if not given
     own                   : how many of the axes, the last ones, are limits of one's own
                             (machine/user_limit.py): functions of the position with rows like an axis
-    own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger at each
-                            point [-]
+    own_here              : (2, P, own) by what factors their acceleration and jerk limits are larger [-]
     own_least             : (3, own) their least bounds of velocity, acceleration and jerk on the path, in
                             units of their own; inf where they bound nothing
 

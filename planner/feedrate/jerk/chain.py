@@ -1,5 +1,4 @@
-"""A piece between two full stops, solved window by window: where windows end, what of them is kept, and what is done if
-one fails.
+"""A piece between two full stops, window by window: where they end, what is kept, and if one fails.
 
 See solver.py.
 """
@@ -19,30 +18,23 @@ from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.start import envelope
 from planner.feedrate.jerk.window import ScaledWindow, Way, Window
 
-# Joining windows. How far a window's stop must be from what is kept, in braking distances [-]: 2 costs 1e-4
-# of some profiles' time, 5 gains nothing.
+# Joining windows. How far a window's stop must be from what is kept, in braking distances [-].
 BRAKING_WAYS = 3.0
-# Share of a^3/j^2 that counts as a way to brake [-]: with less, windows that are joined at slow points end
-# slower; with more, more has to be solved.
+# Share of a^3/j^2 that counts as a way to brake [-]: with less joined windows end slower, more is more work.
 BUILDING = 0.7
 # At most this fraction of a window is kept [-]: the rest is the way ahead that the next window starts with.
 KEPT_SHARE_MAX = 0.95
-# ... and at least this fraction of what can be [-]. In between, the point where more speed would help most: to keep all, whatever
-# the state there, costs up to 0.8 % of a profile's time.
+# ... and at least this fraction of what can be [-]; in between, the point where more speed would help most.
 JOIN_SHARE = 0.92
-# A window is meant to be kept up to a point between these numbers of usual windows from its beginning [-]:
-# there where the least has to be solved for each interval that is kept.
+# A window is kept up to a point between so many usual windows [-]: where least is solved for what is kept.
 NEAREST, FARTHEST = 0.4, 1.25
 # An interval in a window twice as large costs so much more [-]: iterations grow, and memory leaves the cache.
 LARGER_COSTS = 0.2
-# The start keeps shares of the limits (start.py), the motion keeps them in full: its feed^2 is so many times
-# that of the start [-].
+# The start keeps shares of the limits (start.py): the motion's feed^2 is so many times that of the start [-].
 FASTER = 1.6
-# A window ends where the grid is finest on this part of a usual window behind what is needed [-]: a stop
-# needs points.
+# A window ends where the grid is finest on this part of a usual window behind what is needed [-].
 END_SHARE = 0.1
-# Intervals: a smaller window that does not converge is not divided any further: from rest the plain start
-# does for so few. (The last one may have `INTERVALS_MIN` more.)
+# Intervals: a smaller window that does not converge is not divided; from rest the plain start does.
 SMALLEST_WINDOW = 100
 # Into so many smaller windows one that does not converge is divided.
 DIVISION = 5
@@ -197,8 +189,7 @@ class Chain:
         return found
 
     def _unfelt(self, begin: int, end: int, found: Window) -> int:
-        """Where to go on from: a point from which the window's end is far beyond the way to brake, one of the
-        last such points.
+        """Where to go on from: one of the last points with the window's end far beyond the way to brake.
 
         Of these the one where more speed would help most (costate times feed^2). Where less would help, while
         the motion brakes into a bend with all its jerk, its state is at the edge of what can still be

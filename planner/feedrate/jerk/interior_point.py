@@ -1,5 +1,4 @@
-"""The interior-point method behind `JerkLimited` (solver.py), in numba: model, weigh, factorise, step. All in
-scaled units.
+"""The interior-point method behind `JerkLimited`: model, weigh, factorise, step. All in scaled units.
 
 It is a primal-dual method for optimal control whose every step is a linear-quadratic problem, solved by a
 Riccati recursion over the grid (Rao, Wright & Rawlings 1998, J. Optim. Theory Appl. 99:723; as a library
@@ -145,8 +144,7 @@ def minimise_time(blocks, tol, iterations, settings):
         sigma = 1.0 if far else min((affine_gap / gap) ** 3, settings.sigma_max)
         mu = max(sigma * gap / total, settings.gap_floor * tol) / sides
 
-        # Corrector: the step to that barrier, second-order terms of the predictor made up for; the
-        # factorisation stays.
+        # Corrector: the step to that barrier with the predictor's second-order terms; the factors stay.
         second_order = 1.0 if min(primal, dual) > settings.predicted_min else 0.0
         barrier = mu, second_order
         correct(blocks, barrier)

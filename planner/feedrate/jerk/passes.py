@@ -1,5 +1,4 @@
-"""The passes over all rows of an interior-point iteration: their weights, the predicted step, the step, and
-how far it may go.
+"""The passes over all rows of an iteration: weights, predicted step, step, and how far it may go.
 
 Each row -1 <= g <= 1 has a slack s and a multiplier lam on either side, g + s = 1 and s - g = 1. With the
 residuals r of these two, eliminating their Newton steps

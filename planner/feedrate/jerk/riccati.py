@@ -1,5 +1,4 @@
-"""The linear-quadratic problem of one interior-point iteration: two states (dx, du), one control dp, solved
-by a Riccati recursion.
+"""The linear-quadratic problem of an iteration, states (dx, du), control dp, by a Riccati recursion.
 
     minimise   sum_i  g_i z_i + z_i H_i z_i / 2,     z_i = (dx, du, dp)_i
     subject to dx_{i+1} = D0 dx_i + D1 du_i + D2 dp_i + D3,     du_{i+1} = du_i + dp_i

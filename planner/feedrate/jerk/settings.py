@@ -16,8 +16,7 @@ class InteriorPointSettings(NamedTuple):
     """Numbers without a unit; the problem's units are scaled to fastest feed 1 and largest acceleration 1.
 
     Start
-    slack_min       : smallest of the first slacks; smaller ones block the way of a start that violates other
-                      rows (0.03: 4063)
+    slack_min       : smallest of the first slacks; smaller ones block some starts (0.03: 4063)
     start_gap       : the first barrier, complementarity of every row per time. Larger than this the first
                       steps leave the start, one problem then fails (3: 4524); smaller, slacks that must grow
                       cannot (0.03: 4242)
@@ -29,12 +28,10 @@ class InteriorPointSettings(NamedTuple):
     defect          : of the kinematics, as a fraction of the largest feed. Nothing removes it, and starts
                       must have no more of it either: from 1e-7 windows behind motion begin to fail (1e-7:
                       4922)
-    gap_floor       : the barrier stays above this fraction of the gap that is asked for; below, iterations
-                      gain nothing (1e-3: 4034)
+    gap_floor       : the barrier stays above this fraction of the gap that is asked for (1e-3: 4034)
 
     Steps
-    to_boundary     : fraction of the way to the nearest slack or multiplier of zero that a step may take; the
-                      usual one (0.9: 4311)
+    to_boundary     : fraction of the way to a slack or multiplier of zero that a step may take (0.9: 4311)
     domain_edge     : fraction of the kinematics' domain that a step may reach; the rows ask for less
                       (rows.DOMAIN), so that no solution lies here
     shortening      : of a step that leaves the domain, until it does not
@@ -42,10 +39,8 @@ class InteriorPointSettings(NamedTuple):
     feed_sq_shrink  : largest fraction of x that one step may take away: x stays positive
 
     Barrier
-    sigma_max       : the barrier falls by at least this factor; without it one that the predictor cannot
-                      lower would stay for ever
-    predicted_min   : a predictor step shorter than this says nothing about second-order terms. Without these
-                      terms: 5276
+    sigma_max       : the barrier falls by this factor at least; others would stay for ever
+    predicted_min   : a shorter predictor step says nothing about second-order terms. Without these: 5276
     change_max      : while some x changes by more than this fraction the barrier stays: far from the solution
                       it must not fall first. Without: 3752, but one profile is 1.3e-4 slower
 
@@ -55,8 +50,7 @@ class InteriorPointSettings(NamedTuple):
 
     Giving up
     stall_step      : steps shorter than this ...
-    stall_rounds    : ... so often in a row lead nowhere: another start is better than the rest of the
-                      iterations (never: 4091)
+    stall_rounds    : ... so often in a row lead nowhere: then another start is better (never: 4091)
     """
 
     slack_min: float = 0.3

@@ -1,7 +1,6 @@
 """By how much a profile has to be slower to keep its limits at the grid points.
 
-Slower by a factor is speeds over it, accelerations over its square and jerks over its cube, on kinematics
-that stay exact.
+Slower by a factor is speeds over it, accelerations over its square, jerks over its cube.
 """
 
 import numpy as np

@@ -1,5 +1,4 @@
-"""Own kernel for the jerk-limited problem: an interior-point method with a Riccati recursion, linear in the
-grid.
+"""Own kernel for the jerk-limited problem: interior points with a Riccati recursion, linear in the grid.
 
 Minimise the time subject to all second-order limits of `FeedrateProblem` and to the axis jerks
 
@@ -19,9 +18,8 @@ the state reached there, at a point where the costate of the kinematics says tha
 multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that
 of one window per thread.
 
-**Threads.** Pieces between full stops are independent: they are solved side by side, on as many cores as
-planner/base/threads.py says; the kernels let go of Python's lock. The solution is the same, byte by byte, on
-any number.
+**Threads.** Pieces between full stops are independent, and solved side by side (planner/base/threads.py); the
+solution is the same, byte by byte, on any number of cores.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into
 smaller ones if it starts at rest; else, or where even that fails, the profile stops: at the end of the window

@@ -89,13 +89,11 @@ def plain_start(s: FloatArray) -> tuple[FloatArray, FloatArray]:
     for ds, last in ((np.diff(s), n // 2), (np.diff(s)[::-1], n - n // 2)):
         quarter = int(np.searchsorted(np.cumsum(ds), PLAIN_SHARE * (s[-1] - s[0])))
         i = min(max(quarter, 1), last - 1)  # transition on the interval after point i
-        rising = 1.5 * ds[0] + 2.0 * np.concatenate(
-            [[0.0], np.cumsum(ds[1:i])]
-        )  # x at points 1..i of unit acceleration
+        # x at points 1..i of unit acceleration
+        rising = 1.5 * ds[0] + 2.0 * np.concatenate([[0.0], np.cumsum(ds[1:i])])
         v = np.sqrt(rising[-1])
-        top = (
-            v + 0.75 * (np.sqrt(v * v + 4.0 * ds[i] / 3.0) - v)
-        ) ** 2  # with jerk -1/h for the time h of that interval
+        # with jerk -1/h for the time h of that interval
+        top = (v + 0.75 * (np.sqrt(v * v + 4.0 * ds[i] / 3.0) - v)) ** 2
         tops.append((i, rising / top, top))
     (i, rising, top), (k, falling, end_top) = tops
     x[1:-1] = 1.0

@@ -1,5 +1,4 @@
-"""One window of a jerk-limited problem: in units of its own, from a start that suits the interior-point
-kernel, to its result.
+"""One window of a jerk-limited problem: in its own units, from a start for the kernel to its result.
 
 A window goes from rest, or from the way ahead that the window before knew, to rest. It is tried from the
 envelope tracked by a motion, where that is found, then from the envelope itself, whose kinematics are not
@@ -40,8 +39,7 @@ from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
 from planner.feedrate.jerk.track import track
 
-# A start keeps every limit times this [-]: without room its slacks block the first steps (0.6 is too slow: 6
-# % more iterations) ...
+# A start keeps every limit times this [-]: without room its slacks block the first steps ...
 START_ROOM = 0.9
 # ... if it takes no more than this slowing down [-]; from too slow a profile the way is as long as from outside the limits.
 SLOWER_MAX = 2.0

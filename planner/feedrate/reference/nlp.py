@@ -1,5 +1,4 @@
-"""The reference solver of the jerk-limited feedrate problem: one nonlinear program per piece, for ipopt or
-fatrop through casadi.
+"""The reference solver of the jerk-limited problem: a nonlinear program per piece, ipopt or fatrop.
 
 Every interval of a piece has constant jerk j_i along the path and a duration h_i; every point a feed v_i and
 an acceleration a_i. The kinematics are exact cubics in time, so that a start or a stop (v = a = 0) needs no
@@ -68,13 +67,11 @@ from planner.feedrate.reference.piecewise import (
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
-# The guess is the second-order optimum, everywhere this much slower [-]. Of 0.3 to 1, and of optima at a
-# third or a tenth of the acceleration, the best by iterations (23-41); all of them lead to the same optimum.
+# The guess is the second-order optimum, slower everywhere by this [-]: the best of 0.3 to 1 by iterations.
 SLOWER = 0.7
 # Largest violation of a scaled row or bound that a solution may have [-].
 VIOLATION_MAX = 1e-6
-# Grid points of the largest problem that is tried: one that takes about a minute
-# (benchmarks/results/solver-sizes.md).
+# Grid points of the largest problem tried, about a minute (benchmarks/results/solver-sizes.md).
 POINTS_MAX = {"ipopt": 20_000, "fatrop": 5_000}
 # Residual of ipopt's rows [-]; its default of 1e-4 leaves ratios to the limits of 1 + 1e-5 on long pieces.
 FEASIBILITY = 1e-8
@@ -154,9 +151,8 @@ def _solve_piece(
     # ---- scaling: units in which the mean interval and its guessed duration are 1
     h_guess = guess.duration[here][:-1] / SLOWER
     lasts = np.isfinite(h_guess)  # not where the guess stands still at both ends of a tiny interval
-    slow = ds / np.sqrt(
-        problem.feed_sq_limit[here].max()
-    )  # what they take at the largest speed of the segment
+    # what they take at the largest speed of the segment
+    slow = ds / np.sqrt(problem.feed_sq_limit[here].max())
     h_guess = np.where(lasts, h_guess, h_guess[lasts].mean() if lasts.any() else slow)
     length, second = ds.mean(), h_guess.mean()
     speed, acc, jerk = length / second, length / second**2, length / second**3

@@ -1,5 +1,4 @@
-"""Common to the reference solvers: the jerk-limited problem falls into pieces between prescribed speeds,
-solved one by one."""
+"""Common to the reference solvers: the problem falls into pieces between prescribed speeds."""
 
 import time
 from collections.abc import Callable

@@ -1,13 +1,11 @@
-"""Where nothing happens along a path: ranges on which a motion keeps the programmed feed, or tracks smoothly
-what the curve allows.
+"""Where nothing happens along a path: a motion keeps the feed, or tracks what the curve allows.
 
 A grid for jerk-limited motions needs intervals of a fraction of a/j where the acceleration switches; a
 machine whose a/j is a thousandth of the time that its motions last would fill the memory with them. Two
 bounds say where they are not needed:
 
 * An acceleration that switches over an interval of h seconds instead of at once costs a h^2/(8 v) seconds.
-  With h = 0.03 v/a that is 1e-4 of v/a, the time which lies between two such switches because the speed has
-  to change between them.
+  With h = 0.03 v/a that is 1e-4 of v/a, the time between two such switches.
 * A curve is feed-limited where the programmed feed F is the smallest bound, and leaves half of the axes'
   accelerations and jerks free:
 
@@ -30,8 +28,7 @@ from planner.geometry.toolpath import Joint
 
 SWITCHING_WAY = 0.03  # h above [v/a]
 FREE_FRACTION = 0.5  # of accelerations and jerks, on feed-limited curves [-]
-# Of intervals by their distance from what is not feed-limited [-]: as on straight elements (feedrate/grid.py,
-# STEP/NEAR).
+# Of intervals by their distance from what is not feed-limited [-]: as on straight elements (grid.py).
 GROWTH = 0.25
 PLACES = 9  # on every curve, at which it is looked at
 
@@ -79,8 +76,7 @@ def feed_limited(
 
 
 def quiet_way(feed: FloatArray, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
-    """(M,) how far from what is not feed-limited a motion at `feed` (M,) [mm/s] may still change its speed
-    [mm] (module text).
+    """(M,) how far from other ranges a motion at `feed` (M,) [mm/s] may change its speed [mm] (module text).
 
     acceleration, jerk : (A,) limits of the axes [mm/s2], [mm/s3]
     """

@@ -19,16 +19,14 @@ from planner.feedrate.sampling.rows import PathLimits, grown, set_row
 # The midpoint is not quite the worst place of an interval: safety factor on the margin [-].
 MARGIN_SAFETY = 1.25
 POINTS_SHARED = SIZES.grid_shared
-# The jerk between grid points may be off by so many times `resolution` [-]: 1 %, made good by slowing down
-# (planning/methods/optimal.py).
+# The jerk between grid points may be off by so many times `resolution` [-], made good by slowing down.
 JERK_SHARE = 5.0
 # Halvings of one interval at most, and so its smallest part; 2^-20 of a corner is below a nanometre.
 HALVINGS_MAX = 20
 SMALLEST = 2.0**-HALVINGS_MAX
 # Intervals may be this share of their distance from the nearest full stop [-], for solvers of third order.
 REST_GROWTH = 0.5
-# Neighbouring intervals on curves for solvers of third order: at most so many times as long [-], growing by
-# this share of the distance.
+# Neighbouring intervals on curves, third order: at most so many times as long [-], growing with the distance.
 STEEPEST, SLOPE = 4.0, 1.0
 # ... but not down to neighbours, nor parts of them, that are shorter than this share of them [-]: those are rounding.
 FINEST = 1e-4
@@ -209,9 +207,8 @@ def grade(legs, rows):
     """Halve intervals on curves until they are no longer than `STEEPEST` times their neighbours plus `SLOPE`
     times the distance from them: between a short and a long interval the kinematics of a jerk-limited profile
     are far from linear."""
-    size = np.empty(
-        len(rows) + 1
-    )  # at the start of each row; a closing row parts what is before it from what is after it
+    # at the start of each row; a closing row parts what is before it from what is after it
+    size = np.empty(len(rows) + 1)
     for r in range(len(rows)):
         here = rows[r].end - rows[r].begin
         if rows[r].last:

@@ -11,9 +11,8 @@ from planner.corners.smooth import SmoothPath
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PathSamples:
-    """The path on a grid: G pieces between full stops, P points in all, one interval to the right of every
-    point but the last of each piece. At a full stop the point is there twice, as the end of one piece and the
-    start of the next."""
+    """The path on a grid: G pieces between full stops, P points, one interval to the right of each but the
+    last of a piece. A full stop is there twice, as the end of one piece and the start of the next."""
 
     path: SmoothPath
     table: ElementTable
@@ -22,8 +21,7 @@ class PathSamples:
     s: FloatArray  # (P,) arc length from the start of the job [mm]
     position: FloatArray  # (P, A) [mm]
     d1: FloatArray  # (P, A) r' = dr/ds
-    # d2_left and d2_right: (P, A) r'' just before and just after the point [1/mm]; they differ where the
-    # curvature jumps
+    # (P, A) r'' just before and just after the point [1/mm]; they differ where the curvature jumps
     d2_left: FloatArray
     d2_right: FloatArray
     # d3_left and d3_right: (P, A) r''' [1/mm2]
@@ -36,8 +34,7 @@ class PathSamples:
     w1: FloatArray
     segment: Array  # (P,) toolpath segment of that interval
     margin: FloatArray  # (P,) interpolation error of that interval, share of the acceleration limits [-]
-    # kappa_left and kappa_right: (P,) effective curvature in the intervals to the left and to the right
-    # [1/mm]
+    # (P,) effective curvature in the intervals to the left and to the right [1/mm]
     kappa_left: FloatArray
     kappa_right: FloatArray
 

@@ -21,8 +21,7 @@ from planner.geometry.legs import leg_point
 ARC_STEP = np.pi / 8
 # ... and with so many at least, so that a short arc between two stops can start and stop.
 ARC_INTERVALS_MIN = 4
-# Free parts of legs shorter than this fraction of the leg are nothing but rounding: longer ones are at least
-# CLOSE [-].
+# Free parts of legs shorter than this fraction of the leg are rounding: others are at least CLOSE [-].
 FREE_PART_MIN = 1e-9
 
 # curve, w0, w1: element and its parameters; segment: of the toolpath; begin, end: place along the legs from

@@ -1,5 +1,4 @@
-"""The smooth path sampled along its arc length, on a grid that adapts until linear interpolation is good
-enough.
+"""The smooth path sampled along its arc length, on a grid fine enough for linear interpolation.
 
 A second-order solver sees the axis acceleration g(s) = r'(s) u + r''(s) x(s) only at grid points; in an
 interval u is constant and x = feed^2 linear. Between the points g leaves the chord of its end values by at
@@ -38,12 +37,10 @@ from planner.feedrate.sampling.user_rows import user_rows
 from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 
-# Interpolation error of the axis accelerations that the grid may have [share of the limit]. The cycle time is
-# then 0.6e-3 to 3e-3 above that of an infinitely fine grid on the shared jobs (tests/feedrate/sampling):
-# first order in the step, because u is constant on it.
+# Interpolation error of the axis accelerations that the grid may have [share of the limit]: cycle times are
+# 0.6e-3 to 3e-3 above those of a fine grid (tests/feedrate/sampling), as u is constant on intervals.
 RESOLUTION = 2e-3
-# Jobs with more corners than the first number get the second resolution instead, or their grids would fill
-# the memory.
+# Jobs with more corners than the first number get the second resolution, or grids would fill the memory.
 MANY_CORNERS, COARSE_RESOLUTION = SIZES.corners_finely, 1e-2
 # For solvers of third order an interval on an arc or a span lasts at most this share of a/j, the time an axis
 # needs for its acceleration [-], where feedrate/sampling/feed_limited.py does not say that it may last longer.
@@ -176,16 +173,14 @@ def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
     table = element_table(path)
     axes = np.full(samples.d1.shape[1], np.inf)  # for the margins, which are not asked for
     limits = PathLimits(path.toolpath.feed, axes, axes, axes)
-    grid = Intervals(
-        element.copy(), w0, w1, segment.copy(), last
-    )  # read-only arrays would compile a second kernel
+    # read-only arrays would compile a second kernel
+    grid = Intervals(element.copy(), w0, w1, segment.copy(), last)
     columns = evaluate(table, grid, limits)._replace(margin=samples.margin)
     return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns._asdict())
 
 
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
-    """Add grid points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by
-    place.
+    """Add points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
 
     Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
     """

@@ -1,5 +1,4 @@
-"""Limits of one's own on the grid: their rows, how far these are from linear between the points, and where
-more points are needed.
+"""The user's limits on the grid: rows, how far these are from linear, where more points are needed.
 
 A limit (machine/user_limit.py) with the bounds v, a, j on velocity, acceleration and jerk of q(s) is an axis
 more to a solver: the rows q', q'', q''' with the limits a, j, and the cap feed^2 <= (v/q')^2.
@@ -27,8 +26,7 @@ from planner.feedrate.sampling.grid import JERK_SHARE, MARGIN_SAFETY
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine.user_limit import OwnLimit, Place, bounds_at, limit_derivatives
 
-# Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-]; it
-# costs as much as the grid's own error where bounds vary, and nothing elsewhere.
+# Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-].
 BOUND_SHARE = 5.0
 JUMP = 0.3  # change of a bound across an interval, from which on the interval is halved down to `LEAST` [share of the larger]
 LEAST = 1e-3  # shortest interval that is halved [mm]: what a motion does within is less than any period shows
@@ -225,8 +223,7 @@ def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray])
 def _between(
     bound: FloatArray, middle: FloatArray, cap: FloatArray | None, cap_middle: FloatArray | None, at: Array
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A bound (P,) made to hold between the points, by how much it was short in the middles (n,), and by how
-    much it changes.
+    """A bound (P,) kept between points, by how much it was short in the middles (n,), and how it changes.
 
     cap, cap_middle : what else bounds the quantity: what is beyond does not count
     """

@@ -1,5 +1,4 @@
-"""Jobs of the tool's tip: planned through the kinematics, delivered as setpoints of the joints, judged there
-and at the tip."""
+"""Jobs of the tool's tip: planned through the kinematics, delivered and judged in the joints."""
 
 import dataclasses
 import time
@@ -66,8 +65,7 @@ def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
 
 
 def judged(setpoints: Trajectory, job: Judged) -> Verdict:
-    """The verdict on setpoints of the axes: in the joints and at the tip for a program with the tool centre
-    point on.
+    """The verdict on setpoints of the axes: in the joints and at the tip with the tool centre point on.
 
     Raises InputError as `verify` does.
     """

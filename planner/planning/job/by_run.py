@@ -1,5 +1,4 @@
-"""A job run by run, from one full stop of the program to the next: where the runs are in a motion, and jobs
-of one run."""
+"""A job run by run, between full stops of the program: where runs are in a motion, and their jobs."""
 
 import dataclasses
 from functools import cached_property
@@ -15,8 +14,7 @@ from planner.motion.vertex_times import passing_times, standstills
 from planner.planning.job.job import Job
 from planner.verifier import Verdict
 
-# A motion is sampled at this fraction of a/j, the time an axis needs for its acceleration [-], but not more
-# often than that in all.
+# A motion is sampled at this fraction of a/j, an axis' time for its acceleration [-], or so often in all.
 PERIOD, SAMPLES = 0.02, 200_000
 
 
@@ -71,8 +69,7 @@ def job_of_run(job: Job, first: int, last: int) -> Job:
     def part(toolpath: Toolpath) -> Toolpath:
         kept = np.zeros(len(toolpath), bool)
         kept[first:last] = True
-        # before the part is made: a joint that is a full stop of the job need not be one of the path that its
-        # plan is judged by
+        # before the part is made: a full stop of the job need not be one of the path it is judged by
         of_run = toolpath.with_joints(np.array([first, last]), Joint.STOP)
         columns = {
             name: getattr(of_run, name)[first : last + 1].copy()

@@ -37,11 +37,9 @@ from planner.sensitivity.records import GridHistory
 from planner.verifier import OF_CHORDS, verify
 
 NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
-# A motion that is mended where chords leave the tolerance is taken at once if that costs no more than this
-# share of its time [-].
+# A motion mended where chords leave the tolerance is taken at once if that costs no more of its time [-].
 CHEAP = 1e-4
 # A motion that turns in less time than the filters are long is nearer to its path than the closed form says.
-# More than twice its acceleration gains nothing and takes longer.
 BOLDER = 2.0
 
 
@@ -51,14 +49,12 @@ class Job:
 
     program: Program  # the blocks as they were read
     machine: Machine  # limits, interpolation period, filters
-    # the path that is planned: the exact programmed path with its tolerances, or with smaller ones
-    # (`with_share`, delivery/periods.py)
+    # the exact programmed path with its tolerances, or with smaller ones (`with_share`, delivery/periods.py)
     toolpath: Toolpath
     stages: Stages  # the clock
     # machine and toolpath by which the motion is judged, if it is planned with others; else None
     judged: tuple[Machine, Toolpath] | None = None
-    # what a plan takes that there is already [s]: a motion that takes longer is of no use, and need not be
-    # delivered
+    # what a plan takes that there is already [s]: motions that take longer need not be delivered
     most: float = np.inf
 
     @property
@@ -71,8 +67,7 @@ class Job:
 
         share  : of the tolerances, 0 < share <= 1 [-]
         seen   : of the lengths of the filters, as far as closed forms use them [-]
-        curved : whether the normal acceleration is limited to `BOLDER` times that by which filters take the
-                 rest
+        curved : whether the normal acceleration is limited to `BOLDER` times that of the filters' rest
 
         Only for machines with filters.
         """
@@ -149,8 +144,7 @@ class Job:
                       more than `CHEAP`, a motion planned with less tolerance may be faster: then the motion
                       is delivered as it is, with the slower one.
 
-        Standstills are added where the chords between samples would cut off a full stop
-        (delivery/periods.py).
+        Standstills are added where chords would cut off a full stop (delivery/periods.py).
         """
         made, stands = self._delivered(motion, not_limited, 0)
         if as_it_is or made.verdict.passed:

@@ -1,5 +1,4 @@
-"""A job planned again with less of the tolerance where the chords between its samples leave it
-(delivery/periods.py)."""
+"""A job planned again with less tolerance where the chords between samples leave it."""
 
 import dataclasses
 from collections.abc import Callable
@@ -13,9 +12,8 @@ from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.verifier import Verdict
 
-# At most so often: first less at corners, where a round for these changed nothing on the arcs beside them too
-# and twice as much, then inside blocks. Every time the samples fall elsewhere, but what one phase may do to a
-# corner is known after the first.
+# At most so often: first less at corners, then on the arcs beside them too and twice as much, then inside
+# blocks. What one phase of the samples may do to a corner is known after the first.
 PERIOD_ROUNDS = 8
 SAME_TIME = 1e-12  # share of a time that is rounding [-]
 

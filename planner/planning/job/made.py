@@ -18,8 +18,7 @@ class Delivered(NamedTuple):
     trajectory : its samples
     verdict    : on them and on the motion
     motion     : with the standstills that the samples need
-    slower     : where the verdict failed, the same motion run slower in places so that it passes, if that
-                 costs time; else None
+    slower     : where the verdict failed, the same motion slower in places so that it passes; else None
     filtered   : whether the filters behind the setpoints made the motion slower than its limits did
     notes      : what the samples do not tell
     """

@@ -1,8 +1,6 @@
-"""The notes of a plan, on what it assumed and what it gave up: short sentences, each with its first line and
-a count.
+"""The notes of a plan, on what it assumed and gave up, each with its first line and a count.
 
-The notes of the reader (`Program.notes`) come first, then those on machine and tolerance, then those of the
-method.
+Those of the reader (`Program.notes`) come first, then machine and tolerance, then the method.
 """
 
 import numpy as np
@@ -14,8 +12,7 @@ from planner.machine import ROTARY_AXES, Machine
 from planner.nc.program import Kind, Program
 from planner.planning.job.plausible import short_block_notes, unit_notes
 
-# A tolerance above this share of the part's largest extent is noted [-]: 0.05 mm on a part of 2.5 mm. What is
-# rounded by more has little left of its shape.
+# A tolerance above this share of the part's extent is noted [-]: little is left of a part's shape.
 TOLERANCE_OF_PART = 0.02
 
 

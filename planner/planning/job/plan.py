@@ -27,8 +27,7 @@ class Making(NamedTuple):
     """A plan in the making, which may not be the one that is taken.
 
     motion, slower, filtered : as in `Delivered`
-    priced                   : the solution of which the prices are those of the plan; None where they are
-                               there, or not to be had
+    priced                   : the solution whose prices are the plan's; None if there, or not to be had
     given_up                 : what the method has noted
     instead                  : another plan, which passes, for one that does not; else None
     """
@@ -46,19 +45,16 @@ class Plan(Shown):
     """A planned job: its records, and how it shows itself in Python and notebooks (shown.py).
 
     method, solver      : names of what was used
-    corner              : name of the shape of single corners, or the geometry ("auto", "spline"); None where
-                          no corner is rounded
+    corner              : name of the shape of single corners, or the geometry; None where none is rounded
     program, machine    : what was planned, and for which machine
     toolpath            : the exact programmed path with its tolerances
     status, sentence    : how the solution ended
-    trajectory, verdict : the motion at the interpolation period and the verifier's verdict on it; None unless
-                          solved
+    trajectory, verdict : the motion at the interpolation period, and the verdict on it; None unless solved
     joints              : of a program with the tool centre point on: the same motion as setpoints of the
                           joints; `trajectory` is that of the tip
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
-    making              : of a plan on its way what only planning needs; None in a finished one, and unless
-                          solved
+    making              : of a plan on its way what only planning needs; None in a finished one
     stop_time           : cycle time if every block ran from rest to rest [s], dwells included
     grid_points         : number of grid points of the problem that was solved
     notes               : what was assumed and what was given up, each with its first line and a count

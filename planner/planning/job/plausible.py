@@ -1,8 +1,6 @@
-"""Numbers that are allowed and hardly meant: other units than mm and s, and a tolerance longer than the
-blocks.
+"""Numbers that are allowed and hardly meant: other units, a tolerance longer than the blocks.
 
-A machine file in m, mm/min or ms is valid, and its plan passes every check: it keeps the limits that were
-written. So a note asks.
+A machine file in m, mm/min or ms is valid, and its plan passes every check. So a note asks.
 """
 
 import numpy as np
@@ -12,8 +10,7 @@ from planner.machine import LINEAR_AXES, Machine
 
 # Velocities [mm/s] outside of which a number is rather in m/s (6 m/h) or in mm/min (900 m/min).
 VELOCITY_MIN, VELOCITY_MAX = 1.67, 15_000.0
-# Times to build up the acceleration, acceleration / jerk [s]; those of the built-in machines are 0.01 to
-# 0.04.
+# Times to build up the acceleration, acceleration / jerk [s]; of built-in machines 0.01 to 0.04.
 RAMP_MIN, RAMP_MAX = 2.5e-4, 0.5
 PERIOD_MIN, PERIOD_MAX = 1e-5, 0.05  # interpolation periods [s]: one of 1 is rather 1 ms
 

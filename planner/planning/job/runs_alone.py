@@ -12,8 +12,7 @@ from planner.planning.job.job import Job
 from planner.planning.job.made import Delivered
 from planner.planning.job.plan import Plan
 
-# So many runs are planned by themselves at most, and so often once more those that the verdict finds
-# something on.
+# So many runs are planned by themselves, and so often more those that the verdict finds something on.
 ALONE_MOST, VERDICTS = 100, 3
 
 

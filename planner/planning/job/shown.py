@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     import pandas
     from plotly.graph_objects import Figure
 
-# "module:name" of what makes each view of a plan; filled where the package is put together
-# (planner/__init__.py).
+# "module:name" of what makes each view of a plan; filled in planner/__init__.py.
 VIEWS: dict[str, str] = {}
 
 
@@ -50,8 +49,7 @@ class Shown:
     """The part of `Plan` that shows and writes it. Each raises NotSolvedError without a trajectory."""
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The setpoints as a table of pandas, with the columns of a trajectory file; `attrs["units"]` has
-        their units.
+        """The setpoints as a table of pandas, as in a trajectory file; `attrs["units"]` has their units.
 
         Raises InputError if pandas is not installed.
         """

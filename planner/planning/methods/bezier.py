@@ -1,5 +1,4 @@
-"""Method `bezier`: paper 002. Rational Bezier pairs, the error allocation of eq. (18)-(20), S-curves between
-corners at constant speed.
+"""Method `bezier`: paper 002. Bezier pairs, error allocation, S-curves between constant speeds.
 
 1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the
 fraction of the tolerance
@@ -10,8 +9,7 @@ limits, jerk included, allow
 3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop
 at its vertex where that
    is faster (lookahead/look_ahead.py); on arcs the limits are constant.
-4. What the samples of a corner may have missed is made good by slowing down, as in method `optimal`; usually
-nothing.
+4. What the samples of a corner may have missed is made good by slowing down; usually nothing.
 """
 
 import dataclasses
@@ -36,8 +34,7 @@ from planner.planning.optimal.notes import exact_note
 from planner.planning.optimal.tighten import slowed
 from planner.planning.page import CLOSED_FORM_WAYS, Method
 
-# The fraction of every leg that its corners leave free, to change the speed on it [-]: with none all corners
-# are as slow as the first.
+# The fraction of every leg that corners leave free [-]: with none all are as slow as the first.
 FREE_FRACTION = 0.3
 # Interpolation period [s] for which the corners are rounded without allocation: its chord error is nothing.
 NO_PERIOD = 1e-9

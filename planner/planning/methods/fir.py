@@ -13,11 +13,9 @@ command slows
    |a| <= V/T1 and |j| <= V/(T1 T2), holds for no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2),
    docs/papers.md), and eq. 14 not for short ones.
 
-These filters make the setpoints. Filters that the machine has behind its setpoints (`[fir]`) come after them,
-as with every method.
+These filters make the setpoints; those that the machine has behind them (`[fir]`) come after.
 
-`plain` is the paper without 4: T1 = V/A, T2 = A/J, eq. 15 at every corner. Its verdict shows what that
-exceeds.
+`plain` is the paper without 4: T1 = V/A, T2 = A/J, eq. 15 at every corner, whatever that exceeds.
 """
 
 from dataclasses import dataclass

@@ -38,8 +38,7 @@ from planner.planning.page import Method
 
 # Fraction of the tolerance that the rounding of corners may use [-]; the filters round them anyhow.
 ROUNDING_FRACTION = 0.1
-# Interpolation error of the grid that the chords start from, as of feedrate/sampling/samples.py: they are
-# refined by the angle they turn.
+# Interpolation error of the grid that the chords start from; they are refined by their angle.
 RESOLUTION = 0.05
 # Corners that turn by more than one of these angles may become full stops [rad]; the first is none of them.
 STOP_ANGLES = tuple(np.deg2rad([180.0, 120.0, 80.0, 50.0, 25.0, 10.0]))

@@ -1,5 +1,4 @@
-"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, and a look-ahead over their
-speeds.
+"""Method `kinematic`: paper 003's jerk-limited corners between straight legs, with look-ahead.
 
 1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where
 that is faster; curves are
@@ -46,8 +45,7 @@ from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.planning.page import CLOSED_FORM_WAYS, Method
 
-# Fraction of the tolerance that chords of arcs may use; the corners between them get the rest. Half is enough
-# for corners that fill their chords: those leave the vertex by 2/3 to 1 of the sagitta.
+# Fraction of the tolerance that chords of arcs may use; half is enough for corners that fill them.
 CHORD_FRACTION = 0.5
 
 

@@ -1,5 +1,4 @@
-"""`planner.methods`: the names of the methods. Printed, it says what each is; `planner.methods["kinematic"]`
-is one to be planned with."""
+"""`planner.methods`: names, what each method is, and `planner.methods["kinematic"]` to plan with."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Method `optimal`: smoothed path, all limits with jerk, path and feed together where the joint search can
-(attempts.py).
+"""Method `optimal`: all limits with jerk, path and feed together where possible (attempts.py).
 
 Corners are rounded, tangent joints with a jump of the curvature too: a jump would need infinite jerk.
 """
@@ -19,8 +18,7 @@ from planner.planning.optimal.order import ThirdOrder
 from planner.planning.optimal.shaped import shaped_plan
 from planner.planning.page import Method, best_of
 
-# The shape number of Bezier corners that is fastest with jerk limits; 0.9, which has the smaller curvature,
-# is slower.
+# The shape number of Bezier corners that is fastest with jerk limits; 0.9 has a smaller curvature.
 SIGMA2 = 0.94
 NOT_SMOOTHER = "smooth has no effect: geometry and feed were not searched together, or setpoints are shaped"
 
@@ -29,8 +27,7 @@ NOT_SMOOTHER = "smooth has no effect: geometry and feed were not searched togeth
 class OptimalMethod(Method):
     """The fastest motion under all limits, that of the jerk included: path and feed together, or on splines.
 
-    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
-             settings of your own
+    corner : "auto", "spline", "bezier", "fir", "kinematic", or a shape with settings of your own
     solver : name of the solver, "own", "ipopt" or "fatrop" (feedrate/solvers.py), or a solver
     effort : "quick", "normal" or "best": grids, and how finely and up to which size path and feed are searched
              together (planning/optimal/effort.py); that is with corner "auto", the own solver and no shaping

@@ -48,8 +48,7 @@ class MethodSettings(TypedDict, total=False):
                (corners/own.py); None for "bezier"
     solver   : "own", "ipopt" or "fatrop" for "optimal", "reachability" or "toppra" for
                "second-order"; None for the first of them
-    effort   : "quick", "normal" or "best": how fine grids and the steps of the joint search are; None for
-               "normal"
+    effort   : "quick", "normal" or "best": how fine grids and search are; None for "normal"
     smooth   : weight of the jerk against the time, 0 or more [-]: with more the joint search of "optimal"
                finds a smoother and slower motion; None for 0, where jerk is small as far as it costs no time
     shaped   : deliver setpoints that leave the machine's vibration modes at rest

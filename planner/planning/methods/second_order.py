@@ -1,5 +1,4 @@
-"""Method `second-order`: the limits of `optimal` but that of the jerk, path and feed together where the joint
-search can.
+"""Method `second-order`: the limits of `optimal` but the jerk, path and feed together if possible.
 
 The search has no row of the jerk; its accelerations rise and fall in steps as short as it finds them best.
 Where it does not run, the feed along a path is found by reachability analysis, accelerations step at grid
@@ -25,10 +24,8 @@ from planner.planning.page import Method, best_of
 class SecondOrderMethod(Method):
     """The fastest motion under all limits but jerk: path and feed together, or on splines or rounded corners.
 
-    corner : "auto", "spline", the name of a corner shape, "bezier", "fir" or "kinematic", or a shape with
-             settings of your own
-    solver : name of the solver, "reachability" (own kernel) or "toppra" (the package, for comparison), or a
-             solver
+    corner : "auto", "spline", "bezier", "fir", "kinematic", or a shape with settings of your own
+    solver : "reachability" (own kernel), "toppra" (the package, for comparison), or a solver
     effort : "quick", "normal" or "best": as of method `optimal` (planning/optimal/effort.py)
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """

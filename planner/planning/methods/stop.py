@@ -1,5 +1,4 @@
-"""Method `stop`: every block from rest to rest, jerk-limited, in closed form. The baseline the papers compare
-with."""
+"""Method `stop`: every block from rest to rest, jerk-limited, in closed form: the papers' baseline."""
 
 from dataclasses import dataclass
 

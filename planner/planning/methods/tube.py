@@ -1,5 +1,4 @@
-"""Method `tube`: geometry and feed found together, anywhere inside the tolerance, from the motion of another
-method.
+"""Method `tube`: path and feed found together within the tolerance, from another method's motion.
 
 All other methods round the path first and then find the feed. Here the motion of the axes itself is what is
 sought (joint/rows.py, joint/nlp.py), so nothing is given away between the two. What is found is the best

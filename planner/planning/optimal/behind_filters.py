@@ -1,5 +1,4 @@
-"""Corners taken slowly enough for the filters behind the setpoints, before delivery/filters.py slows down
-whole runs.
+"""Corners taken slowly enough for filters, before delivery/filters.py slows down whole runs.
 
 A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the
 corner itself, the less the way in and out counts. Therefore only the feed close to a corner that the filtered
@@ -10,11 +9,9 @@ was too fast the last time; the problem is solved again with all of them, until 
 has room left. Where the contour is left away from corners, the feed is limited wherever the filters hold the
 motion at that moment.
 
-The rounds keep the limits at grid points only. What they end with keeps them between these too, and the
-tolerance (`kept`).
+The rounds keep limits at grid points; what they end with keeps them between, and the tolerance.
 
-Along arcs, where curvature and feed are constant, a closed form gives the bound beforehand
-(constraints/assemble.py).
+Along arcs a closed form gives the bound beforehand (constraints/assemble.py).
 """
 
 import dataclasses
@@ -32,12 +29,10 @@ from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import Order, solve_again
 from planner.planning.optimal.tighten import within_limits
 
-# At most. In 23 calls of five hard jobs, picked for it, motions took 0.94 of the time on the mean that they
-# take with 10.
+# Rounds at most.
 ROUNDS = 16
 # The feed is limited this far on both sides of a corner [tolerances]: the shorter, the more it is like
-# waiting at the vertex. Where the least feed is not enough there, because grid points are far apart, a point
-# more on each side.
+# waiting at the vertex. Where the least feed is not enough, a point more on each side.
 REACH = 0.3
 # Vertices that turn by more are corners [rad], others are places of the contour.
 SHARP = float(np.deg2rad(20.0))
@@ -48,8 +43,7 @@ AIM = 0.01  # of the tolerance: what the search leaves unused [-]; it ends where
 WORTH = 0.05
 HELD = 1e-3  # a square of a feed that is below its bound by less than this share is held by it [-]
 CREEP = 1e-3  # of the feed before the first round: it is not limited to less [-], or the motion would stand where it cannot go on
-# A motion that still leaves the tolerance takes less time than what comes of it, or more by this factor at
-# most [-].
+# A motion that leaves the tolerance takes less time than what comes of it, or at most so much more [-].
 BACK = 1.1
 BOUND = FILTER_ERROR.name
 

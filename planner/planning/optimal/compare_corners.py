@@ -36,12 +36,9 @@ CORNER_POINTS, LEG_POINTS = 100.0, 10.0
 # chords of 20 um, 10.6 and 98 on chords of 0.3 mm, at a/j = 40 ms).
 COARSER, COARSE_SHARE, FEWER = 100.0, 0.9, 10.0
 
-# Corners that on the first grid take so many times as long as splines on the final one are not tried
-# there [-]: times on the coarse grid are longer by up to that.
+# Corners that take so many times as long as splines on the first grid are not tried on the final one [-].
 CLOSE = 1.01
-FASTER = (
-    1e-4  # corners that save less of the whole time are not worth planning it again [-]: the solver's own gap
-)
+FASTER = 1e-4  # corners that save less of the whole time are not worth it [-]: the solver's own gap
 
 
 class CornerBounds(NamedTuple):

@@ -18,8 +18,7 @@ from planner.feedrate.constraints.limits import JERK
 from planner.joint.guess import Cut
 from planner.planning.optimal.order import Order
 
-# Interpolation error of the axis accelerations on the coarsest grid [share of the limit]
-# (feedrate/sampling/samples.py).
+# Interpolation error of the axis accelerations on the coarsest grid [share of the limit].
 COARSE = 3.2e-2
 
 
@@ -51,11 +50,9 @@ class Search:
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
     smooth: float = 0.0  # weight of the jerk against the time at least [-]
     again: bool = True  # search once more where that has not ended
-    # steps of the motions for which `finer` and `again` are meant. Those of more steps are searched where a
-    # step is at least an interpolation period on the mean: 120,000 blocks of 1 to 20 um took three times the
-    # time for 2e-3 less motion. And instead of `finer` once more in steps about as long, with the tolerance that
-    # chords and filters need beside what was found: on reliefs that leaves 7e-5 of the time, in
-    # three quarters of the computing
+    # steps of the motions that `finer` and `again` are meant for; longer ones are searched where a step is
+    # at least a period on the mean, and instead of `finer` once more in steps about as long, with the
+    # tolerance that chords and filters need beside what was found
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:
@@ -65,8 +62,7 @@ class Search:
         return dataclasses.replace(self, finer=((self.cut, LARGE_GAP),), again=False)
 
 
-# Steps of a motion that is searched with the usual effort at most: what takes a minute or two on two
-# processors. Steps of a small one.
+# Steps that are searched with the usual effort at most, a minute or two on two processors; of a small motion.
 STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
 THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 

@@ -10,8 +10,7 @@ from planner.smoothing.spline_path import SplineShape
 
 
 def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
-    """The notes of a motion on a smooth path: what its splines did, corners that are not rounded, full stops
-    of the solver.
+    """The notes of a motion on a path: splines, corners that are not rounded, full stops of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion

@@ -1,5 +1,4 @@
-"""The feedrate problem on one path, of third order (with jerk limits) or second order (without), solved on a
-grid of its own.
+"""The feedrate problem on one path, with jerk limits or without, solved on a grid of its own.
 
 The grid is made for the motion. With jerk limits the second-order problem is solved first, because it says
 where straight legs need points (feedrate/grid.py). Without jerk limits the points where the profile switches

@@ -61,8 +61,7 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
         found = [found.pop().held_by_filters()]
     if not found[0].solution.solved:
         return plan_of_solution(job, found[0], None, settings)
-    # from here on the motion is held by no name, so that tightening lets go of it: a third of a kilobyte a
-    # point
+    # held by no name from here on, so that tightening lets go of it: a third of a kilobyte a point
     with job.stage("solve"):
         best, motion = known or within_limits(
             found.pop(), settings.order, job.toolpath, job.machine, job.tell

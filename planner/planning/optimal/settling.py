@@ -1,5 +1,4 @@
-"""A planned motion p made gentler, or with longer rests, until what is delivered of it behind a shaper keeps
-limits and tolerance.
+"""A planned motion p made gentler until what is delivered of it behind a shaper keeps everything.
 
 The delivered motion D and what p may do that D must not are in shaped.py.
 """
@@ -25,15 +24,12 @@ from planner.planning.optimal.order import Order, solve_again
 from planner.planning.optimal.tighten import fastest_inside, tightened
 
 ROUNDS = 12  # of a candidate, at most; what is left then is not delivered
-# D may exceed a limit by this share [-] before something is done about it, and is slowed down by this much
-# more.
+# D may exceed a limit by this share [-] before it is slowed down, and by this much more then.
 EXCESS, SPARE = 2e-7, 1e-5
 # What the path and the shaper may use of the tolerance, and what errors are brought to [-].
 ROOM, AIM = 1.0 - SPARE_ERROR, 1.0 - 2.0 * SPARE_ERROR
 MOST_SLOWER = 2.0  # of a run, in one round [-] ...
-SHORT_RUN = (
-    0.25  # ... but of one to which that was no help, which takes at least so much of what D is made of [-]
-)
+SHORT_RUN = 0.25  # ... but of one to which that was no help, which takes so much of what D is made of [-]
 
 
 class Over(NamedTuple):
@@ -68,8 +64,7 @@ class Settling:
     def settled(
         self, planned: OnPath, useless: Callable[[float], bool]
     ) -> tuple[OnPath, Motion, ShapedMotion] | None:
-        """The fastest D found on the path of `planned`, with the p that it is made of; None if none is of
-        use.
+        """The fastest D found on the path of `planned`, with its p; None if none is of use.
 
         useless : whether a D that takes so long [s] is no faster than what is there
         """
@@ -197,8 +192,7 @@ def slower_by_errors(
 ) -> FloatArray:
     """(G,) how much slower than planned runs have to be for their errors to come to `AIM` [-].
 
-    now, before : how much slower they were (G,) [-], and the error over tolerance with that (G,), 0 where it
-                  is none
+    now, before : how much slower they were (G,) [-], and error over tolerance then (G,), 0 without one
     share       : of the tolerance, that the path may use [-]
     least       : (G,) how much slower they are at least when that was in vain [-]
 

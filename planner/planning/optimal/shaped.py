@@ -56,10 +56,9 @@ from planner.planning.page import tolerant
 
 # Corners that turn by more are stops of p [rad].
 SHARP = float(np.deg2rad(20.0))
-# What the shaper may take of the tolerance at the largest acceleration for p to be searched with it in one,
-# at least for it to be planned in other ways too, at most for it to be searched [-]: of a pentagon, a zig-zag
-# and an arc at 400 to 9 Hz the search was faster in all with less, and in none with more
-# (`python -m benchmarks.net.ablation ROWS --net NET --without SEARCHED`, or NOT_SEARCHED).
+# What the shaper may take of the tolerance at the largest acceleration for p to be planned in other ways too,
+# at least, and to be searched, at most [-] (`python -m benchmarks.net.ablation ROWS --net NET --without
+# SEARCHED`, or NOT_SEARCHED).
 SEARCHED, NOT_SEARCHED = 1.0, 10.0
 
 
@@ -203,8 +202,7 @@ def _in_other_ways(job: Job, settings: Settings) -> Plan:
     plan = _plan_of(job, settings, shaped(job, settings))
     if plan.verdict is None or counted_time(plan) < np.inf:
         return plan
-    # what is slower is not gentler everywhere behind a shaper, whose copies then meet elsewhere; with the
-    # limits as they are D is
+    # slower is not gentler behind a shaper, whose copies then meet elsewhere; with limits as they are D is
     gentle = _plan_of(job, settings, shaped(job, settings, CANDIDATES[:1]))
     kept = counted_time(gentle) < np.inf
     job.tell(

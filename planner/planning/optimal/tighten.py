@@ -1,5 +1,4 @@
-"""Limits that a motion exceeds between grid points, and two ways to keep them: tighter limits there, or less
-speed.
+"""Limits that a motion exceeds between grid points, kept by tighter limits there, or less speed.
 
 A solver keeps the limits at the grid points. Between them the motion may exceed a limit, usually by less than
 0.5 %. Slowing down by lam divides speeds by lam, accelerations by lam^2 and jerks by lam^3, so an excess says
@@ -38,8 +37,7 @@ TIGHTENING_ROUNDS = 2
 # What is slowed down is slowed down by this much more [-]; less is rounding.
 SLOWING_MORE = 1e-5
 EXCESS_ROUNDING = 1e-9
-# Jobs of more than so many points are slowed down by this factor as a whole before the verdict: the verifier
-# looks at places of its own, and finds a little more; a second verdict takes as long as the first.
+# Jobs of more points are slowed down by this factor before the verdict, which would find a little more.
 MANY_POINTS, SEEN_BEFORE = SIZES.slowed_before, 1.0 + 2e-5
 
 

@@ -49,7 +49,7 @@ WORDS: dict[tuple[str, int], str] = {
     ("G", 330): "K", ("G", 331): "KI", ("G", 760): "PIJKRQHEL",
     ("G", 730): "RLQPK", ("G", 740): "RPLQK", ("G", 810): "RLPK", ("G", 820): "RLPK", ("G", 830): "RLQPIJK", ("G", 840): "RLPQK",
     ("G", 850): "RLPK", ("G", 860): "RLP", ("G", 870): "RLIJK", ("G", 880): "RLP", ("G", 890): "RLP",
-    **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
+    **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 190): "RPQ", ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
     ("M", 610): "Q",
 }  # fmt: skip
 FANUC_WORDS = {
@@ -138,6 +138,25 @@ _PROBE = Refusal(
 G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
     **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
+    **dict.fromkeys((310, 350, 360, 361, 370), _PROBE),
+    1500: Refusal(
+        "a pocket round the contour of a subprogram, whose single passes are the control's, is",
+        _STRAIGHT,
+        True,
+    ),
+    470: Refusal("engraving a text is", _STRAIGHT, True),
+    **dict.fromkeys((842, 843, 1740, 1840), Refusal("tapping of that kind is", "write G84 or G74", True)),
+    1070: Refusal("a contour round a cylinder is", "write the angles of the rotary axis", True),
+    **dict.fromkeys(
+        (2540, 2680), Refusal("a frame that follows the rotary axes is", "write G68.2, or G43.4", True)
+    ),
+    2340: Refusal(
+        "the tool centre point of Haas is", "write G43.4 H, with [kinematics] in the machine file", True
+    ),
+    **dict.fromkeys((1410, 1430), Refusal("tool compensation in five axes is", _ANGLES, True)),
+    **dict.fromkeys(
+        (270, 290, 600), Refusal("a move by way of a reference point is", "write G0 to its end", True)
+    ),
     435: Refusal("the tool's direction as a vector (G43.5 with I J K) is", _ANGLES, True),
     500: Refusal("presetting coordinates with G50 is", "write G92", True),
     510: Refusal("scaling is", "write the scaled coordinates out"),

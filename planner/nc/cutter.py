@@ -123,13 +123,13 @@ class Cutter:
     """The compensation in force, from G41 or G42 to G40; it writes its moves into the table of blocks.
 
     radius : of the tool [mm], > 0
-    left   : on which side of the path it is
+    left   : on which side of the path it is, kept as a `sign`
     normal : axis normal to the plane
     """
 
     def __init__(self, state: State, table: BlockTable, *, radius: float, left: bool, normal: int):
         self._state, self._table = state, table
-        self._radius, self._sign = radius, 1 if left else -1
+        self._radius, self.sign = radius, 1 if left else -1
         self.normal = normal
         self._open: _Open | None = None
         self._placed = False
@@ -177,7 +177,7 @@ class Cutter:
         state = self._state
         start, end, centre = self._plane(state.position), self._plane(target), self._plane(arc.centre)
         turning = 1 if arc.sweep > 0 else -1
-        nearer = turning * self._sign * self._radius
+        nearer = turning * self.sign * self._radius
         size = abs(end - centre)
         first, last = (1j * turning * (p - centre) / abs(p - centre) for p in (start, end))
         if nearer >= size:
@@ -207,9 +207,9 @@ class Cutter:
         """Join the open move to the next at a programmed corner; True for an inner one."""
         assert self._open is not None
         before = self._open.side
-        turn = cmath.phase(side.first / before.last) * self._sign  # towards the tool's side
+        turn = cmath.phase(side.first / before.last) * self.sign  # towards the tool's side
         back = math.pi - abs(turn) < STRAIGHT_ON
-        around = side.turning == self._sign if side.turning else not before.turning
+        around = side.turning == self.sign if side.turning else not before.turning
         outer = around if back else turn < -STRAIGHT_ON
         inner = not outer and (back or turn > STRAIGHT_ON)
         if inner:
@@ -222,7 +222,7 @@ class Cutter:
     def _inner_corner(self, side: OffsetMove) -> None:
         open_ = self._open
         assert open_ is not None
-        point = meeting(open_.side, side, self._sign)
+        point = meeting(open_.side, side, self.sign)
         if point is None:
             raise CutterFault(_GOUGE)
         if open_.fixed:
@@ -247,7 +247,7 @@ class Cutter:
             self._table.add(Kind.RAPID, line, state)
             return
         spokes = (end - corner) / (self._plane(state.place) - corner)
-        sweep = -self._sign * (-self._sign * cmath.phase(spokes) % (2.0 * math.pi))
+        sweep = -self.sign * (-self.sign * cmath.phase(spokes) % (2.0 * math.pi))
         state.actual = place
         self._table.add_arc(Arc(self._at(corner, place), sweep), self.normal, line, state)
 
@@ -324,7 +324,7 @@ class Cutter:
         return at_place(point, others, self.normal)
 
     def _beside(self, point: complex, tangent: complex) -> complex:
-        return point + self._sign * self._radius * 1j * tangent
+        return point + self.sign * self._radius * 1j * tangent
 
 
 def _turn(start: complex, end: complex, side: OffsetMove) -> float:

@@ -36,6 +36,7 @@ from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
 # Nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s].
 _FEED_LEAST = 1.0 / SECONDS_PER_MINUTE
+_END_OF_DATA = 11.0  # G code
 _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
@@ -139,6 +140,11 @@ class Interpreter:
             if after < rows:
                 self.by_word += 1
                 self.table.frame = int(words.frame[after])
+                if self.state.entering:
+                    letters, values = words.of_rows(after)
+                    self.state.entering = not ((letters == ord("G")) & (values == _END_OF_DATA)).any()
+                    row = after + 1
+                    continue
                 block = read_block(words, after, self.findings.report, self.ignored)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program
@@ -224,6 +230,7 @@ class Interpreter:
                 self.saved.take(setting, self.state, self.table, block.line)
             else:
                 self.limits.take(setting, self.state, self.table, block.line, self.findings)
+        self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
         auxiliary.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.table, block, self.findings)

@@ -163,14 +163,16 @@ class Mover:
         self.feed_default, self.findings = feed_default, findings
         self.cutter: Cutter | None = None
         self.splines = SplineReader()
+        self._before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
 
     def execute(self, block: Block) -> None:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
         state, code = self.state, block.g.get("motion")
         if code is not None:  # stays in force, until another one or G80
             state.motion = code // 10 if code <= 30 else code
+            self._before_cycles = state.motion if state.motion <= 1 else self._before_cycles
         elif "cycle end" in block.g:
-            state.motion, state.series = NO_MOTION, None
+            state.motion, state.series = self._before_cycles if state.fanuc else NO_MOTION, None
         if block.g.get("one-shot") in COVET_AXES:
             return
         if block.g.get("tool length") in (431, 432) and "motion" not in block.g:

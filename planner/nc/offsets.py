@@ -34,6 +34,7 @@ from planner.nc.state import (
 )
 
 _OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 P1 to P20; and G154
+_DATA = (3, 50, 52)  # tool life, parameters of the control; to G11
 _FANUC_TOOLS = (10, 11, 12, 13)
 _FIXTURE = 593  # the system of G10 L11
 
@@ -135,6 +136,9 @@ def set_data(state: State, block: Block, findings: Findings) -> None:
         _set_fanuc_tool(state, block, kind, findings)
     elif kind in (1, 10, 11):
         _set_tool(state, block, kind, findings)
+    elif state.fanuc and kind in _DATA:
+        state.entering = True
+        findings.assume(f"G10 L{kind} to G11 writes data of the control, which are not followed", block.line)
     else:
         needed = (
             "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them"

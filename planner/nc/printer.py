@@ -105,7 +105,12 @@ def command_of(text: str) -> Command | None:
 
 
 def is_printer(words: Words) -> bool:
-    """True for a program of a 3-D printer."""
+    """True for a program of a 3-D printer: of none that has a number or changes tools (M6), where M83 and M109
+    are others."""
+    begin = words.first[:-1]
+    numbers = (words.letter[begin] == ord("O")) & (words.value[begin] >= 0.0)
+    if numbers.any() or len(words.find("M", 6.0)):
+        return False
     of_sets = [words.of_rows(row)[0].tolist() for row in words.rows_with(words.find("M", *_SETS))]
     sets = (
         ord("G") not in letters and letters.count(ord("M")) == 1 and set(letters) & set(_NUMBERS)

@@ -109,9 +109,9 @@ _MOVES_FINISHED = 400  # waits until the axes stand
 TEXTS = frozenset((117, 118))  # a message to the end of the line
 MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printers that move
 # G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates
-# off, polar interpolation off, stored stroke and spindle speed checks, mirror image off, look-ahead of Haas
-# and its smoothness, rotation off.
-_G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 690, 1030, 1130, 1870))
+# off, polar interpolation off, stored stroke and spindle speed checks, mirror image off, slower corners,
+# tapping, output, look-ahead of Haas and its smoothness, rotation off.
+_G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 620, 630, 690, 1020, 1030, 1130, 1870))
 # Codes of the groups that are settings beside some words.
 _SOMETIMES = frozenset((50, 51, 80, 100, 920))
 ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {730}}
@@ -145,6 +145,8 @@ def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | N
 
 
 def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
+    if code == 220 and behind:
+        return CodeSetting(G_SETTING, EVERYTHING)  # the limits of travel that it checks
     if _MOVED.intersection(before + behind):
         return None
     if code in (500, 920) and "S" in behind:

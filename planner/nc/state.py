@@ -130,6 +130,7 @@ class State:
     tool_loaded: int = 0
     to_level: bool = False  # canned cycles retract to the level before them (G98), not to R (G99)
     retract_given: bool = False  # a G98 or G99 was read
+    numbers: dict[str, float] = field(default_factory=dict)  # of D beside G41, G42, and of H beside G43
     series: CycleSeries | None = None  # canned cycles in force
     # the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
     cycle_dwell: float = 0.0
@@ -140,6 +141,7 @@ class State:
     in_thread: bool = False  # the last block was cut in step with the spindle
     strict: bool = False  # nothing is assumed (`Reading.strict`)
     fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
+    entering: bool = False  # lines up to G11 are data of the control (G10 L50)
     seconds_meant: bool = False  # the unit of dwells is known
     plane_known: bool = True  # G17, G18 or G19 was read, or the control starts with G17
 

@@ -224,7 +224,7 @@ def test_a_text_that_fits_nowhere_is_tried_in_one_way(data: bytes) -> None:
         "G21\nG60 S1",
         "G21\nG16 X9 Y30",
         "G21\nG51.1",
-        "G21\nG68.2 X0 Y0 Z0 I9 J0 K0",
+        "G21\nG68.2 X0 Y0 Z0 I9 J30 K0",
         "G21\nM428 X5",
         "$J=X9",
         "G21\nG34 Z9 K1",

@@ -80,21 +80,21 @@ LATHE_NOTE = (
 # Codes that call and return, save and restore modes.
 _CALLS = {"M": (70, 71, 72, 73, 97, 98, 99), "G": (65, 66, 67)}
 # Codes of Fanuc's and Haas' mills that begin something: frames, patterns and pockets; and those that end it.
-_FRAMES = (12, 13, 16, 51, 51.1, 68, 70, 71, 72, 101)
-_FRAME_ENDS = (15, 50, 50.1, 69, 100)
+_FRAMES = (12, 13, 16, 51, 51.1, 68, 68.2, 70, 71, 72, 101)
+_FRAME_ENDS = (15, 50, 50.1, 53.1, 69, 100)
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 _O_WORD = r"O(?:\d+|<[^>]*>|\[.*?\]|#[\d<>\w]+)"
 _LINUXCNC = re.compile(
     rf"{_O_WORD}(?:SUB|ENDSUB|CALL|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|RETURN|BREAK|CONTINUE)|#<"
 )
 _FANUC = re.compile(
-    r"GOTO|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
+    r"GOTO|POPEN|PCLOS|[DB]PRNT\[|SETVN\d|#(?:[6-9]|1\d)\d{3}(?!\d)|[=\[]#4[0-3]\d\d(?!\d)|^(?:/\d?)?(?:N\d+)?(?:IF\[|WHILE\[|DO\d|END\d|#[\d\[\]#]+=[^\[\]]*[#\d.][-+*/]|#[\d\[\]#]+=#0(?!\d)|"
     r"[A-Z\d.]*(?:G6[567](?![\d.])|M9[789](?![\d.])))"
 )
 _FRAME = re.compile(
-    r",[ACR](?=[-+.\d#\[])|G0*(?:16|51(?:\.1)?|68)(?![\d.])|G1[23](?![\d.]).*I|G101(?![\d.]).*[XYZ]|G7[012](?![\d.])(?=.*I)(?=.*L)"
+    r",[ACR](?=[-+.\d#\[])|G0*(?:16|51(?:\.1)?|68(?:\.2)?)(?![\d.])|G1[23](?![\d.]).*I|G101(?![\d.]).*[XYZ]|G7[012](?![\d.])(?=.*I)(?=.*L)"
 )
-_ENDS_FRAME = re.compile(r"G0*(?:15|50(?:\.1)?|69|100)(?![\d.])")
+_ENDS_FRAME = re.compile(r"G0*(?:15|50(?:\.1)?|53\.1|69|100)(?![\d.])")
 # Signs of lathes, and of others (`_has_signs`).
 _TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
 _SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0

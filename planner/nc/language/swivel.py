@@ -6,6 +6,7 @@ the tool centre point is switched on behind it, so that x, y, z are the tool's t
 
     Siemens      the angles A, B, C about the axes of MODE, each about the axes turned before: M = R1 R2 R3; the zero
                  is at (X0, Y0, Z0), and (X1, Y1, Z1) further in the plane
+    Fanuc        G68.2 X Y Z I J K: M = Rz(I) Rx(J) Rz(K), the zero at (X, Y, Z); G53.1 turns the axes, G69 ends it
     Heidenhain   M = Rz(SPC) Ry(SPB) Rx(SPA); EULER: M = Rz(EULPR) Rx(EULNU) Rz(EULROT); RELATIV: M Rx, Ry or Rz
 
 Sources: 840D sl, CYCLE800 (bits of MODE); TNC 640, conversational programming, PLANE SPATIAL.
@@ -23,10 +24,11 @@ from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
 if TYPE_CHECKING:
     from planner.nc.language.making import Making
+    from planner.nc.language.travel import Travel
 
 _ON, _OFF = float(TOOL_POINT_ON[1]), float(TOOL_POINT_OFF[1])
 _SAME = 1e-9  # of a direction's components, which are the same then
-_NO_MOVE, _STAY, _TURN, _MOVE = 0, 1, 2, 3  # what the rotary axes do
+NO_MOVE, _STAY, _TURN, _MOVE = 0, 1, 2, 3  # what the rotary axes do
 WAYS = {"STAY": _STAY, "TURN": _TURN, "MOVE": _MOVE}
 RETRACTED = "the retraction of CYCLE800 (FR), to places that the machine's data hold, is not planned"
 MOVED = "PLANE with MOVE turns the rotary axes where the tool stands, as with TURN"
@@ -60,7 +62,7 @@ def siemens(making: "Making", given: Mapping[str, float]) -> None:
         making,
         matrix,
         shift,
-        _NO_MOVE if not given else _TURN if side else _STAY,
+        NO_MOVE if not given else _TURN if side else _STAY,
         int(side) if any(angles) else 0,
     )
 
@@ -69,7 +71,7 @@ def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
     """PLANE and cycle 19: SPA SPB SPC, EULPR EULNU EULROT; `way` one of WAYS, `side` of SEQ. Raises
     ValueError."""
     if "EULNU" in given:
-        matrix = turned(given["EULPR"], 2) @ turned(given["EULNU"], 0) @ turned(given["EULROT"], 2)
+        matrix = euler(given["EULPR"], given["EULNU"], given["EULROT"])
     else:
         parts = (turned(given.get(f"SP{'ABC'[k]}", 0.0), k) for k in (2, 1, 0))
         matrix = np.linalg.multi_dot(list(parts))
@@ -79,6 +81,23 @@ def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
     if given["way"] == _MOVE:
         making.assume(MOVED)
     tilt(making, matrix, np.zeros(3), round(given["way"]), round(given.get("side", 0.0)))
+
+
+def euler(first: float, second: float, third: float) -> FloatArray:
+    """The matrix (3, 3) of rotations about z, the new x and the new z [degrees]."""
+    return np.asarray(turned(first, 2) @ turned(second, 0) @ turned(third, 2), dtype=np.float64)
+
+
+def plane(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
+    """As `tilt`, shift (3,) [mm] and matrix (3, 3), on no programmed frame. Raises ValueError."""
+    _no_frame(making, matrix, shift)
+    tilt(making, matrix, shift, way, side)
+
+
+def is_level(travel: "Travel") -> bool:
+    """True where no tilted plane is in force."""
+    matrix, shift = travel.swivelled
+    return not shift.any() and bool((matrix == np.eye(3)).all())
 
 
 def _no_frame(making: "Making", matrix: FloatArray, shift: FloatArray, *, turned_only: bool = False) -> None:
@@ -117,13 +136,13 @@ def tilt(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side
     target = min(fitting, key=lambda pair: float(abs(pair - here).max()))
     for k in range(2):
         making.numbered[120 + "ABC".index(letters[k]) + 1] = float(target[k])
-    if way == _NO_MOVE or (way != _STAY and abs(target - here).max() < _SAME):
+    if way == NO_MOVE or (way != _STAY and abs(target - here).max() < _SAME):
         target = here
     making.take([[("M", _OFF)]])
     if way in (_TURN, _MOVE) and (target != here).any():
         making.take([[("G", 90.0), ("G", 0.0), *zip(letters, target.tolist(), strict=True)]])
         making.take([] if state.absolute else [[("G", 91.0)]])
-    on = way != _NO_MOVE and bool(abs(state.programmed()[at] - target).max() < _SAME) and not level
+    on = way != NO_MOVE and bool(abs(state.programmed()[at] - target).max() < _SAME) and not level
     if on:
         making.take([[("M", _ON)]])
     travel.swivel(matrix, shift, waiting=way == _STAY and not on and not level)

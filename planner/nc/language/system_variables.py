@@ -13,14 +13,18 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.travel import Travel
+from planner.nc.language.travel_rows import FrameParts
 from planner.nc.program import PathControl
-from planner.nc.state import SYSTEMS, System, system_name
+from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, System, system_name
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
 # G codes in force, that parameters answer with.
 _PATH = {PathControl.EXACT_PATH: 61.0, PathControl.EXACT_STOP: 61.1, PathControl.BLEND: 64.0}
 _PLANE = {2: 17.0, 1: 18.0, 0: 19.0}
+_OF_ONE = 20  # parameters of one work system
+_FURTHER = range(FURTHER_SYSTEMS + 1, FURTHER_SYSTEMS + 301)
+_OFFSETS = ((5221, 5340, SYSTEMS), (7001, 7960, _FURTHER), (14_001, 19_980, _FURTHER))
 _ROTATION = 9  # behind the axes of a work coordinate system
 # G code of a feed mode.
 _FEED_MODES = {"inverse time": 93.0, "per minute": 94.0, "per turn": 95.0}
@@ -227,15 +231,17 @@ class LinuxcncVariables(SystemVariables):
 
 
 class FanucVariables(SystemVariables):
-    """Modal information 4001 to 4120 and 4201 to 4320, positions 5001 to 5043, work offsets 5201 to 5326."""
+    """Modal information 4001 to 4130 and 4201 to 4330, positions 5001 to 5048, work offsets 5201 to 5326, 7001 to
+    7960 and 14001 to 19980."""
 
     numbers = _numbers((1000, 1200), (2000, 3020), (4001, 4131), (4201, 4331), (5001, 5009), (5021, 5029),
-                       (5041, 5049), (5201, 5209), (5221, 5327))  # fmt: skip
+                       (5041, 5049), (5201, 5209), (5221, 5327), (7001, 7961), (10_001, 20_000))  # fmt: skip
 
     def get(self, parameter: int | str, depth: int) -> float:
         """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
         assert isinstance(parameter, int)
         state, number = self.interpreter.state, parameter
+        parts = FrameParts() if self.travel is None else self.travel.parts
         if 4201 <= number <= 4330:
             number -= 200
         modal: dict[int, Callable[[], float]] = {
@@ -244,13 +250,23 @@ class FanucVariables(SystemVariables):
             4003: lambda: 90.0 if state.absolute else 91.0,
             4005: lambda: _FEED_MODES[state.feed_mode],
             4006: lambda: 21.0 if state.unit == 1.0 else 20.0,
-            4007: lambda: 40.0,
+            4004: lambda: 23.0,
+            4007: lambda: self._compensation(),
             4008: lambda: 43.0 if state.tool_offset.any() else 49.0,
-            4014: lambda: min(54.0 + self.system(), 59.0),
+            4010: lambda: 98.0 if state.to_level else 99.0,
+            4011: lambda: 50.0 + (parts.scale != 1.0).any(),
+            4013: lambda: 96.0 if state.spindle.surface_speed else 97.0,
+            4014: lambda: 54.1 if state.system > FURTHER_SYSTEMS else min(54.0 + self.system(), 59.0),
+            4015: lambda: _PATH[state.path_control] // 1.0,
+            4016: lambda: 68.0 if parts.rotation else 69.0,
+            4022: lambda: 50.1 + (parts.mirror < 0.0).any(),
+            4107: lambda: state.numbers.get("D", 0.0),
             4109: self.feed,
+            4111: lambda: state.numbers.get("H", 0.0),
             4113: lambda: self.event("M") or 0.0,
             4119: lambda: self.event("S") or 0.0,
             4120: lambda: float(state.tool_selected),
+            4130: lambda: float(max(state.system - FURTHER_SYSTEMS, 0)),
         }
         if number in modal:
             return modal[number]()
@@ -258,9 +274,9 @@ class FanucVariables(SystemVariables):
             return self.here((number - 1) % 20)
         if 5021 <= number <= 5028:
             return self.machine(number - 5021)
-        if 5221 <= number <= 5326:
-            system, axis = divmod(number - 5221, 20)
-            return self.offset(system, axis) if axis < 8 else 0.0
+        if (place := _work_offset(number)) is not None:
+            system, axis = place
+            return float(state.work_system(system).origin[axis]) / state.unit if axis < 3 else 0.0
         if 5201 <= number <= 5208:
             return 0.0
         remedy = "assign the value it has there to a parameter of your own"
@@ -272,12 +288,25 @@ class FanucVariables(SystemVariables):
             raise ValueError(f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:
             return  # timers and what the operator may do: nothing moves
-        system, axis = divmod(number - 5221, 20)
-        if not 5221 <= number <= 5326 or axis >= 3:
+        system, axis = _work_offset(number) or (0, 3)
+        if axis >= 3:
             super().put(number, value)
         state = self.interpreter.state
-        old = state.work_system(SYSTEMS[system])
+        old = state.work_system(system)
         origin = old.origin.copy()
         origin[axis] = (value or 0.0) * state.unit
-        state.systems[SYSTEMS[system]] = System(origin, old.rotation)
+        state.systems[system] = System(origin, old.rotation)
         state.apply_offsets()
+
+    def _compensation(self) -> float:
+        cutter = self.interpreter.mover.cutter
+        return 40.0 if cutter is None else 41.0 if cutter.sign > 0 else 42.0
+
+
+def _work_offset(number: int) -> tuple[int, int] | None:
+    """The work system and the axis that a parameter of Fanuc holds; of G54.1 P in two ranges."""
+    for first, last, systems in _OFFSETS:
+        if first <= number <= last:
+            at, axis = divmod(number - first, _OF_ONE)
+            return systems[at], axis
+    return None

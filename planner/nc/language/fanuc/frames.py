@@ -23,7 +23,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, in_plane
-from planner.nc.language import tree
+from planner.nc.language import swivel, tree
 from planner.nc.language.making import Maker, Making, Row, around, equal_steps
 from planner.nc.language.source import SourceLine
 from planner.nc.language.travel_rows import FrameParts, turned
@@ -31,7 +31,7 @@ from planner.nc.language.travel_rows import FrameParts, turned
 AXES = "XYZ"
 # Their own words, by code; those that have none end something, and come before the rest of their line.
 WORDS = {
-    "G68": "XYZABRIJK", "G51": "XYZPIJK", "G51.1": "XYZIJK", "G101": "XYZ",
+    "G68": "XYZABRIJK", "G68.2": "XYZIJKPQR", "G53.1": "PR", "G51": "XYZPIJK", "G51.1": "XYZIJK", "G101": "XYZ",
     "G50.1": "XYZ", "G100": "XYZ", "G69": "", "G50": "", "G15": "", "G16": "",
     "G12": "XYZIKQDLF", "G13": "XYZIKQDLF", "G70": "IJL", "G71": "IJL", "G72": "IJKL",
 }  # fmt: skip
@@ -106,6 +106,8 @@ def _frame(making: Making, given: Mapping[str, float], *, code: str) -> None:
     travel = making.travel
     if making.interpreter.mover.cutter is not None:
         raise ValueError(f"{code} while cutter radius compensation is on; write G40 before it")
+    if code == "G69" and not swivel.is_level(travel):
+        swivel.tilt(making, np.eye(3), np.zeros(3), swivel.NO_MOVE, 0)
     _set(making, code, given)
     parts = travel.parts
     if parts.rotation % 360.0 and (parts.mirror < 0.0).any():
@@ -121,6 +123,24 @@ def affine(parts: FrameParts) -> tuple[FloatArray, FloatArray]:
     shift = scale @ (parts.mirrored_at - mirror @ parts.mirrored_at) + parts.centre - scale @ parts.centre
     about = scale @ mirror @ parts.about + shift
     return turn @ scale @ mirror, turn @ shift + about - turn @ about
+
+
+def _tilted(making: Making, given: Mapping[str, float]) -> None:
+    """G68.2: the plane, at X Y Z, turned by I about z, J about its x and K about its z. Raises ValueError."""
+    if given.get("P", 0.0):
+        raise ValueError(
+            f"G68.2 P{given['P']:g} is another way to write a plane; write its angles I J K (Euler)"
+        )
+    shift, angles = ([given.get(c, 0.0) for c in letters] for letters in ("XYZ", "IJK"))
+    swivel.plane(making, swivel.euler(*angles), np.array(shift) * making.unit, swivel.WAYS["STAY"], 0)
+
+
+def _to_plane(making: Making, given: Mapping[str, float]) -> None:
+    """G53.1: the rotary axes turn to the plane. P1, P2: the tilting axis positive, negative."""
+    side = {0: 0, 1: 1, 2: -1}.get(round(given.get("P", 0.0)))
+    if side is None:
+        raise ValueError("P of G53.1 is 0, 1 or 2")
+    swivel.tilt(making, *making.travel.swivelled, swivel.WAYS["TURN"], side)
 
 
 def _polar(making: Making, given: Mapping[str, float]) -> None:
@@ -188,6 +208,8 @@ MAKERS: dict[str, Maker] = {
     **{code: partial(_frame, code=code) for code in WORDS},
     "G15": lambda making, given: making.travel.set_polar(None),
     "G16": _polar,
+    "G68.2": _tilted,
+    "G53.1": _to_plane,
     "G12": partial(_round_pocket, turning=-1),
     "G13": partial(_round_pocket, turning=1),
     **{code: partial(_pattern, code=code) for code in PATTERNS},

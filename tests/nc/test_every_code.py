@@ -121,6 +121,7 @@ PRINTER = {
     (104, 140, 141, 106, 107, 108, 110, 111): "temperatures that nothing waits for, fans, the line number, log level",
     (120, 121, 126, 127, 142, 143, 144, 145, 149, 150, 163, 164): "endstops, valves, standby, units of temperatures, lights, mixes",
     (201, 202, 204, 220): "without the values that limit something here (tests/nc/test_set_limits.py has them)",
+    (200, 221): "what E feeds; the program has no extruder",
     (207, 208): "lengths of retractions, which G10 and G11 say",
     (240, 250, 280, 300): "cameras, contrast, servos, sounds: nothing waits for them",
     (301, 302, 304, 305): "control of temperatures",

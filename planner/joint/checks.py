@@ -15,11 +15,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.joint.legs import LegFormulas, along_tangent, formula_point, nearest_point, put_places
-from planner.joint.run import TubeRun
 
 PLACES = 33  # where a step is looked at first [-]
 NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
-AWAY = 1e-12  # rounding of distances to a vertex, and of (p - V).v, in tolerances and largest speeds [-]
 # Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
 PIECES = 4
 
@@ -230,30 +228,3 @@ def worst_shares(keeps, leg, h, state, jerk, place):
             end = keeps.legs.length[r] if ends else last if i == N - 1 else on_line[i + 1, 0]
             tube[i] = _of_line(keeps, r, c, on_line[i], end, budgets, work)
     return limit, tube
-
-
-def switches_missed(run: TubeRun, leg: Array, state: FloatArray) -> Array:
-    """(N,) where N steps run at the larger of two feeds and are nearer to the vertex between them than the
-    node at which they go over: of the nodes of the faster leg that are nearer, and of those within the budget
-    of the vertex on which the way to it is the wrong one, the leg that begins there; -1 of all others.
-
-    leg (N,), state (N+1, 3, A)
-    """
-    missed = np.full(len(leg), -1)
-    begins = np.flatnonzero(np.diff(leg)) + 1  # the nodes at vertices
-    edges = np.concatenate([[0], begins, [len(leg)]])
-    for k, node in enumerate(begins):
-        way, budget = run.switch[leg[node]], run.vertex_budget[leg[node]]
-        if way == 0.0:
-            continue
-        # of the faster leg, from the vertex on: backwards where the feed falls
-        part = np.arange(node, edges[k] - 1, -1) if way > 0 else np.arange(node, edges[k + 2] + 1)
-        off = state[part, 0] - run.vertex[leg[node]]
-        far, nearing = np.linalg.norm(off, axis=1), way * (off * state[part, 1]).sum(axis=1)
-        wrong = nearing > AWAY * budget * np.linalg.norm(run.velocity)
-        nearer = far < far[0] - AWAY * budget
-        nearer[0] = wrong[0]
-        if nearer.any():
-            at = part[nearer | (wrong & (far <= budget))]
-            missed[np.minimum(at, len(leg) - 1)] = leg[node]
-    return missed

@@ -30,6 +30,7 @@ from planner.joint.row_kinds import (
     NORMAL_ROWS,
     ORDER_MID,
     ORDER_NODE,
+    SIDE,
     SIXTH,
     SWITCH,
     THIRD,
@@ -94,6 +95,14 @@ def _put_switch_row(sizes, group, i, x, row):
     for k in range(axes):
         row[k] = group.switch[i] * x[axes + k]
         row[axes + k] = group.switch[i] * (x[k] - group.switch_at[i, k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _put_side_row(sizes, group, i, row):
+    """row (4 A + 1,) = the derivative of SIDE."""
+    clear(row)
+    for k in range(len(sizes.axes)):
+        row[k] = group.side[i, k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -201,6 +210,8 @@ def put_model(sizes, group, rows, i, x, u, W, row):
     if sizes.any_switch:
         _put_switch_row(sizes, group, i, x, row)
         _add_square(sizes, W, row, z[more + SWITCH] * per_s[more + SWITCH])
+        _put_side_row(sizes, group, i, row)
+        _add_square(sizes, W, row, z[more + SIDE] * per_s[more + SIDE])
     if sizes.any_own:
         for r in range(sizes.rows - more - NORMAL_ROWS):
             of = more + NORMAL_ROWS + r

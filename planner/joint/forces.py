@@ -14,6 +14,7 @@ from planner.joint.row_kinds import (
     NORMAL_ROWS,
     ORDER_MID,
     ORDER_NODE,
+    SIDE,
     SIXTH,
     SWITCH,
     THIRD,
@@ -84,8 +85,9 @@ def put_force(sizes, group, rows, i, x, u, first, aim, second, w):
             total += (v + h * (a + 0.5 * h * j)) * f_next + ((v + h * a) * arc - 0.5 * a * mid) * at_mid
     if sizes.any_switch:
         q = push_of(rows, i, more + SWITCH, first, aim, second) * group.switch[i]
+        beyond = push_of(rows, i, more + SIDE, first, aim, second)
         for k in range(axes):
-            w[k] += q * x[axes + k]
+            w[k] += q * x[axes + k] + beyond * group.side[i, k]
             w[axes + k] += q * (x[k] - group.switch_at[i, k])
     w[4 * axes] = total
     if sizes.any_own:
@@ -155,10 +157,11 @@ def put_slopes(sizes, group, rows, i, x, u, d, out):
             total += y * (d[2 * axes + k] - turn * d[axes + k])
         out[more + NORMAL_NODE] = total * group.normal_node[i]
     if sizes.any_switch:
-        total = none
+        total, beyond = none, none
         for k in range(axes):
             total += x[axes + k] * d[k] + (x[k] - group.switch_at[i, k]) * d[axes + k]
-        out[more + SWITCH] = total * group.switch[i]
+            beyond += group.side[i, k] * d[k]
+        out[more + SWITCH], out[more + SIDE] = total * group.switch[i], beyond
     if sizes.any_own:
         for r in range(sizes.rows - more - NORMAL_ROWS):
             total = none

@@ -68,6 +68,7 @@ class Group(NamedTuple):
     h_min: FloatArray  # (N, W)
     switch: FloatArray  # (N, W) over tolerance and pace
     switch_at: FloatArray  # (N, A, W) the vertex
+    side: FloatArray  # (N, A, W) over tolerance
     smooth: FloatArray  # (N, W) twice the weight of jerk^2, in time
     centre: FloatArray  # (N, W) in time, 0 where the row is not
     per_step: FloatArray  # (N, W) 1/step_max
@@ -111,7 +112,7 @@ def group_of(
     def limit(name: str, fill: float = 0.0) -> FloatArray:
         return stack([getattr(one.limits, name) for one in windows], fill)
 
-    legs, leg, switch_leg = _legs_of(windows)
+    legs, leg = _legs_of(windows)
     square = (legs.drift**2).sum(axis=1)
     start = legs.base + legs.radius[:, None] * legs.e1
     passed = [one.limits.passed for one in windows]
@@ -151,7 +152,8 @@ def group_of(
         h_max=limit("h_max", 2.0),
         h_min=limit("h_min", 0.5),
         switch=stack([one.limits.switch / (one.limits.room_node * one.limits.pace) for one in windows]),
-        switch_at=points([start[at] for at in switch_leg]),
+        switch_at=points([one.limits.switch_at for one in windows]),
+        side=points([one.limits.side / one.limits.room_node[:, None] for one in windows]),
         smooth=2.0 * limit("smooth") * limit("h"),
         centre=limit("centre") * limit("h") * on[:, 8 * axes + TUBE_NODE],
         per_step=1.0 / limit("step_max", 1.0),
@@ -187,8 +189,8 @@ def group_of(
     return sizes, group, bends, x, u, stack([one.place for one in windows])
 
 
-def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array], list[Array]]:
-    """The legs of all windows, and those of the steps of each window among them: their own, and `switch_leg`."""
+def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array]]:
+    """The legs of all windows, and those of the steps of each window among them."""
     first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
     curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
     legs = LegFormulas(
@@ -196,12 +198,7 @@ def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array], list[
     )
     offset = np.repeat(curves[:-1], np.diff(first))
     legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
-    begins = list(zip(windows, first[:-1], strict=True))
-    return (
-        legs,
-        [one.limits.leg + begin for one, begin in begins],
-        [one.limits.switch_leg + begin for one, begin in begins],
-    )
+    return legs, [one.limits.leg + begin for one, begin in zip(windows, first[:-1], strict=True)]
 
 
 def place_of(of: int, axes: int) -> Array:

@@ -87,6 +87,7 @@ def lanes_of(sizes, group):
         wide1(group.h_min, width),
         wide1(group.switch, width),
         wide2(group.switch_at, width, sizes.axes),
+        wide2(group.side, width, sizes.axes),
         wide1(group.smooth, width),
         wide1(group.centre, width),
         wide1(group.per_step, width),

@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, switches_missed, worst_shares
+from planner.joint.checks import Keeps, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import Guess, unit_of
 from planner.joint.interior_point import Tuning
@@ -36,6 +36,7 @@ from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
+from planner.joint.switches import Beside, no_rows_beside, switches_missed
 from planner.joint.window_solver import Asked
 
 # Steps of a run that is one window, of a window of others at most, on each side of a join that is searched once more, and
@@ -247,7 +248,7 @@ class _Search:
         run, smooth = self.run, self.settings.smooth
         tuning = Tuning(PULL, PROX, self.settings.gap, MISSED, self.settings.least, *START)
         tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
-        needed, beside, taken = near(run.laws, begun), np.full(hi - lo, -1), False
+        needed, beside, taken = near(run.laws, begun), no_rows_beside(hi - lo, len(run.axis)), False
         for number in range(TOLD if len(run.laws) else TIGHTENED):
             which = np.flatnonzero(needed)
             window = window_of(run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside)
@@ -255,7 +256,6 @@ class _Search:
             self.iterations.append(iterations)
             if not done:
                 break
-            rows_of_switch = int((beside >= 0).sum())
             over = self._taken(lo, hi, window, begun, beside)
             if over is None:
                 self.price[lo:hi] = step_prices(run, window, z)
@@ -264,7 +264,7 @@ class _Search:
                 if shorter <= SHORTENED * window.u[:, -1].sum():
                     break
                 continue
-            if (beside >= 0).sum() > rows_of_switch:
+            if not over.any():
                 continue
             if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
                 break
@@ -277,11 +277,13 @@ class _Search:
             needed |= (of_laws > NEAR).any(axis=0)
         return taken
 
-    def _taken(self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Array) -> FloatArray | None:
+    def _taken(
+        self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Beside
+    ) -> FloatArray | None:
         """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are
         faster they take their place. Else the shares (hi - lo, 1 + M) that they use of what rows watch in places, or
         about other places, only: the tolerance along curves, the laws; then `begun` becomes what was found. In `beside`
-        (hi - lo,) comes where rows of a change of feed are missing."""
+        comes where rows of a change of feed are missing; the shares are 0 then."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
@@ -302,15 +304,27 @@ class _Search:
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
             return np.column_stack([of_leg[leg], of_laws])
-        missed = switches_missed(run, leg, found)
-        if (missed >= 0).any():
-            beside[:] = np.where(beside >= 0, beside, missed)
+        missed = self._switches_missed(lo, hi, h, found, jerk)
+        if missed is not None:
+            beside.add(missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))
         if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = along
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False
         return None
+
+    def _switches_missed(
+        self, lo: int, hi: int, h: FloatArray, state: FloatArray, jerk: FloatArray
+    ) -> Beside | None:
+        """As the function, of the steps lo .. hi - 1 and those beside them: a vertex there may be nearest in these."""
+        guess, first = self.guess, max(lo - JOIN_WITHIN, 0)
+        before, behind = slice(first, lo), slice(hi, hi + JOIN_WITHIN)
+        leg = guess.leg[first : hi + JOIN_WITHIN]
+        h = np.concatenate([guess.h[before], h, guess.h[behind]])
+        state = np.concatenate([guess.state[before], state, guess.state[hi + 1 : hi + 1 + JOIN_WITHIN]])
+        jerk = np.concatenate([self.jerk[before], jerk, self.jerk[behind]])
+        return switches_missed(self.run, leg, h, state, jerk, slice(lo - first, hi - first))
 
 
 def keeps_of(run: TubeRun) -> Keeps:

@@ -55,9 +55,9 @@ def step_prices(run: TubeRun, window: StepWindow, z: FloatArray) -> FloatArray:
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_ROWS : rows.LAW_ROWS].sum(axis=1),
             more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, none, node),
             np.where(at_vertex, node, none),
-            more[:, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH]].sum(
-                axis=1
-            ),
+            more[
+                :, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH, rows.SIDE]
+            ].sum(axis=1),
             np.zeros((len(z), len(run.laws))),
         ]
     )

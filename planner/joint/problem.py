@@ -16,6 +16,7 @@ from planner.joint.normal_rows import turns_far
 from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
 from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
+from planner.joint.switches import Beside, no_rows_beside
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks
 # stay inside them.
@@ -53,7 +54,7 @@ def window_of(
     tight: FloatArray | None = None,
     smooth: float = 0.0,
     which: Array | None = None,
-    beside: Array | None = None,
+    beside: Beside | None = None,
 ) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
@@ -61,7 +62,7 @@ def window_of(
     tight  : (hi - lo, 1 + M) by what the room of control points and the laws are divided [-], >= 1; None for 1
     smooth : weight of the jerk against the time at least [-] (numbers.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
-    beside : (hi - lo,) of nodes beside a vertex where the feed changes, the leg that begins there; else -1
+    beside : nodes beside a vertex where the feed changes, and places that stand for one
     """
     cut = Window(guess, lo, hi)
     part, leg = slice(cut.lo, cut.hi), cut.leg[cut.lo : cut.hi]
@@ -70,8 +71,7 @@ def window_of(
     speed, acc, jerk = length / second, length / second**2, length / second**3
     # far from it, gaps of the kinematics would not get below the rounding of positions
     units = Units(second, length, cut.state[cut.lo, 0].copy())
-    near_by = leg if beside is None else np.append(leg, beside[beside >= 0])
-    of = slice(int(near_by.min()), int(near_by.max()) + 1)
+    of = slice(int(leg[0]), int(leg[-1]) + 1)
     inside = 1.0 - NARROWED * missed
     tight = np.ones((len(leg), 1 + len(run.laws))) if tight is None else tight
     which = np.flatnonzero(near(run.laws, cut)) if which is None else which
@@ -82,12 +82,11 @@ def window_of(
     )
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = (cut.place[part, :3] - run.offset[leg][:, None]) / length
+    beside = no_rows_beside(len(leg), len(run.axis)) if beside is None else beside
     limits = _limits(run, cut, units, (missed, tight), laws, smooth, beside)
     return StepWindow(
         legs=_legs(run, of, units),
-        limits=limits._replace(
-            leg=limits.leg - of.start, switch_leg=np.maximum(limits.switch_leg - of.start, 0)
-        ),
+        limits=limits._replace(leg=leg - of.start),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -124,7 +123,7 @@ def _limits(
     narrow: tuple[float, FloatArray],
     laws: tuple[LawRows, Array],
     smooth: float,
-    beside: Array | None,
+    beside: Beside,
 ) -> StepLimits:
     """The limits of the steps of a window, narrowed, smooth and beside as in `window_of`; `laws`: their rows, and which there
     are."""
@@ -168,9 +167,14 @@ def _limits(
     more[0, rows.NORMAL_ROWS] &= ~turns[0]
     more[-1, rows.NORMAL_ROWS + 1] &= ~turns[-1]
     more[turns | np.append(False, turns[:-1]), rows.NORMAL_NODE] = False
-    of_switch = np.where(at_vertex & (run.switch[leg] != 0.0), leg, -1 if beside is None else beside)
+    near_by = beside.leg >= 0
+    of_switch = np.where(near_by, beside.leg, np.where(at_vertex & (run.switch[leg] != 0.0), leg, -1))
+    switch_at = np.where(near_by[:, None], beside.at, run.vertex[leg])
     more[:, rows.SWITCH] = of_switch >= 0
     more[0, rows.SWITCH] = False
+    own_pace = pace(cut.state[lo : hi + 1, 1])
+    side = np.where(near_by, run.switch[of_switch], 0.0)[:, None] * cut.state[lo:hi, 1] / own_pace[:, None]
+    more[:, rows.SIDE] = more[:, rows.SWITCH] & near_by
     return StepLimits(
         leg=leg,
         passed=passed,
@@ -187,12 +191,13 @@ def _limits(
         turns=turns,
         laws=laws[0],
         step_max=STEP_SHARE * np.where(curved, np.minimum(run.step_max[leg], run.offset[-1]), 1.0) / length,
-        pace=pace(cut.state[lo : hi + 1, 1]) / speed,
+        pace=own_pace / speed,
         h=h,
         h_max=h * LONGER,
         h_min=h / LONGER,
         switch=np.where(of_switch >= 0, run.switch[of_switch], 0.0),
-        switch_leg=np.maximum(of_switch, 0),
+        switch_at=(switch_at - units.origin) / length,
+        side=side,
         smooth=jerk_weights(run, leg, cut.state[lo : hi + 1, 1], smooth),
         centre=np.full(hi - lo, CENTRE),
         aside=NARROWED * narrow[0],

@@ -17,9 +17,9 @@ VECTOR_OF_NODE = (
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
 # lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
-ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH = range(9, 14)
+ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH, SIDE = range(9, 15)
 # Rows with derivatives of their own: of the normal acceleration between nodes, and the laws.
-NORMAL_ROWS, LAW_ROWS = 14, 14 + BETWEEN
+NORMAL_ROWS, LAW_ROWS = 15, 15 + BETWEEN
 MORE_ROWS = LAW_ROWS
 VECTOR_OF_BOX = (J, A, MID, V)
 THIRD, SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
@@ -53,7 +53,8 @@ class StepLimits(NamedTuple):
     h_max: FloatArray  # (N,)
     h_min: FloatArray  # (N,)
     switch: FloatArray  # (N,) 1 at the vertex where the feed falls and before it, -1 where it rises and behind it; else 0
-    switch_leg: Array  # (N,) the leg that begins at that vertex
+    switch_at: FloatArray  # (N, A) the place that stands for that vertex
+    side: FloatArray  # (N, A) about the direction of the start there, with that sign, where a row beside is asked for; else 0
     smooth: FloatArray  # (N,) weight of (jerk/limit)^2 of every axis, against the step's time
     centre: FloatArray  # (N,) weight of the row of the node's tolerance, against the step's time
     aside: float  # how far inside its bound the row of that has to be [-]

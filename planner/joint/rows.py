@@ -38,7 +38,9 @@ others where a window needs them.
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
 on p and, through `Rows.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
-comes nearer to V once more on the other side, nodes there have the row too (checks.py).
+comes nearer to V once more on the other side, nodes there have the row too, about a place further on (switches.py).
+Round V, at one distance, v is across p - V everywhere: so those nodes may not be beyond the plane through V either that
+is across the direction t of the start, m (p - V).t <= 0.
 """
 
 from planner.base.kernels import CONTRACT, njit
@@ -65,6 +67,7 @@ from planner.joint.row_kinds import (
     NORMAL_ROWS,
     ORDER_MID,
     ORDER_NODE,
+    SIDE,
     SIXTH,
     SWITCH,
     THIRD,
@@ -200,10 +203,12 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
             g[more + ORDER_NODE], g[more + ORDER_MID] = order_node / group.pace[i], order_mid / group.pace[i]
             g[more + ARC] = arc * group.per_step[i] - 1.0
         if sizes.any_switch:
-            square = group.aside[0]
+            square, beyond = group.aside[0], 0.0 * h
             for k in range(axes):
-                square += group.switch[i] * y[V, k] * (y[P, k] - group.switch_at[i, k])
-            g[more + SWITCH] = square
+                off = y[P, k] - group.switch_at[i, k]
+                square += group.switch[i] * y[V, k] * off
+                beyond += group.side[i, k] * off
+            g[more + SWITCH], g[more + SIDE] = square, beyond
         if sizes.any_normal:
             _ball(axes, y, ACROSS, group.normal_node[i], more + NORMAL_NODE, g)
         if sizes.any_normal:

@@ -1,15 +1,16 @@
-"""Where the feed changes at a vertex: which block the motion of a search is on (joint/checks.py), and what is found on long arcs."""
+"""Where the feed changes at a vertex: which block the motion of a search is on (joint/switches.py), and what is found on long arcs."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from starts import MACHINE, begun_on
 
 from planner.geometry.build import toolpath_from_program
-from planner.joint.checks import switches_missed
 from planner.joint.own import TubeOwn
 from planner.joint.run import tube_runs_of
+from planner.joint.switches import switches_missed
 from planner.nc.reader import parse_program
 
 RADIUS = 8.0  # [mm]
@@ -38,16 +39,20 @@ def run_of(program):
     return run
 
 
-def along(run, begin, end, steps=40):
-    """Nodes that follow the path at a constant speed from the place `begin` [mm] before its vertex to `end` behind it: legs, state."""
+def places_along(run, begin, end, steps=40):
+    """Legs of steps, and nodes (n, A) that follow the path evenly from the place `begin` [mm] before its vertex to `end` behind it."""
     ends = run.length[0]
     places = [np.linspace(ends - begin, ends, steps), np.linspace(0.0, end, steps + 1)]
-    leg = np.repeat([0, 1], [steps - 1, steps])
     of = np.append(np.zeros(steps, dtype=int), np.ones(steps, dtype=int))
-    x = np.append(places[0], places[1][1:])
-    state = np.zeros((len(x), 3, len(run.axis)))
-    state[:, 0], state[:, 1] = run.points(of, x), 20.0 * run.tangents(of, x)
-    return leg, state
+    return np.repeat([0, 1], [steps - 1, steps]), run.points(of, np.append(places[0], places[1][1:]))
+
+
+def motion(leg, points, speed=20.0):
+    """A motion through points at about a speed [mm/s], as `switches_missed` takes it: leg, h, state, jerk."""
+    h = np.linalg.norm(np.diff(points, axis=0), axis=1) / speed
+    through = CubicSpline(np.append(0.0, np.cumsum(h)), points, bc_type="natural")
+    state = np.stack([through(through.x, order) for order in range(3)], axis=1)
+    return leg, h, state, through(through.x[:-1], 3)
 
 
 @pytest.mark.parametrize("degrees", [30, 179, 190, 300, 355, 359.9])
@@ -56,36 +61,81 @@ def test_the_path_itself_switches_at_the_vertex(degrees, feeds):
     """Its nearest place to the vertex is the vertex, however far the arc turns."""
     run = run_of(arc_and_line(degrees, *feeds))
     assert run.switch[1] == (1.0 if feeds[0] > feeds[1] else -1.0)
-    assert (switches_missed(run, *along(run, run.length[0], run.length[1])) < 0).all()
+    assert switches_missed(run, *motion(*places_along(run, run.length[0], run.length[1]), 50.0)) is None
 
 
 @pytest.mark.parametrize("degrees", [30, 300])
 @pytest.mark.parametrize(("feeds", "late"), [((3000, 1200), -1), ((1200, 3000), 1)])
 def test_a_node_on_the_slower_side_of_the_nearest_place_is_not_kept(degrees, feeds, late):
     """The node of the vertex a fifth of its budget behind it where the feed falls, before it where the feed rises: what lies between
-    runs at the larger F, though the motion is on the other block."""
+    runs at the larger F, though the motion is on the other block. Where it keeps the smaller F there nothing is missed."""
     run = run_of(arc_and_line(degrees, *feeds))
-    leg, state = along(run, 5.0, 5.0)
+    leg, points = places_along(run, 5.0, 5.0)
     node = int(np.flatnonzero(np.diff(leg))[0]) + 1
-    moved = state.copy()
-    moved[:, 0] -= late * 0.2 * run.vertex_budget[1] * state[node, 1] / np.linalg.norm(state[node, 1])
-    assert (switches_missed(run, leg, moved) >= 0).any()
-    on_the_other = state.copy()
-    on_the_other[:, 0] -= moved[:, 0] - state[:, 0]
-    assert (switches_missed(run, leg, on_the_other) < 0).all()
+    ahead = points[node + 1] - points[node - 1]
+    moved = -late * 0.2 * run.vertex_budget[1] * ahead / np.linalg.norm(ahead)
+    missed = switches_missed(run, *motion(leg, points + moved, 50.0))
+    assert missed is not None
+    assert missed.leg[node] == 1
+    assert switches_missed(run, *motion(leg, points - moved, 50.0)) is None
+    assert switches_missed(run, *motion(leg, points + moved, 19.0)) is None
 
 
 @pytest.mark.parametrize("degrees", [30, 300])
 def test_a_motion_that_was_nearer_before_its_node_is_not_kept(degrees):
     """It comes as near as half the budget, goes away and comes back within the budget: the judge's switch is the first time."""
     run = run_of(arc_and_line(degrees, 3000, 1200))
-    leg, state = along(run, 5.0, 5.0)
+    leg, points = places_along(run, 5.0, 5.0)
     node = int(np.flatnonzero(np.diff(leg))[0]) + 1
     budget = run.vertex_budget[1]
-    onward = state[node, 1] / np.linalg.norm(state[node, 1])
-    state[node - 1, 0], state[node - 1, 1] = run.vertex[1] + 0.5 * budget * onward, 20.0 * onward
-    state[node, 0], state[node, 1] = run.vertex[1] + 0.9 * budget * onward, -20.0 * onward
-    assert (switches_missed(run, leg, state) >= 0).any()
+    ahead = points[node + 1] - points[node]
+    onward = ahead / np.linalg.norm(ahead)
+    points[node - 1], points[node] = (
+        run.vertex[1] + 0.5 * budget * onward,
+        run.vertex[1] + 0.9 * budget * onward,
+    )
+    assert switches_missed(run, *motion(leg, points, 50.0)) is not None
+
+
+@pytest.mark.parametrize("feeds", [(3000, 1200), (1200, 3000)])
+def test_between_nodes_as_many_places_tell(feeds):
+    """Random motions round the vertex, against 4,000 places of every step: whether the faster leg comes nearer than the slower one."""
+    run, counts = run_of(arc_and_line(30, *feeds)), {True: 0, False: 0}
+    random, fine = np.random.default_rng(3), np.linspace(0.0, 1.0, 4001)[:, None]
+    for _ in range(60):
+        leg = np.repeat([0, 1], random.integers(1, 4, 2))
+        points = run.vertex[1] + random.normal(size=(len(leg) + 1, len(run.axis))) * run.vertex_budget[1]
+        leg, h, state, jerk = motion(leg, points, 500.0)
+        p, v, a = (state[:-1, None, order] for order in range(3))
+        t = fine * h[:, None, None]
+        apart = np.linalg.norm(p + t * (v + t * (a / 2 + t * jerk[:, None] / 6)) - run.vertex[1], axis=2).min(
+            axis=1
+        )
+        of = [apart[leg == one].min() for one in (0, 1)]
+        fast, slow = of if feeds[0] > feeds[1] else of[::-1]
+        if abs(fast - slow) > 1e-6:
+            missed = switches_missed(run, leg, h, state, jerk) is not None
+            assert missed == (fast < slow)
+            counts[missed] += 1
+    assert min(counts.values()) > 10
+
+
+def test_a_node_before_a_step_that_comes_back_is_to_be_further_from_the_vertex():
+    """At both nodes of the step the way is away from the vertex; between them it is nearer. About the place that is told the first node
+    is on the wrong side."""
+    run = run_of(arc_and_line(30, 1200, 3000))
+    leg, h, state = np.array([0, 1]), np.full(2, 1e-3), np.zeros((3, 3, len(run.axis)))
+    along, across = np.eye(len(run.axis))[:2]
+    begin = run.vertex[1] + run.vertex_budget[1] * across
+    jerk = np.outer([-1e9, 3e8], across)
+    state[1] = begin, 21.0 * along + 1e-3 * across, -4e4 * across
+    for node, t, one in ((0, -h[0], jerk[0]), (2, h[1], jerk[1])):
+        (p, v, a), j = state[1], one
+        state[node] = p + t * (v + t * (a / 2 + t * j / 6)), v + t * (a + t * j / 2), a + t * j
+    assert (((state[1:, 0] - run.vertex[1]) * state[1:, 1]).sum(axis=1) > 0.0).all()
+    missed = switches_missed(run, leg, h, state, jerk)
+    assert missed is not None
+    assert ((begin - missed.at[1]) * state[1, 1]).sum() < 0.0
 
 
 @pytest.mark.parametrize("program", [arc_and_line(285, 2400, 900), line_and_arc(900, 2400)])
@@ -106,4 +156,4 @@ def test_where_a_faster_leg_comes_nearer_the_search_gets_rows_beside_the_vertex(
     assert found.windows == 1
     p, v, a = found.steps.position, found.steps.velocity, found.steps.acceleration
     state = np.concatenate([np.stack([p, v, a], axis=1), guess.state[-1:]])
-    assert (switches_missed(run, guess.leg, state) < 0).all()
+    assert switches_missed(run, guess.leg, found.steps.h, state, found.steps.jerk) is None

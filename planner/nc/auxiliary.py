@@ -177,11 +177,11 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
         state.tool_loaded = state.tool_selected
         table.add_event("M", 6.0, line)
         table.add(Kind.STOP, line, state)
-        text = "a tool change is a full stop of the motion that moves nothing"
+        text = "tool change: a full stop, moves nothing"
         if state.change_timed:
             findings.note(text, line)
         else:
-            why = "it has no time, which [times] tool_change of the machine file gives"
+            why = "its time is not included, [times] tool_change of the machine file gives it"
             findings.assume(f"{text}; {why}", line, block.at["tool change"])
     table.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:

@@ -46,8 +46,8 @@ _ALWAYS = frozenset("XYZFST$@^" + codes.PARKABLE)  # words that need no code bes
 _TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
 _BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
 NAME_SHOWN = 20  # characters of a name in a note
-PROGRAM_NAME = Assumption("program name{|s}", "nothing is done with them")
-PROGRAM_NUMBER = Assumption("program number{|s}", "kept, nothing is done with them")
+PROGRAM_NAME = Assumption("program name{|s}", "without effect")
+PROGRAM_NUMBER = Assumption("program number{|s}", "kept, without effect")
 _UNREADABLE = {
     Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
     Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",

@@ -60,11 +60,13 @@ class FaultList(MadeWhenAsked[Fault]):
 
 
 class Note(NamedTuple):
-    """A note, its line, and whether it is an assumption that may change geometry or time."""
+    """A note, its line, whether it is an assumption that may change geometry or time, and whether it comes before
+    the others, because the path may be another one altogether."""
 
     line: int
     text: str
     changes: bool
+    grave: bool = False
 
 
 class Notes(NamedTuple):
@@ -85,6 +87,7 @@ class Findings:
         self._reports: list[tuple[int, str]] = []  # of the chunk that is being read
         self._reported: set[tuple[int, str]] = set()
         self._notes: dict[tuple[bool, str], list[int]] = {}  # in their order: first line, times
+        self._grave: set[str] = set()
 
     def report(self, word: int, message: str) -> None:
         """Keep a fault of a word of the chunk, by its index."""
@@ -103,8 +106,8 @@ class Findings:
         """Keep what a user should know of a line, and what changes neither geometry nor time."""
         self._notes.setdefault((False, text), [line, 0])[1] += 1
 
-    def assume(self, text: str, line: int, word: int | None = None) -> None:
-        """Keep what was assumed on a line, and may change geometry or time.
+    def assume(self, text: str, line: int, word: int | None = None, *, grave: bool = False) -> None:
+        """Keep what was assumed on a line, and may change geometry or time; `grave` as in `Note`.
 
         word : index in the chunk; strict reading refuses it there. None where strict reading does not come
                by.
@@ -113,14 +116,21 @@ class Findings:
             self.report(word, f"{text} (assumed without --strict)")
         else:
             self._notes.setdefault((True, text), [line, 0])[1] += 1
+            if grave:
+                self._grave.add(text)
 
     def notes(self, more: Sequence[Note]) -> Notes:
         """Assumptions and notes, each once with its first line and how often, and `more`, by line."""
         found = [
-            Note(line, f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}", changes)
+            Note(
+                line,
+                f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}",
+                changes,
+                text in self._grave,
+            )
             for (changes, text), (line, times) in self._notes.items()
         ]
-        ordered = sorted([*found, *more], key=lambda note: note.line)
+        ordered = sorted([*found, *more], key=lambda note: (not note.grave, note.line))
         return Notes(
             tuple(note.text for note in ordered if note.changes),
             tuple(note.text for note in ordered if not note.changes),

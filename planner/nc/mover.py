@@ -93,7 +93,7 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
     tool = state.tools.get(number)
     if tool is None or tool.diameter == 0.0:
         text = f"tool {number} has no diameter in the machine file: {name} does not move the path"
-        findings.assume(text, block.line, block.at["cutter compensation"])
+        findings.assume(text, block.line, block.at["cutter compensation"], grave=True)
     return 0.0 if tool is None else tool.diameter
 
 

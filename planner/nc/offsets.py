@@ -96,14 +96,14 @@ def take_system(state: State, block: Block, findings: Findings) -> None:
     state.system = code
     if state.system not in state.systems and state.system != 540:
         text = f"{system_name(state.system)} has no offset in the machine file: 0"
-        findings.assume(text, block.line, block.at["work offset"])
+        findings.assume(text, block.line, block.at["work offset"], grave=True)
 
 
 def assume_origin(state: State, what: str, block: Block, findings: Findings) -> None:
     """Say that `what` goes by machine coordinates where those of G54 are not known."""
     if state.system == 540 and 540 not in state.systems:
         text = f"{what} is in machine coordinates, and G54 has no offset in the machine file: 0"
-        findings.assume(text, block.line, block.at["one-shot"])
+        findings.assume(text, block.line, block.at["one-shot"], grave=True)
 
 
 def shift_origin(state: State, block: Block) -> None:

@@ -22,9 +22,9 @@ from planner.report.tables import info_table
 
 # A line that moves nothing between two moves, and the note about it: the motion is that of the two moves.
 HARMLESS = [
-    ("O1000", "1 program number: kept, nothing is done with them; first O1000 line 2"),
+    ("O1000", "1 program number: kept, without effect; first O1000 line 2"),
     ("O1000 (BRACKET)", "1 program number: kept"),
-    (":1000", "1 program number: kept, nothing is done with them; first :1000 line 2"),
+    (":1000", "1 program number: kept, without effect; first :1000 line 2"),
     ("M428", "1 M code that this reader does not know: assumed not to move anything; first M428 line 2"),
     ("M10\nM11\nm10", "3 M codes that this reader does not know: assumed not to move anything; first M10 line 2"),
     ("M123 P5 Q2", "1 M code that this reader does not know"),

@@ -235,10 +235,10 @@ def test_a_motion_code_alone_moves_nothing() -> None:
 def test_notes_say_what_is_missing() -> None:
     program = parse_program("T3 M6\nG43 H3\nG56\nG28\nG28\nG64 Q1 P1\nG64 Q1 P1\nG43 H3", machine())
     assert program.notes == (
-        "line 1: a tool change is a full stop of the motion that moves nothing; it has no time, which [times] tool_change of the "
-        "machine file gives",
-        "line 2: tool 3 has no length in the machine file: 0 (2 times)",
         "line 3: G56 has no offset in the machine file: 0",
+        "line 1: tool change: a full stop, moves nothing; its time is not included, [times] tool_change of the "
+        "machine file gives it",
+        "line 2: tool 3 has no length in the machine file: 0 (2 times)",
         "line 4: G28 has no position in the machine file: machine zero (2 times)",
         "line 4: no G20 or G21 before the first move: mm",
         "line 6: G64 Q is not used: the tolerance of P bounds every deviation (2 times)",

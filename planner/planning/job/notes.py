@@ -17,16 +17,18 @@ TOLERANCE_OF_PART = 0.02
 
 
 def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[str]:
-    """Notes of the reader, on numbers that are hardly meant, on feeds that the machine lowers, and on a
-    tolerance that is large beside the part."""
+    """Notes on a tolerance that is large beside the part, of the reader, on numbers that are hardly meant, and on
+    feeds that the machine lowers."""
+    large = tolerance_notes(toolpath)
     return [
+        *large,
         *program.notes,
         *unit_notes(machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
         *_extruder_notes(toolpath),
         *_radius_notes(toolpath, machine),
-        *(_tolerance_notes(toolpath) or short_block_notes(toolpath)),
+        *([] if large else short_block_notes(toolpath)),
     ]
 
 
@@ -78,7 +80,8 @@ def _radius_notes(toolpath: Toolpath, machine: Machine) -> list[str]:
     ]
 
 
-def _tolerance_notes(toolpath: Toolpath) -> list[str]:
+def tolerance_notes(toolpath: Toolpath) -> list[str]:
+    """A sentence where the tolerance is more than `TOLERANCE_OF_PART` of the part's largest extent."""
     if not len(toolpath):
         return []
     moved = ~toolpath.rapid if not toolpath.rapid.all() else np.ones(len(toolpath), bool)

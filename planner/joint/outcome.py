@@ -9,10 +9,10 @@ from planner.joint.motion import Steps
 SOLVED = (Status.OPTIMAL, Status.ACCEPTABLE)
 # What ipopt returns, as status and sentence.
 OUTCOMES = {
-    "Solve_Succeeded": (Status.OPTIMAL, "the best motion near its start, geometry and feed together"),
+    "Solve_Succeeded": (Status.OPTIMAL, "path and feed optimised together"),
     "Solved_To_Acceptable_Level": (
         Status.ACCEPTABLE,
-        "the best motion near its start, geometry and feed together, to about 1e-4 of its time",
+        "path and feed optimised together, to about 1e-4 of its time",
     ),
     "Maximum_Iterations_Exceeded": (
         Status.ITERATION_LIMIT,

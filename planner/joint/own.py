@@ -64,7 +64,7 @@ SHORTENED = 1e-3
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
 KEPT = "no faster motion was found there"
-FOUND = "the best motion near its start, geometry and feed together"
+FOUND = "path and feed optimised together"
 
 
 @dataclass(frozen=True)

@@ -314,7 +314,7 @@ def said(
     took = [one for k, one in enumerate(found) if k not in stays]
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
-    text += f"; its start ({what}) took {first.motion.end:.6g} s"
+    text += f"; before that ({what}) {first.motion.end:.6g} s"
     if stays:
         run, line = found[stays[0]].run, job.toolpath.line
         why = why or found[stays[0]].sentence

@@ -87,7 +87,7 @@ def test_linear_and_rotary_axes_that_move_together_are_searched() -> None:
     """Geometry and feed together, with F as the speed in x, y and z: nothing of it is broken, and the mirrored job takes as long."""
     text = "G21 F2700\nG1 X11 A5\nX19 Y7 A12\nX33 Y10 Z2 A16\nX41 Y22 A19\nX28 Y31 A11\n"
     plan = planned(text, machine_of("xyza"), "optimal")
-    assert "geometry and feed together" in plan.sentence
+    assert "path and feed optimised together" in plan.sentence
     assert 0.999 < plan.verdict.limits["feed"].ratio <= 1.0
     other = planned(text.replace("Y", "Y-").replace("A", "A-"), machine_of("xyza"), "optimal")
     assert other.cycle_time == pytest.approx(plan.cycle_time, rel=1e-4)

@@ -9,7 +9,7 @@ import planner
 from planner.planning.job.plan import Plan
 
 TURNS = "G21\nG64 P0.02 F6000\nG1 X14\nG1 X22 Y9\nG2 X30 Y17 I8 J0\nG1 X9 Y26\nG1 X0 Y4\n"
-TOGETHER = "geometry and feed together"
+TOGETHER = "path and feed optimised together"
 
 
 class Guard(planner.PathLimit):

@@ -178,7 +178,7 @@ def test_a_run_that_gets_no_spline_is_searched_like_the_others():
     plan = planner.plan(planner.read_program(text=text, machine=machine), machine, effort="quick", log=told)
     assert plan.verdict is not None
     assert plan.verdict.passed, plan.verdict.faults
-    assert plan.sentence.startswith("the best motion near its start, geometry and feed together")
+    assert plan.sentence.startswith("path and feed optimised together")
     assert "stays" not in plan.sentence
     assert searched(told)["alone"] == 0
 

@@ -78,7 +78,7 @@ def test_a_spline_takes_as_long_as_its_fine_chords() -> None:
     curves = "G1 X20\n" + "\n".join(bend.block() for bend in bends) + "\nG1 Y40"
     lines = "G1 X20\n" + "\n".join(bend.chords(60) for bend in bends) + "\nG1 Y40"
     made = planned(curves, "optimal")
-    assert made.sentence.startswith("the best motion near its start")
+    assert made.sentence.startswith("path and feed optimised together")
     assert time_of(made) == pytest.approx(time_of(planned(lines, "optimal")), rel=5e-4)
 
 

@@ -34,7 +34,7 @@ def test_more_effort_is_never_slower(program):
     assert normal.trajectory.cycle_time <= quick.trajectory.cycle_time * (1 + 1e-4)
     assert best.trajectory.cycle_time <= normal.trajectory.cycle_time * (1 + 1e-4)
     for made in (quick, normal, best):
-        assert "geometry and feed together" in made.sentence
+        assert "path and feed optimised together" in made.sentence
         assert 0.9 < made.grid.share.max() + made.grid.share[-2] <= 1.0 + 1e-12
         assert made.prices is not None
     np.testing.assert_allclose(best.trajectory.position[-1], best.toolpath.end[-1], atol=1e-9)
@@ -45,8 +45,8 @@ def test_where_jerk_is_what_limits_the_search_finds_what_splines_have_not():
     splines, default = plan(problems.zigzag(6), MACHINE, geometry="spline"), plan(problems.zigzag(6), MACHINE)
     assert splines.verdict.passed
     assert default.verdict.passed
-    assert "geometry and feed together" in default.sentence
-    assert "geometry and feed together" not in splines.sentence
+    assert "path and feed optimised together" in default.sentence
+    assert "path and feed optimised together" not in splines.sentence
     assert default.trajectory.cycle_time < splines.trajectory.cycle_time * (1 - 1e-2)
 
 

@@ -28,11 +28,32 @@ from planner.commands.verify import verify_command
 # BadParameter.
 UsageError: Any = typer.BadParameter.__mro__[1]
 _NUMBER = re.compile(r"Input should be a valid (number|integer).*|'.*' is not a valid (float|integer)\.?")
+# Options that most people need; a command with more than `LONG` of them has the others below (count of rows).
+FIRST = ("machine", "tolerance", "output", "report", "units", "verbose", "changes", "vary")
+LONG = 16
 _LEAST = re.compile(r"Input should be greater than or equal to (\S+)")
 
 
 class PlainCommand(TyperCommand):
     """A command whose usage faults are in plain words."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """The options of a long list that a machinist needs first, the others under "Advanced"."""
+        shown = [
+            (one.name in FIRST or one.param_type_name == "argument", one.get_help_record(ctx))
+            for one in self.get_params(ctx)
+        ]
+        parts = {"Options": [line for first, line in shown if first and line]}
+        parts["Advanced"] = [line for first, line in shown if not first and line]
+        if len(shown) <= LONG:
+            parts = {"Options": parts["Options"] + parts["Advanced"]}
+        for title, lines in parts.items():
+            if lines:
+                formatter.write_paragraph()
+                formatter.write_heading(title)
+                formatter.indent()
+                formatter.write_dl(lines)
+                formatter.dedent()
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As in the base class; raises its UsageError with a message of ours."""
@@ -108,7 +129,7 @@ def common(
 # Every command with the line that `planner --help` has of it; its docstring is what its own --help says.
 for name, (command, line) in {
     "plan": (plan_command, "Plan and verify the motion of a program, or of several."),
-    "what-if": (what_if_command, "What other limits would change: foretold and planned again."),
+    "what-if": (what_if_command, "What other limits would save: estimated, then planned."),
     "sweep": (sweep_command, "Plan a program over ranges of limits, into a table."),
     "compare": (compare_command, "Plan a program with several methods, side by side."),
     "verify": (verify_command, "Judge a trajectory file, from any source."),

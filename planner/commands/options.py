@@ -122,6 +122,15 @@ TrajectoryArgument = Annotated[
         metavar="TRAJECTORY", help="trajectory file (.parquet, .csv, .npz), or directory that 'plan -o' wrote"
     ),
 ]
+UnitsOption = Annotated[
+    str | None,
+    _choice(
+        "--units",
+        functools.partial(names.known_name, "units", names=("mm", "inch")),
+        "mm or inch, for what is shown (default: as in the program); feeds are per minute",
+        "mm|inch",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
 ThreadsOption = Annotated[
     int | None,

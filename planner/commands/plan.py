@@ -62,8 +62,10 @@ def plan_command(
         bool, typer.Option("--corners", help="list every programmed corner with its values of eq. 18 to 20")
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("-v", "--verbose", help="say on standard error what planning tries, step by step")
+        bool,
+        typer.Option("-v", "--verbose", help="print everything, and on standard error the steps of planning"),
     ] = False,
+    units: options.UnitsOption = None,
     trace: Annotated[
         Path | None,
         typer.Option("--trace", metavar="FILE", help="write what planning tried into FILE (JSON)"),
@@ -76,8 +78,7 @@ def plan_command(
     how: dict[str, Any],
     reading: Reading,
 ) -> None:
-    """Plan the motion of a program, sample it and verify it; of several ones side by side, each into
-    DIR/NAME."""
+    """Plan and verify one or more programs; several ones go into DIR/NAME each."""
     nowhere = output is None
     for wrong, why in (
         (plot and nowhere, f"--plot writes its pictures {INTO_OUTPUT}"),
@@ -85,6 +86,7 @@ def plan_command(
         (file_format is not None and nowhere, f"--format is the format of the trajectory {IN_OUTPUT}"),
         (corners and as_json, "--corners adds to the table, and --json prints none; leave one out"),
         (verbose and quiet, "--verbose tells what --quiet keeps quiet; leave one out"),
+        (verbose and as_json, "--verbose adds to the table, and --json prints all; leave one out"),
         (
             force and nowhere and trace is None,
             "--force is for files, and without -o or --trace there are none; leave one out",
@@ -112,6 +114,8 @@ def plan_command(
     from planner.report.export import SUMMARY, check_places, write_plan
     from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary
+    from planner.report.tables import assumed_lines, brief_table, corners_table, plan_table
+    from planner.report.units import units_of
 
     form = file_format or options.Format.parquet
     if output is not None:
@@ -145,9 +149,15 @@ def plan_command(
     if as_json:
         say_json(said)
     else:
-        _show(result, said["notes"], corners=corners)
-        for name in written:
-            say(str(output / name) if output else name)
+        shown_in = units_of(result.program, units)
+        if verbose:
+            show(*assumed_lines(result.program.assumptions), plan_table(result, said["notes"]))
+        else:
+            show(brief_table(result, shown_in, said["notes"], tolerance))
+        if corners:
+            show("", corners_table(result.corners, shown_in) or NO_CORNERS)
+        if written:
+            say(f"files in {output}: {', '.join(written)}")
     if result.trajectory is None:
         untouched = f"; {output} was not touched" if output is not None else ""
         raise NotSolvedError(f"{result.sentence}{untouched}")
@@ -165,11 +175,3 @@ def _trace(steps: Trace, plan: Plan) -> dict[str, Any]:
         "sentence": plan.sentence,
         "steps": steps.as_json(),
     }
-
-
-def _show(result: Plan, notes: list[str], *, corners: bool) -> None:
-    from planner.report.tables import assumed_lines, corners_table, plan_table
-
-    show(*assumed_lines(result.program.assumptions), plan_table(result, notes))
-    if corners:
-        show("", (corners_table(result.corners) if result.corners is not None else None) or NO_CORNERS)

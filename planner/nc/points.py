@@ -8,6 +8,7 @@ straight. Numbers are written so that they read back exactly.
 
 import dataclasses
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from planner.nc.program import Kind, PathControl, Program, SplineTable
 
 AXES = ("x", "y", "z")
 SOURCE, CURVE = "<points>", "NURBS"  # what messages call programs of points and of curves
+UNIT_WORD = re.compile(rb"^[^(;\n]*?[Gg](20|21)\b", re.MULTILINE)  # the first of each line of an NC text
 _FORMAT = "points"
 _CURVES = tuple(field.name for field in dataclasses.fields(SplineTable))
 

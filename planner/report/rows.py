@@ -195,19 +195,19 @@ def price_rows(prices: PriceList, cycle_time: float) -> list[tuple[str, str]]:
         told = f"saves {NOTHING} to speak of"
     rows.append((f"{more} tolerance", told))
     if prices.corners is not None and len(prices.corners):
-        rows.append((f"{more} at line", f"saves, in ms, {_by_line(prices.corners)}"))
+        rows.append(("most sensitive corners", f"ms saved by {more} tolerance: {_by_line(prices.corners)}"))
     return rows
 
 
 def _by_line(corners: DearCorners) -> str:
-    """The time that more tolerance at the corners saves, by line: "7: 4.4, 4: 2.2"; corners that a loop
+    """The time that more tolerance at the corners saves, by line: "line 7: 4.4, line 4: 2.2"; corners that a loop
     passes again are added up."""
     passed: dict[int, list[float]] = {}
     for line, saved in zip(corners.line.tolist(), corners.saved.tolist(), strict=True):
         passed.setdefault(line, []).append(saved / MILLISECOND)
     ranked = sorted(passed.items(), key=lambda one: -sum(one[1]))
     return ", ".join(
-        f"{line}: {sum(saved):.2g}" + (f" at {len(saved)} corners" if len(saved) > 1 else "")
+        f"line {line}: {sum(saved):.2g}" + (f" at {len(saved)} corners" if len(saved) > 1 else "")
         for line, saved in ranked
     )
 
@@ -217,6 +217,8 @@ def _seconds(prices: PriceList, name: str) -> str:
     if name not in prices.hints:
         return f"{prices.saved[name]:.3g} s"
     least, most = prices.ranges[name]
+    if name != "tolerance":
+        least = max(least, 0.0)  # more of a limit never costs time
     return f"{least:.2g} to {most:.2g} s"
 
 

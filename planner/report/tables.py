@@ -14,6 +14,7 @@ from planner.base.sizes import SIZES
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
 from planner.machine import LINEAR_AXES, Machine
 from planner.nc.info import PLACES_SHOWN
+from planner.report.brief import brief_rows, note_lines
 from planner.report.rows import (
     FAILED,
     PASSED,
@@ -26,6 +27,7 @@ from planner.report.rows import (
     smoothing,
     verdict_rows,
 )
+from planner.report.units import UNITS, Units
 
 if TYPE_CHECKING:
     from planner.nc.faults import Fault
@@ -56,6 +58,19 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return titled(title, table, *(Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)))
 
 
+def brief_table(
+    plan: Plan, units: Units, notes: Sequence[str] | None = None, tolerance: float | None = None
+) -> Group:
+    """The plan in eight lines, as report/brief.py says; `notes` and what else it takes as there, None for those of
+    the plan."""
+    table = pairs_table()
+    _add(table, brief_rows(plan, units, tolerance))
+    above, below = note_lines(plan, plan.notes if notes is None else notes)
+    title = f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
+    first = [Text(line, style="yellow") for line in above]
+    return Group(*first, titled(title, table, *map(Text, below)))
+
+
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
     """The assumptions about a program that may change geometry or time: the first lines of what a command
     prints; at most so many."""
@@ -72,10 +87,10 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
     return titled(title, table)
 
 
-def corners_table(corners: CornerCheck) -> Table | None:
-    """Eq. 18-20 at every programmed corner; of many corners those closest to the limits. None without
-    corners."""
-    if not len(corners):
+def corners_table(corners: CornerCheck | None, units: Units = UNITS["mm"]) -> Table | None:
+    """Eq. 18-20 at every programmed corner, feeds in `units`; of many corners those closest to the limits. None
+    without corners."""
+    if corners is None or not len(corners):
         return None
     speed, budget = corners.told()
     closest = np.maximum(speed, budget)
@@ -85,19 +100,19 @@ def corners_table(corners: CornerCheck) -> Table | None:
     for name in (
         "line",
         "angle\ndeg",
-        "feed\nmm/s",
+        f"feed\n{units.feed}",
         "eq. 19\nfeed / its own",
         "eq. 18\nerror / budget",
-        "eq. 20\nmm/s",
+        f"eq. 20\n{units.feed}",
         "feed /\neq. 20",
     ):
         table.add_column(name, justify="right")
     for k in sorted(worst):
         known = (
-            f"{corners.feed_planned[k]:.3f}",
+            f"{units.per_feed * corners.feed_planned[k]:.4g}",
             ratio_text(speed[k]),
             ratio_text(budget[k]),
-            f"{corners.feed_paper[k]:.3f}",
+            f"{units.per_feed * corners.feed_paper[k]:.4g}",
             f"{corners.gain[k]:.3f}" if np.isfinite(corners.gain[k]) else "-",
         )
         angle = f"{np.rad2deg(corners.theta[k]):.2f}"
@@ -209,7 +224,8 @@ def machines_table(machines: Iterable[Machine]) -> Table:
 def _add(table: Table, rows: Iterable[tuple[str, str]]) -> None:
     """Rows as they are, the verdict in its colour."""
     for label, text in rows:
-        style = {PASSED: "green", FAILED: "bold red"}.get(text, "") if label == VERDICT else ""
+        styles = {PASSED: "green", FAILED: "bold red"}
+        style = styles.get(text.partition(";")[0], "") if label == VERDICT else ""
         table.add_row(Text(label), Text(text, style=style))
 
 

@@ -51,9 +51,9 @@ def test_unsolved_plan() -> None:
 def test_corners() -> None:
     said = text(corners_table(make_corners()))
     assert [line.split()[:3] for line in said.splitlines()[-3:]] == [
-        ["3", "90.00", "14.000"],
-        ["4", "90.00", "13.000"],
-        ["5", "90.00", "0.000"],
+        ["3", "90.00", "840"],
+        ["4", "90.00", "780"],
+        ["5", "90.00", "0"],
     ]
     assert "1.400" in said  # over eq. 20
     assert corners_table(make_corners(turns=False)) is None

@@ -139,7 +139,7 @@ def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: fl
         return Forecast(slope / n * gain, slope / n * gain)
     more = MORE_TOLERANCE / present if name == TOLERANCE else MORE_LIMIT
     least, most = (saved * gain / (1.0 - (1.0 + more) ** -n) for saved in prices.ranges[name])
-    return Forecast(-most, -least)
+    return Forecast(-most, -least if name == TOLERANCE else min(-least, 0.0))  # more of a limit costs no time
 
 
 REASONS_SHOWN = 5  # why points did not pass
@@ -147,7 +147,7 @@ REASONS_SHOWN = 5  # why points did not pass
 
 def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
     """Rows of `what_if` side by side, followed by the reason for each one that did not pass."""
-    headings = ("cycle\ntime s", "change\ns", "foretold\ns", "change\n%", "contour\nµm")
+    headings = ("cycle\ntime s", "change\ns", "estimate\ns", "change\n%", "contour\nµm")
     table = outcomes_table(["change", "from"], headings)
     said = []
     time = rows[0].row.cycle_time

@@ -26,7 +26,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.chords import polyline
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.nc.points import own_text
+from planner.nc.points import UNIT_WORD, own_text
 from planner.nc.program import FEED_MOVES, Kind, PathControl, Program
 from planner.planning.job.beside import codes_of
 
@@ -38,7 +38,6 @@ FIRST_FEED = 25.0  # of rapids before the first F word, as Klipper begins [mm/s]
 _COMMENT = re.compile(rb"^[ \t]*(?:N\d+[ \t]*)?(?:\(([^)\n]*)\)|;([^\n]*?))[ \t]*\r?$", re.MULTILINE)
 _LAYER = re.compile(r"(?:LAYER|layer):?[ _]*(-?\d+)|LAYER_CHANGE|CHANGE_LAYER")
 _F_WORD = re.compile(rb"^[^(;\n]*?[Ff][ \t]*(\d*\.?\d+)", re.MULTILINE)
-_UNIT = re.compile(rb"^[^(;\n]*?[Gg](20|21)\b", re.MULTILINE)
 _JOINING = re.compile(rb"^[^(;\n]*?[Gg]64[^(;\n]*?[Qq][ \t]*(\d*\.?\d+)", re.MULTILINE)
 
 
@@ -99,9 +98,9 @@ def control_times(
         seconds=float(of_block.sum()),
         dwells=dwells,
         moves=moves,
-        tools=_by_name(of_block, tools_of(program)),
-        operations=_by_name(of_block, operations),
-        layers=_by_name(of_block, layers),
+        tools=by_name(of_block, tools_of(program)),
+        operations=by_name(of_block, operations),
+        layers=by_name(of_block, layers),
         assumed=assumed,
     )
 
@@ -191,7 +190,7 @@ def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:
     """Q of G64 [mm], which is P where a program gives P alone; 0 without one."""
     given = _JOINING.findall(text)
     if given:
-        return float(given[-1]) * (MM_PER_INCH if _UNIT.findall(text)[:1] == [b"20"] else 1.0)
+        return float(given[-1]) * (MM_PER_INCH if UNIT_WORD.findall(text)[:1] == [b"20"] else 1.0)
     p = program.tolerance[np.isfinite(program.tolerance)]
     return float(p[-1]) if len(p) and float(toolpath.tolerance[-1]) == float(p[-1]) else 0.0
 
@@ -199,8 +198,8 @@ def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:
 def feed_in_force(program: Program, text: bytes) -> FloatArray:
     """(B,) the F in force on each block [mm/s]: of the last feed move or F word up to its line."""
     number = _line_number(text)
-    scale = np.array([MM_PER_INCH if one[1] == b"20" else 1.0 for one in _UNIT.finditer(text)])
-    unit_at = np.array([number(one) for one in _UNIT.finditer(text)])
+    scale = np.array([MM_PER_INCH if one[1] == b"20" else 1.0 for one in UNIT_WORD.finditer(text)])
+    unit_at = np.array([number(one) for one in UNIT_WORD.finditer(text)])
     words = [(number(one), float(one[1])) for one in _F_WORD.finditer(text)]
     line, value = np.array(words).reshape(-1, 2).T
     unit = np.append(1.0, scale)[np.searchsorted(unit_at, line, side="right")]
@@ -255,8 +254,8 @@ def _at_blocks(program: Program, named: list[tuple[int, str]]) -> list[str] | No
     return [names[k] for k in found.tolist()]
 
 
-def _by_name(seconds: FloatArray, names: list[str] | None) -> dict[str, float]:
-    """Seconds (B,) by the names of the blocks, in the order of the program; none of a single name."""
+def by_name(seconds: FloatArray, names: list[str] | None) -> dict[str, float]:
+    """`seconds` (B,) by the `names` (B,) of the blocks, in the order of the program; empty where none has a name."""
     found: dict[str, float] = {}
     for name, more in zip(names or (), seconds.tolist(), strict=False):
         if more:

@@ -148,7 +148,7 @@ def _rows(plan: Plan) -> Iterable[tuple[str, str]]:
         yield "not solved", html.escape(plan.sentence)
         return
     for label, text in plan_rows(plan):
-        if label in SHOWN or "saves" in label or label.endswith("more tolerance"):
+        if label in SHOWN or "saves" in label or label.endswith(("more tolerance", "sensitive corners")):
             shown = html.escape(text)
             yield html.escape(label), f"<b>{shown}</b>" if label in ("cycle time", VERDICT) else shown
 

@@ -1,0 +1,150 @@
+"""A plan in eight lines for the people at the machine: time, tools, what is saved, what limits, tolerance,
+verdict, notes, files. report/rows.py has all the rest.
+
+What is saved is told against the planner of the control that the machine names (controls/timing/times.py), else
+against a stop at every block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.base.errors import InputError
+from planner.controls.timing.times import TIMED, ControlTimes, by_name, control_times, tools_of
+from planner.planning.job.notes import tolerance_notes
+from planner.report.rows import FAILED, PASSED, VERDICT, Rows, beside_rows, first_of, hours_text
+from planner.report.units import Units
+from planner.report.word_feed import planned_blocks
+
+if TYPE_CHECKING:
+    from planner.planning.job.plan import Plan
+
+NOTES, LIMITS, TOOLS, FAULTS = 3, 4, 6, 2  # that are told
+DIGITS = 6  # behind the point of lengths: what is less is rounding
+QUANTITIES = {"velocity": "speed", "acceleration": "acceleration", "jerk": "jerk"}
+NAMES = {
+    "linuxcnc": "LinuxCNC",
+    "klipper": "Klipper",
+    "marlin": "Marlin",
+}  # of controls, as they write themselves
+FURTHER = {
+    "feed": "the programmed feed",
+    "acceleration.tangential": "acceleration along the path",
+    "none": "nothing",
+    "rest": "dwells",
+}
+
+
+def brief_rows(plan: Plan, units: Units, tolerance: float | None = None) -> Rows:
+    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict.
+
+    tolerance : that was asked for [mm]; None for that of the program or the machine
+    """
+    if plan.trajectory is None or plan.verdict is None:
+        return [("time", "-"), (VERDICT, f"not solved: {plan.sentence}")]
+    rows: Rows = [("time", _time(plan))]
+    tools = tool_times(plan)
+    if len(tools) > 1:
+        said = first_of([f"{name or 'before'} {seconds:.4g} s" for name, seconds in tools.items()], TOOLS)
+        rows.append(("tools", ", ".join(said)))
+    if plan.method != "stop" or plan.machine.control is not None:
+        rows.append(("saved", _saved(plan, tolerance)))
+    if plan.grid is not None:
+        ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
+        told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]
+        rows.append(("limited by", f"{', '.join(told)} of the time, some together"))
+    rows.append(("tolerance used", _used(plan, units)))
+    failed = "; ".join([FAILED, *first_of(plan.verdict.sentences, FAULTS)])
+    return [*rows, (VERDICT, PASSED if plan.verdict.passed else failed)]
+
+
+def note_lines(plan: Plan, notes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Lines above the others: what may make it another part, a tolerance that is large beside it and what was
+    assumed; and lines below them: the first of the other `notes`. Each with how many more there are."""
+    large, assumed = tolerance_notes(plan.toolpath), list(plan.program.assumptions)
+    above = [*(f"note: {note}" for note in large), *(f"assumed: {note}" for note in assumed)]
+    below = [f"note: {note}" for note in notes if note not in large and note not in assumed]
+    return _first(above), _first(below)
+
+
+def _first(lines: list[str]) -> list[str]:
+    more = len(lines) - NOTES
+    return lines[:NOTES] + ([f"and {more} more, with -v"] if more > 0 else [])
+
+
+def tool_times(plan: Plan) -> dict[str, float]:
+    """Seconds of the motion by tool, "T1"; empty where the program names none."""
+    names = tools_of(plan.program)
+    if names is None or plan.trajectory is None:
+        return {}
+    lasting = planned_blocks(plan.trajectory, plan.toolpath).duration
+    blocks = np.bincount(plan.toolpath.block, lasting, len(plan.program)) + plan.program.dwell
+    return by_name(blocks, names)
+
+
+def control_of(plan: Plan, tolerance: float | None = None) -> ControlTimes | None:
+    """What the control that the machine names takes for the program as it is; None where it names none, or
+    where there is no model of that, or none for this program.
+
+    tolerance : as of `brief_rows`
+    """
+    control = plan.machine.control
+    if control is None or control.name not in TIMED:
+        return None
+    try:
+        return control_times(plan.program, plan.machine, control.name, tolerance)
+    except InputError:
+        return None
+
+
+def limit_text(name: str) -> str:
+    """A limit's name in words: "jerk.x" is "jerk of X"."""
+    quantity, _, axis = name.partition(".")
+    if name in FURTHER or quantity not in QUANTITIES or not axis:
+        return FURTHER.get(name, name)
+    return f"{QUANTITIES[quantity]} of {axis.upper()}"
+
+
+def _time(plan: Plan) -> str:
+    assert plan.trajectory is not None
+    motion = plan.trajectory.cycle_time
+    beside = dict(beside_rows(plan.beside, motion, 0.0))
+    total = motion + sum(it.seconds for it in plan.beside)
+    missing = beside.get("not in the total") or beside.get("not in the cycle time")
+    of = f": motion {motion:.4f} s, {beside['beside the motion']}" if "beside the motion" in beside else ""
+    return f"{total:.4f} s{hours_text(total)}{of}" + (f"; without {missing}" if missing else "")
+
+
+def _saved(plan: Plan, tolerance: float | None) -> str:
+    assert plan.trajectory is not None
+    time, found = plan.trajectory.cycle_time, control_of(plan, tolerance)
+    if found is None:
+        other, takes = "a stop at every block", plan.stop_time
+    else:
+        other, takes = (
+            f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)",
+            found.seconds,
+        )
+    if not np.isfinite(takes):
+        return "not known"
+    saved = takes - time
+    if saved > 0.0:
+        return f"{saved:.4g} s, {100.0 * saved / takes:.0f} %, against {other}: {takes:.4f} s of motion"
+    limited = plan.verdict is not None and "jerk" not in plan.verdict.not_limited
+    why = ", which limits no jerk," if found is not None and limited else ""
+    return f"nothing: {other}{why} takes {takes:.4f} s of motion"
+
+
+def _used(plan: Plan, units: Units) -> str:
+    assert plan.verdict is not None
+    errors = [plan.verdict.contour_error_mm, plan.verdict.vertex_error_mm]
+    known = [error for error in errors if error is not None]
+    if not known:
+        return "not known"
+    least, most = float(plan.toolpath.tolerance.min()), float(plan.toolpath.tolerance.max())
+    of = f"{least / units.mm:.4g} to " if least < most else ""
+    used = round(max(known) / units.mm, DIGITS)
+    return f"{used:.4g} of {of}{units.length_text(most)}"

@@ -1,0 +1,42 @@
+"""The units of what is shown: lengths in mm or inch and feeds in their number per minute, as F words have
+them. Inside the package and in files everything stays in mm and s."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.nc.points import UNIT_WORD, own_text
+from planner.nc.program import Program
+
+INCH = b"20"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Units:
+    """A unit of length [mm], its name, and that of feeds: each number per minute."""
+
+    length: str = "mm"
+    feed: str = "mm/min"
+    mm: float = 1.0
+
+    @property
+    def per_feed(self) -> float:
+        """What a feed [mm/s] is multiplied with."""
+        return SECONDS_PER_MINUTE / self.mm
+
+    def length_text(self, length: float) -> str:
+        """A length [mm] with its unit."""
+        return f"{length / self.mm:.4g} {self.length}"
+
+
+UNITS = {"mm": Units(), "inch": Units(length="in", feed="in/min", mm=MM_PER_INCH)}
+
+
+def units_of(program: Program, asked: str | None = None) -> Units:
+    """The units that are `asked` for by their name in `UNITS`, or those of a program: of its first G20 or G21, mm
+    without one."""
+    if asked is not None:
+        return UNITS[asked]
+    found = None if program.pen else UNIT_WORD.search(own_text(program) or b"")
+    return UNITS["inch" if found is not None and found[1] == INCH else "mm"]

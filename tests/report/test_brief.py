@@ -1,0 +1,112 @@
+"""The eight lines of `planner plan`: what they say, in which units, and what comes first."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hand_made import make_plan
+from test_tables import text
+
+import planner
+from planner.controls.timing.times import control_times
+from planner.machine import ControlData, load_machine
+from planner.nc.reader import parse_program
+from planner.planning.job.beside import Beside
+from planner.report.brief import brief_rows, control_of, limit_text, tool_times
+from planner.report.tables import brief_table
+from planner.report.units import UNITS, units_of
+
+
+def test_eight_lines_without_a_symbol_of_papers() -> None:
+    said = text(brief_table(make_plan(), UNITS["mm"]))
+    assert len(said.splitlines()) <= 9, "with the title"
+    for word in ("eq.", "jerk.", "acceleration.", "grid", "solver", "certified"):
+        assert word not in said
+    assert "acceleration of Y 70 %, the programmed feed 25 %" in said
+
+
+def test_what_is_saved_against_a_stop_and_never_less_than_nothing() -> None:
+    plan = make_plan()
+    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith(
+        "0.45 s, 36 %, against a stop at every block"
+    )
+    plan.stop_time = 0.5
+    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing: a stop at every block")
+
+
+def test_what_is_saved_against_the_control_that_the_machine_names() -> None:
+    plan = make_plan()
+    plan.machine = plan.machine.model_copy(update={"control": ControlData(name="grbl")})
+    takes = control_times(plan.program, plan.machine, "grbl").seconds
+    found = control_of(plan)
+    assert found is not None
+    assert found.seconds == pytest.approx(takes)
+    said = dict(brief_rows(plan, UNITS["mm"]))["saved"]
+    assert "grbl" in said
+    assert f"{takes:.4f} s" in said
+    assert not any(f"-{digit}" in said for digit in "0123456789")
+
+
+def test_the_total_and_what_is_not_in_it() -> None:
+    plan = make_plan()
+    change, start = (
+        Beside(what=what, count=2, each=each) for what, each in (("tool change", 6.0), ("M8", None))
+    )
+    plan.beside = (change, dataclasses.replace(start, because="no time in the machine file"))
+    assert dict(brief_rows(plan, UNITS["mm"]))["time"] == (
+        "12.8000 s: motion 0.8000 s, 12 s: 2 tool changes of 6 s; without 2 M8 (no time in the machine file)"
+    )
+
+
+def test_tolerance_in_inch() -> None:
+    rows = dict(brief_rows(make_plan(), UNITS["inch"]))
+    assert rows["tolerance used"].endswith(f"of {0.02 / 25.4:.4g} in")
+
+
+@pytest.mark.parametrize(
+    ("program", "name"), [("G20 G1 X1 F10", "in"), ("(G20) G21\nG1 X1 F10", "mm"), ("G1 X1 F10", "mm")]
+)
+def test_units_are_those_of_the_program(program: str, name: str) -> None:
+    read = parse_program(program, load_machine("mill"))
+    assert units_of(dataclasses.replace(read, text=program.encode())).length == name
+    assert units_of(read, "inch").feed == "in/min"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("jerk.x", "jerk of X"),
+        ("velocity.a", "speed of A"),
+        ("feed", "the programmed feed"),
+        ("spindle power", "spindle power"),
+    ],
+)
+def test_limits_in_words(name: str, words: str) -> None:
+    assert limit_text(name) == words
+
+
+def test_the_times_of_tools_are_those_of_the_motion() -> None:
+    machine = load_machine("mill")
+    job = "G21 F1200 T1 M6\nG1 X10\nY10\nT2 M6\nG1 X0\nG4 P0.5\nY0\nM2\n"
+    plan = planner.plan(planner.read_program(text=job, machine=machine), machine, method="stop")
+    found = tool_times(plan)
+    assert [*found] == ["T1", "T2"]
+    assert sum(found.values()) == pytest.approx(plan.cycle_time, abs=machine.dt)
+    assert found["T2"] - found["T1"] == pytest.approx(0.5, abs=machine.dt), "the dwell"
+    assert np.isfinite([*found.values()]).all()
+
+
+@pytest.mark.parametrize(
+    "job",
+    ["M8\nT3 M6\nG1 X1 F100\nG41\nX9", "M8\nT3 M6\nG1 X1 F100\nG55\nX9", "T3 M6\nG1 X1 F100\nG64 P30\nX9"],
+)
+def test_what_may_be_another_part_is_told_first(job: str) -> None:
+    """G41 without a diameter, an unknown work offset, and a tolerance that is larger than the part."""
+    machine = load_machine("mill")
+    plan = planner.plan(
+        planner.read_program(text=f"G21 {job} Y9\nM2\n", machine=machine), machine, method="stop"
+    )
+    first = text(brief_table(plan, UNITS["mm"])).splitlines()[0]
+    assert any(words in first for words in ("no diameter", "no offset", "the part's largest extent")), first

@@ -52,15 +52,8 @@ WORDS: dict[tuple[str, int], str] = {
     **{("M", code): "P" for code in (620, 630, 640, 650)}, ("M", 190): "RPQ", ("M", 660): "PELQ", ("M", 670): "EQ", ("M", 680): "EQ",
     ("M", 610): "Q",
 }  # fmt: skip
-FANUC_WORDS = {
-    730: "PK",
-    740: "LQK",
-    810: "PK",
-    820: "K",
-    830: "PIJK",
-    840: "QK",
-    850: "PK",
-}  # cycles of LinuxCNC have not
+# That cycles of LinuxCNC have not.
+FANUC_WORDS = {730: "PK", 740: "LQK", 810: "PK", 820: "K", 830: "PIJK", 840: "QK", 850: "PK"}
 MOTION_WORDS = "IJKRPQLH"  # that a motion code in force may use
 M_GROUP: dict[int, str] = {
     **dict.fromkeys((0, 10, 20, 300, 600), "stopping"),

@@ -182,8 +182,9 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     """The hole of the words in force, at no place yet. Raises WordFault if it would begin below its depth."""
     a, b = IN_PLANE[state.normal]
     axis, to_level = state.normal, state.to_level or (state.fanuc and not state.retract_given)
-    clear = words["R"] + (0.0 if state.absolute else series.level)
-    bottom = words["XYZ"[axis]] + (0.0 if state.absolute else clear)
+    absolute = state.absolute or state.fanuc
+    clear = words["R"] + (0.0 if absolute else series.level)
+    bottom = words["XYZ"[axis]] + (0.0 if absolute else clear)
     if bottom > clear:
         name, depth = f"G{codes.number(state.motion)}", f"{AXES[axis].upper()} = {bottom:g}"
         raise block.fault(f"{name} would begin at R = {clear:g}, below its depth {depth}; write R above it")
@@ -251,12 +252,14 @@ def _say(state: State, block: Block, findings: Findings) -> None:
 def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
     """The words in force. Raises WordFault for one that is missing."""
     code, axis = series.code, "XYZ"[state.normal]
-    for letter in f"{axis}RPQIJK":
+    for letter in f"R{axis}PQIJK":
         if letter not in block.value:
             continue
         if not state.fanuc and letter in codes.FANUC_WORDS.get(code, ""):
             raise block.fault(unused(letter), letter)
         series.words[letter] = block.value[letter]
+        if state.fanuc and not state.absolute:  # levels stay where they were when they were given
+            series.words[letter] += {"R": series.level, axis: series.words.get("R", 0.0)}.get(letter, 0.0)
     if state.fanuc:
         series.words = {"P": 0.0} | series.words
     needed = f"{axis}R" + {870: "IJK"}.get(code, "")

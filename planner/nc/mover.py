@@ -169,8 +169,8 @@ class Mover:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
         state, code = self.state, block.g.get("motion")
         if code is not None:  # stays in force, until another one or G80
+            self._before_cycles = state.motion if state.motion in (0, 1) else self._before_cycles
             state.motion = code // 10 if code <= 30 else code
-            self._before_cycles = state.motion if state.motion <= 1 else self._before_cycles
         elif "cycle end" in block.g:
             state.motion, state.series = self._before_cycles if state.fanuc else NO_MOTION, None
         if block.g.get("one-shot") in COVET_AXES:

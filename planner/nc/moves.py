@@ -28,7 +28,7 @@ OFFSET_NUMBER = codes.Assumption(
 Report = Callable[[int, str], None]
 _CLOSES_IF = "the arc would close if its centre were"
 _TURN = 360.0  # degrees
-_ROUNDING = {**dict.fromkeys("THDLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
+_ROUNDING = {**dict.fromkeys("THDKLQ", 1e-4), "P": 1e-3}  # what RS274NGC rounds away from a whole number
 
 
 class WordFault(Exception):

@@ -23,15 +23,7 @@ from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.faults import Findings
 from planner.nc.moves import Block, WordFault, coordinate, integer
-from planner.nc.state import (
-    FURTHER_MAX,
-    FURTHER_SYSTEMS,
-    SYSTEMS,
-    State,
-    System,
-    Tool,
-    system_name,
-)
+from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
 
 _OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 P1 to P20; and G154
 _DATA = (3, 50, 52)  # tool life, parameters of the control; to G11

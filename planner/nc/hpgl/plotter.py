@@ -20,12 +20,7 @@ from planner.machine import Machine, Plotter
 from planner.nc.arcs import Arc
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
-from planner.nc.hpgl.drawing import (
-    Point,
-    Scaling,
-    ScalingError,
-    circle_through,
-)
+from planner.nc.hpgl.drawing import Point, Scaling, ScalingError, circle_through
 from planner.nc.hpgl.instructions import (
     ALLOWED,
     CHANGING,

@@ -39,7 +39,7 @@ _SIEMENS = re.compile(
     r"UPATH|SPATH|ENDIF|ENDWHILE|ENDLOOP|ENDFOR|MCALL|[BAC]SPLINE|UNTIL|LOOP|INVCW|INVCCW|M17|RET)\b)",
     re.IGNORECASE,
 )
-_SIEMENS_CODES = (500, *range(505, 600), 601, 602, 603, 621, 331, 332, *range(641, 646), 700, 710)
+_SIEMENS_CODES = (331, 332, 500, *range(505, 600), 601, 602, 603, 621, *range(641, 646), 700, 710)
 _SUBPROGRAMS = (".mpf", ".spf")
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment

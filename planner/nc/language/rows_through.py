@@ -42,22 +42,7 @@ _PLACING = frozenset((10.0, 28.0, 30.0, 43.0, 43.1, 43.2, 49.0, 52.0, 53.0, 59.1
 _HOMES = frozenset((28.0, 30.0))
 _SIDES = {41.0: 42.0, 42.0: 41.0, 41.1: 42.1, 42.1: 41.1}  # of compensation, in a mirror image
 # G codes that leave the position and the coordinates as they are.
-_NEUTRAL = frozenset(
-    (
-        4.0,
-        40.0,
-        41.0,
-        42.0,
-        41.1,
-        42.1,
-        61.0,
-        61.1,
-        64.0,
-        80.0,
-        91.1,
-        *(float(code) for code in range(93, 100)),
-    )
-)
+_NEUTRAL = frozenset((4, 40, 41, 42, 41.1, 42.1, 61, 61.1, 64, 80, 91.1, *range(93, 100)))
 
 
 class RowsThrough(Places):

@@ -16,14 +16,7 @@ from typing import Any
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.compiled import (
-    Compiled,
-    Endless,
-    last_statement,
-    sentence,
-    statement_of,
-    whole,
-)
+from planner.nc.language.compiled import Compiled, Endless, last_statement, sentence, statement_of, whole
 from planner.nc.language.making import Maker, Making
 from planner.nc.language.rows import AppendedRows, NotFinite
 from planner.nc.language.source import Source

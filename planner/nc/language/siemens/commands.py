@@ -11,11 +11,7 @@ from planner.nc.language import tree
 from planner.nc.language.makers import ADDED, SIEMENS
 from planner.nc.language.siemens import cycles, patterns, tables
 from planner.nc.language.siemens.declarations import Declarations, changed
-from planner.nc.language.siemens.text import (
-    LineTokens,
-    handed_over,
-    position,
-)
+from planner.nc.language.siemens.text import LineTokens, handed_over, position
 
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
 _TIMES = re.compile(r"P(\d+)")

@@ -5,12 +5,7 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from planner.nc.language.making import (
-    Cycle,
-    HolePlan,
-    Making,
-    Row,
-)
+from planner.nc.language.making import Cycle, HolePlan, Making, Row
 from planner.nc.language.milling import (
     HELIX,
     RAPID,

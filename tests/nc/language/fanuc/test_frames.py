@@ -51,6 +51,10 @@ CASES = {
         "G68 X0 Y0 R90.\nG99 G83 X5. Y0 Z-5. R2. Q3.\nX10.\nG80\nG69\nG0 X0 Y0",
         "G99 G83 X0 Y5 Z-5 R2 Q3\nX0 Y10\nG80\nG0 X0 Y0",
     ),
+    "holes in steps": (
+        "G99 G81 X1. Y1. Z-5. R2.\nG91 X10. K3\nG90 G80\nG0 X0\nG91 G81 Z-3. R-4. X1. L2\nG90 G80\nX0",
+        "G99 G81 X1 Y1 Z-5 R2\nX11\nX21\nX31\nG80\nG0 X0\nG81 X1 Z-5 R-2\nX2\nG80\nG0 X0",
+    ),
     "bolt holes of Haas": (
         "G0 X5. Y5.\nG81 Z-5. R2. L0\nG70 I10. J0 L4\nG80\nG0 X0 Y0",
         "G0 X5 Y5\nG81 X15 Y5 Z-5 R2\nX5 Y15\nX-5 Y5\nX5 Y-5\nG80\nG0 X0 Y0",

@@ -1,5 +1,4 @@
-"""Arithmetic with functions of one variable to third order: a function of the position becomes its
-derivatives along a motion.
+"""Arithmetic with functions of one variable to third order: derivatives of functions along a motion.
 
 A `Series` holds a value and its first three derivatives with respect to the same variable (arc length or
 time), for n places at once. What numpy computes with it has the derivatives of the result, exact but for

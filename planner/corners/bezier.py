@@ -1,7 +1,6 @@
 """The Bezier-pair corner of paper 002.
 
-Two mirrored rational cubics, control points P - d u1, P - d/2 u1, P - d/4 u1, joint, ... ; two numbers
-describe all weights:
+Two mirrored rational cubics, control points P - d u1, P - d/2 u1, P - d/4 u1, joint, ... of weights:
 
     sigma1 = w0 w2 / w1^2,   sigma2 = w1 w3 / w2^2            (eq. (2), (3))
 

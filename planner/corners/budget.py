@@ -1,5 +1,4 @@
-"""The error budget of a corner: how much of it the path may use, and how fast that lets the corner be taken
-(paper 002, eq. 18-20).
+"""The error budget of a corner: what the path may use of it, and the speed then (002, eq. 18-20).
 
 The budget is shared by the rounding, the chord error of the interpolation period and, where FIR filters
 follow, their error; with X = kappa feed^2 the normal acceleration at the apex (docs/papers.md D, three
@@ -95,8 +94,7 @@ def normal_at_corners(
 ) -> FloatArray:
     """(n,) A at corners with unit tangents u1, u2 (n, A) [mm/s2].
 
-    curvature : (n,) of their legs. Between arcs the normal at the apex is not the bisector at the vertex: the
-                largest over all directions bounds it.
+    curvature : (n,) of their legs; between arcs the largest of all directions bounds the apex's normal.
     """
     limits = machine.limits("acceleration", axes)
     reachable = normal_of_axes(limits, u1, u2)

@@ -1,5 +1,4 @@
-"""Elements: the smooth path as a sequence of curves, what is free of a leg, a corner or a span, each over its
-own parameter w.
+"""Elements: the smooth path as curves, free parts of legs, corners, spans, each over its own w.
 
 Of a path with R legs an element is numbered r in [0, R) for what is free of leg r (w is the leg's x [mm]), ~k
 < 0 for the corner at joint k (w in [0, 1]), and R + i for span i of the spline (w in [0, 1]). This file is

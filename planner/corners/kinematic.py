@@ -1,7 +1,6 @@
 """The kinematic corner of paper 003: geometry and timing at once, within the limits of every axis.
 
-Directions u1 before and u2 after the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp response R as in
-docs/papers.md 0.
+Directions u1, u2 at the vertex P, du = u2 - u1, s = sin(theta/2) = |du|/2, ramp R (docs/papers.md 0).
 
 **Zero entry acceleration** (eq. (1)-(8)). All axes run jerk +j, 0, -j for Tj, Ta, Tj; with T1 = Tj + Ta >= T2
 = Tj

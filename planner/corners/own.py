@@ -1,5 +1,4 @@
-"""A corner shape of one's own: the retreat X = d f(w) as a polynomial, the advance Y = d f(1 - w) its mirror
-image.
+"""A user's corner shape: the retreat X = d f(w) as a polynomial, the advance Y = d f(1 - w).
 
     class Wide(PolynomialCorner):
         name = "wide"

@@ -153,8 +153,7 @@ def round_corners(
     blend_tangents : blend tangent joints too where the curvature jumps, as a jerk-limited motion needs it;
                      such a corner has theta = 0, bends off both legs within the tolerance, and has no jump
                      left. Where the path is to be followed exactly (G61) it is a full stop
-    free           : fraction of every leg that its corners leave free [-], for motions that change their
-                     speed between corners only
+    free           : fraction of every leg that corners leave free [-], for changes of speed between them
 
     Raises InputError if the machine lacks an axis of the toolpath.
     """

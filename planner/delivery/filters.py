@@ -156,8 +156,7 @@ def stops_between(early: Array, late: Array, count: int) -> Array:
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:
-    """The motion with the shortest rests at its full stops behind which the filtered motion keeps the
-    tolerance, no run slowed down.
+    """The motion with the shortest rests at its full stops that keep the tolerance behind filters.
 
     It has the standstills that its samples need.
     """

@@ -1,5 +1,4 @@
-"""Faults that a verdict finds are mended where they are: the motion is run slower there, and as it was
-everywhere else.
+"""Faults that a verdict finds are mended where they are: the motion is run slower there only.
 
 A limit that is exceeded, a feed, a corner passed too fast, and an error of the chords between samples or of
 filters all get less where the motion is slower (verifier/excess.py says by what power), so that each says by

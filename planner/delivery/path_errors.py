@@ -1,5 +1,4 @@
-"""How far a motion is from the programmed path: what planning measures, by the planner's own matching
-(geometry/point_matching.py).
+"""How far a motion is from the programmed path, by the planner's own matching (point_matching.py).
 
 The path is cut into pieces, arcs and curves at most every `PIECE_ANGLE`. Each place of the motion is put down
 to the link of the path that the best assignment in order gives it, where a block left out and a feed cost

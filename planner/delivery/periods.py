@@ -1,29 +1,19 @@
 """The share of the interpolation period in the contour error, and what is done about it.
 
-The machine gets samples dt apart and runs the chords between them. Within a period the chord is off the
-motion by
+The machine runs the chords between samples dt apart, which are off the motion by |e(t)| <= dt^2/8 max |q''|,
+whatever the direction of the acceleration q'': where the motion q misses a vertex by m, they miss it by at
+most so much more. Error allocation (eq. 18-20) uses the normal acceleration, as along a smooth path the other
+part shifts the chord along itself; not so at full stops, and at corners that are passed within a few periods.
 
-    |e(t)| <= dt^2/8 max |q''|,     whatever the direction of the acceleration q'',
-
-so if the motion q misses a vertex by m, the chords miss it by m + dt^2/8 max |q''| at most. Error allocation
-(eq. 18-20) uses the normal acceleration in place of |q''|. Along a smooth path that is right, because the
-acceleration along the path shifts the chord along itself. It is not right at full stops, and at corners that
-are passed within a few periods: there the motion brakes along one leg and speeds up along another.
-
-1. Full stops: if the motion arrives between two samples, the chord cuts the vertex off, by |q''| (dt/2)^2/2
-at most. If that is more
-   than the tolerance, `standing` lets the motion stand until the next sample, or for a shorter time that is
-   enough: less than dt per stop.
-2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall. If that is
-more than the tolerance,
-   `with_less_tolerance` subtracts the excess from the tolerance of the corner, and from that of the arcs
-   beside it only where this was not enough. Where the chords alone would use nearly all of the tolerance, the
-   corner becomes a full stop.
-3. Curves: where feed changes within a period the acceleration along the path has a share in the chord's error
-after all. If the verdict
-   finds it too large inside a block, or by eq. (18) at its end, `with_less_inside` takes the excess from the
-   tolerance of the block; where that is not enough, it takes what the worst phase of the samples shows at the
-   vertices inside.
+1. Full stops: where the motion arrives between two samples, the chord cuts the vertex off, by |q''|
+   (dt/2)^2/2 at most. If that is too much, `standing` lets the motion stand for less than dt.
+2. Corners: `missed` measures by how much the chords miss every vertex, wherever the samples fall;
+   `with_less_tolerance` subtracts what is too much from the tolerance of the corner, and from that of the
+   arcs beside it only where this was not enough. A corner whose chords would use nearly all becomes a full
+   stop.
+3. Curves: where feed changes within a period the acceleration along the path has a share after all. Where the
+   verdict finds it too large inside a block, or by eq. (18), `with_less_inside` takes it from the block's
+   tolerance, and then what the worst phase of the samples shows at the vertices inside.
 """
 
 import dataclasses
@@ -77,8 +67,7 @@ class Standing(NamedTuple):
 def standing(
     motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool = False
 ) -> Standing:
-    """How much longer a motion has to stand where the chords between samples would cut off a full stop by
-    more than the tolerance.
+    """How much longer a motion has to stand where chords would cut off a full stop by too much.
 
     jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full
                    acceleration at once: then it need not be looked at where that is enough
@@ -229,8 +218,7 @@ def with_less_tolerance(
     times: float = 1.0,
     beside: bool = False,
 ) -> Toolpath | None:
-    """The path to be planned so that the chords stay within the tolerance of the programmed path; None if
-    they do already.
+    """The path to be planned so that chords keep the programmed path's tolerance; None if they do.
 
     planned   : the path that the motion was planned on
     near, far : by how much motion and chords miss the vertices (M+1,) [mm], from `missed`

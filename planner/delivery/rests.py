@@ -31,8 +31,7 @@ class Mean:
     """Of the last `length` of a motion [s].
 
     inside : (C,) times from a stop, before and after it, at which the motion is asked [s]
-    into   : (STEPS + 1, C) weights of where it is before the stop, at each step after the arrival; they make
-             A
+    into   : (STEPS + 1, C) weights of its places before the stop, at steps after the arrival: A
     out    : (STEPS + 1, C) of where it is after the stop, at each step after the departure; they make B
     """
 

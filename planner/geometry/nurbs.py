@@ -1,7 +1,6 @@
 """NURBS curves: points, and an NC program of the curve itself or of its chords.
 
-A curve of degree p with control points P_i, weights w_i and knots u_i is r(u) = sum N_i w_i P_i / sum N_i
-w_i, on the domain [u_p, u_n].
+A curve of degree p with points P_i, weights w_i, knots u_i: r(u) = sum N_i w_i P_i / sum N_i w_i.
 """
 
 import dataclasses

@@ -14,8 +14,7 @@ two budgets, so that time and memory are linear in points and links. Distances b
 none; of equal assignments that which passes the vertices last is taken: a motion that stands on a vertex is
 still at the block before.
 
-A motion that keeps the tolerance has such an assignment. Where nothing can be reached the budgets are
-widened, up to `WIDEST` times.
+A motion within the tolerance has one. Where nothing can be reached budgets are widened, up to `WIDEST`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Moves whose feed is to be held: threads, cut in step with the spindle. From rest the feed F is reached
-behind a run-in of the length
+"""Threads, cut in step with the spindle. From rest the feed F is reached behind a run-in of the length
 
     d = F T / 2,     T = F / a + a / j  where F >= a^2 / j,  else 2 sqrt(F / j),
 

@@ -1,5 +1,4 @@
-"""The prices of limits and tolerance where geometry and feed were found together, from the multipliers of
-that search (joint/price.py).
+"""The prices of limits and tolerance where path and feed were found together, from its multipliers.
 
 Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So
 nothing is solved again. A limit acts at every step through its price there; the tolerance, and accelerations

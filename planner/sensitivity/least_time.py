@@ -1,5 +1,4 @@
-"""A time that no motion falls short of: a bound for every motion that keeps the limits of the axes, the feed and the
-tolerance, however it was found.
+"""A time that no motion within the limits of the axes, the feed and the tolerance falls short of.
 
 A motion passes the waypoints P_k of the path (vertices, and points on arcs and curves) in order, each within its
 tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Five facts:
@@ -52,8 +51,7 @@ LINEAR = "xyz"
 
 
 def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...] = ()) -> float | None:
-    """A time that no motion falls short of [s], dwells included; None behind filters and for axes other than x, y and z,
-    of which the feed counts otherwise.
+    """A time that no motion falls short of [s], with dwells; None behind filters and for axes beside x, y, z.
 
     not_limited : of velocity, acceleration and jerk, what the motions need not keep
     """

@@ -1,5 +1,4 @@
-"""From slopes to what more of every limit saves: what the prices of a path (path_prices.py) and those of a
-search (found_prices.py) have in common.
+"""From slopes to what more of every limit saves, for the prices of a path and those of a search.
 
 **Finite changes.** A corner that jerk j lets through within eps takes a time that goes with (eps/j)^(1/3),
 one that acceleration lets through with (eps/a)^(1/2), a range at full speed with 1/v. So a price p = dT/d(ln
@@ -114,8 +113,7 @@ def price_list(
     tolerance : dT/d(tolerance) [s/mm]; None where it is not known
     bounds    : what more of a limit saves at most, by name [s]
     unrest    : by how much a motion made again is faster or slower for no other reason [share of the time]
-    less      : by how much more of a limit may save less than it is foretold to [-]; of the feed, where it holds
-                all of the motion, by `WITHIN`
+    less      : by how much more of a limit may save less than foretold [-]; of a steady feed `WITHIN`
     unsure    : whether more of anything may save nothing
     """
     present = _present(toolpath)

@@ -49,8 +49,7 @@ class Way(NamedTuple):
         return turned._replace(tangent=-turned.tangent)
 
     def along(self, direction: FloatArray, feed: FloatArray) -> tuple[Bounds, FloatArray]:
-        """The limits of the coordinates along directions, and the vectors y (n, A) whose product with a velocity is then
-        at most 1 and most along them.
+        """The limits along directions, and vectors y (n, A) whose product with a velocity is at most 1 then.
 
         direction : (n, A) unit vectors
         feed      : (n,) that holds meanwhile [mm/s]

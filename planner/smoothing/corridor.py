@@ -1,5 +1,4 @@
-"""The corridor of each run: the programmed path as a chain of chords, each with its tolerance, inside of
-which a spline is laid.
+"""The corridor of each run: the path as a chain of chords with tolerances, for a spline inside.
 
 A straight leg is one chord, or one for each of its programmed feeds: a spline may slide along a chord, but
 has to pass the place where the feed changes. An arc becomes chords whose sagitta is at most `SAGITTA` of the

@@ -1,8 +1,6 @@
-"""The convex problem of a spline in a corridor, by a primal-dual interior-point method that never leaves the
-corridor.
+"""The convex problem of a spline in a corridor, by an interior-point method that never leaves it.
 
-Over the control points c (n, A), minimise a quadratic form, one banded matrix H_k per axis, with every site j
-inside its ball:
+Over control points c (n, A), a quadratic form, a banded matrix H_k per axis, sites j inside balls:
 
     minimise    1/2 sum_k c_k' H_k c_k
     subject to  g_j = (|e_j|^2 / r_j^2 - 1)/2 <= 0,     e_j = d_j - (1 - slide_j) t_j (t_j . d_j),     d_j = p(u_j) - q_j

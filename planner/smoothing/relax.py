@@ -1,8 +1,6 @@
-"""Smooth curves inside the corridor: each run relaxed to the least integral of its squared third derivative,
-and proved to be inside.
+"""Smooth curves inside the corridor: least integral of the squared third derivative, and the proof.
 
-Third derivatives by the place along the path are jerks at constant feed, which is a good guess where no feed
-is known yet.
+Third derivatives along the path are jerks at constant feed, a good guess while no feed is known.
 
 A run is relaxed window by window. Where its certificate (certificate.py) fails, the sites around are
 tightened by as much as the bound is too large, and relaxed again.

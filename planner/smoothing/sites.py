@@ -1,5 +1,4 @@
-"""The splines of a path, one for each run, and their sites: the places at which the distance from the path is
-bounded.
+"""The splines of a path, one a run, and their sites: where the distance from the path is bounded.
 
 Sites are all vertices of the corridor, each with a ball around it, and between distant ones places on the
 chords `SITE_SPACING` of a span apart, around which the spline may slide along the chord. Site j bounds the

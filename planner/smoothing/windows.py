@@ -1,5 +1,4 @@
-"""Windows of a long spline: which of its control points are relaxed at a time, and how those
-around a site are tightened (relax.py)."""
+"""Windows of a long spline: which control points are relaxed at a time, or tightened (relax.py)."""
 
 from typing import NamedTuple
 

@@ -4,8 +4,7 @@ At the motion's point nearest to the vertex, in the program's order (matching.py
 speed, t = v/|v|, a_n the part of the acceleration a across t, n = a_n/|a_n|, kappa = |a_n| / v^2 the motion's
 own curvature, all over the linear axes.
 
-**Eq. (19), the speed.** Paper 002 lets a corner be passed at sqrt(A/kappa). With A(n) the most that the
-machine leaves in the direction n,
+**Eq. (19), the speed.** A corner may be passed at sqrt(A/kappa). With A(n) the most that is left along n,
 
     A(n) = min( sum_k |n_k| a_k,  A_max ),       a_k the axes' acceleration limits, A_max the machine's normal acceleration,
 

@@ -12,8 +12,7 @@ F is the speed in x, y and z alone where these move, in u, v and w where only th
 axes. Beside a corner the parts of a motion in these axes differ from those of its block, so the chord in them
 alone is compared with F, too.
 
-So far as sampling does not tell where a block begins and ends (`reach` in switches.py) a place belongs to
-both, and the larger F counts.
+Where a block begins and ends to within `reach` (switches.py), both are meant, and the larger F counts.
 """
 
 import numpy as np

@@ -43,8 +43,7 @@ JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
 
 class ProgramPieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, and the K arcs and curves. Few arrays, since each
-    costs at every call.
+    """N pieces over A axes, the N+1 vertices around them, the K arcs and curves; few arrays, as calls cost.
 
     vertex : (N+1, A) [mm]
     joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real: of the program

@@ -1,5 +1,4 @@
-"""The tangential acceleration |a.t| <= A_t and the tangential jerk |j.t + |a - (a.t) t|^2/|v|| <= J_t, with
-t = v/|v| of x, y and z, sample by sample.
+"""The tangential acceleration |a.t| <= A_t and jerk |j.t + |a - (a.t) t|^2/|v|| <= J_t, t = v/|v| in x, y, z.
 
 Twice: on the delivered columns, and by the lengths run between samples. With the mean speed u = L/h of every
 period, twice the change from one to the next over the time of both is a mean of the tangential acceleration,

@@ -105,10 +105,8 @@ class Verdict:
     passed           : True if every check holds, apart from quantities that are "not limited"
     limits           : checks by name: velocity.x, acceleration.x, jerk.x ..., feed, normal acceleration
     claims           : how each figure is known (claims.py)
-    contour          : the largest distance of the motion from the path, as far as it could be followed,
-                       against the tolerance there
-    vertex           : the largest distance of a programmed vertex from the motion, of those that are known,
-                       against the tolerance there
+    contour          : the largest distance of the motion from the path, against the tolerance there
+    vertex           : the largest known distance of a vertex from the motion, against the tolerance there
     corners          : eq. 18-20 at the programmed corners
     contour_error_mm : largest distance of the motion (samples, their chords, places between) from the path
                        [mm]; None if the motion could not be followed

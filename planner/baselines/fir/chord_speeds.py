@@ -187,8 +187,7 @@ def filter_lengths(
 ) -> tuple[FloatArray, FloatArray]:
     """T1 >= T2 (S,) [s] for the speeds on the chords (par. 19).
 
-    T1 = V/A and T1 T2 = V/J with the axes' limits along the chords, each times its margin, or both the same
-    where V is too small to reach A.
+    T1 = V/A, T1 T2 = V/J with the limits along chords times margins, or equal where A is not reached.
 
     speed  : (R,) [mm/s]
     margin : (S, 2) of T1 and of T1 T2 [-]

@@ -1,5 +1,4 @@
-"""Corners at constant speed (paper 002): how fast each may be, and a smooth path as the chain of legs and
-corners for the look-ahead.
+"""Corners at constant speed (paper 002): how fast each may be, and their chain for the look-ahead.
 
 At the constant speed v an axis has r'_k v, r''_k v^2 and r'''_k v^3, so that over a corner
 

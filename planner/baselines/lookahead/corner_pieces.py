@@ -4,8 +4,7 @@ Every piece is anchored at a joint k between the legs k-1 and k with the directi
 
     P_k + c1(t) u1 + c2(t) u2,      c1, c2 cubics in t: position, velocity, acceleration, jerk at the piece's start.
 
-On leg k only c2 moves, in the seven phases of two ramps and the cruise between them. In the corner at joint k
-(corners/kinematic.py)
+On leg k only c2 moves, in seven phases. In the corner at joint k (corners/kinematic.py)
 
     zero entry acceleration    c1'' = -V h(t),  c2'' = V h(t),   h = the trapezoid of T1, T2 (docs/papers.md 0);
     entry deceleration         c1''' = c2''' = A/Tc,

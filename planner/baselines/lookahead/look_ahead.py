@@ -7,17 +7,13 @@ grow with V (or do not depend on it), so every candidate is a family with one pa
 between two corners is in baselines/lookahead/ramps.py, with V' and x as there.
 
 Acceleration has to change its sign on the leg, at a speed not below either V + A^2/(2j); so a leg is feasible
-iff from the slower of its ends that speed of the faster one is within reach of what the corners leave: W_fast
-<= V' + x.
+iff from the slower of its ends that speed of the faster one is within reach: W_fast <= V' + x.
 
-1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible.
-Lowering a speed never
-   lengthens its corner, which leaves the neighbouring leg feasible, so two sweeps are enough.
-2. Faster corners are not always better (zero entry acceleration makes the deceleration die out twice, a
-corner at constant low speed
-   takes long). Over all choices of a candidate or a stop per corner, the fastest is found by dynamic
-   programming; between two corners the speeds where only limits change are the largest ones. All stops, and
-   every candidate throughout, are among the choices: the result is never slower than any of them.
+1. Candidate by candidate, one sweep backwards and one forwards lower the speeds until every leg is feasible:
+   a lower speed never lengthens a corner, so two sweeps are enough.
+2. Faster corners are not always better. Over all choices of a candidate or a stop per corner, the fastest is
+   found by dynamic programming; between two corners the speeds where only limits change are the largest ones.
+   All stops, and every candidate throughout, are among the choices: the result is never slower than these.
 
 Everything is linear in the number of joints.
 """

@@ -1,7 +1,6 @@
 """A limit, as the planner sees it. Every limit is an object in a file of its own, listed in `limits.py`.
 
-A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2 and u, j
-acceleration and jerk along the path:
+A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2, u, j:
 
     a cap    x <= ...  at a grid point. What it comes from says which method the limit has:
                  at_points   the point and the intervals beside it          programmed feed, axis velocity

@@ -1,5 +1,4 @@
-"""The rows of a third-order problem as compiled functions take them: the solver (layout.py), and the
-Lagrangian of its solution."""
+"""The rows of a third-order problem as the solver (layout.py) and its Lagrangian take them."""
 
 from typing import NamedTuple
 

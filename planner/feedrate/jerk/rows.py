@@ -1,5 +1,4 @@
-"""The jerk-limited problem on one window, linearised, with its curvature: what the interior-point step of
-interior_point.py works on.
+"""The jerk-limited problem on one window, linearised, with its curvature: for an interior-point step.
 
 Unknowns of a window with N intervals: z_i = (x_i, u_i), feed^2 and acceleration along the path at the N+1
 points (both ends given), and p_i = u_{i+1} - u_i on the intervals. The jerk is constant on an interval, so

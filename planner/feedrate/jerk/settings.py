@@ -1,9 +1,7 @@
 """The settings of the interior-point method of interior_point.py: one record, the same for every problem.
 
-"Iterations" below are those of 156 problems, 150 of benchmarks/solvers/jerk_campaign.py and three jobs, in
-windows of 1,000 intervals, with one number changed at a time: 3889 with the numbers as they are. None is
-critical: of 38 other values that were tried only a first barrier of 3 and a defect of 1e-7 left problems
-without a solution.
+Numbers in brackets are the iterations of 156 problems (benchmarks/solvers/jerk_campaign.py and three jobs)
+with another value; 3889 with the values as they are.
 """
 
 from dataclasses import dataclass, field
@@ -32,8 +30,7 @@ class InteriorPointSettings(NamedTuple):
 
     Steps
     to_boundary     : fraction of the way to a slack or multiplier of zero that a step may take (0.9: 4311)
-    domain_edge     : fraction of the kinematics' domain that a step may reach; the rows ask for less
-                      (rows.DOMAIN), so that no solution lies here
+    domain_edge     : fraction of the kinematics' domain that a step may reach; rows ask for less
     shortening      : of a step that leaves the domain, until it does not
     shortest        : steps are not shortened below this; the next model is another one
     feed_sq_shrink  : largest fraction of x that one step may take away: x stays positive

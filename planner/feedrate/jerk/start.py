@@ -2,17 +2,14 @@
 
 `envelope` is what the solver starts from, turned into a motion where that is found (track.py):
 
-1. Caps: feed^2 may not exceed a share of what axis accelerations allow at constant speed, |r''_k| x <= a_k,
-nor of what axis jerks
-   allow, |r'''_k| x^(3/2) <= j_k.
+1. Caps: feed^2 may not exceed a share of what axis accelerations and jerks allow at constant speed,
+   |r''_k| x <= a_k and |r'''_k| x^(3/2) <= j_k.
 2. The fastest profile under these caps that leaves every dip, and brakes into it, like a motion with a share
-of the jerk, up to a share
-   of the acceleration. Near rest that is s = j t^3/6.
+   of the jerk, up to a share of the acceleration. Near rest that is s = j t^3/6.
 
 `plain_start` is far from it and always works: from rest with constant jerk on the first interval, with that
 acceleration for about a quarter of the way, constant speed after one interval of transition, and the same
-backwards from the end. Every interval has constant jerk, so that the kinematics are exact, and slowed down
-enough it keeps any limits.
+backwards. Its kinematics are exact, and slowed down enough it keeps any limits.
 """
 
 import numpy as np

@@ -1,5 +1,4 @@
-"""Profiles on exact kinematics, near one whose kinematics are not: what the interior-point method starts
-from, and its result polished."""
+"""Profiles on exact kinematics, near one whose kinematics are not: starts, and results polished."""
 
 import numpy as np
 

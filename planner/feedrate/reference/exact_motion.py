@@ -1,5 +1,4 @@
-"""From a profile of another transcription to one that can be delivered: constant jerk in time on every
-interval, within all limits.
+"""From another transcription's profile to one of constant jerk on every interval, within all limits.
 
 1. The nearest profile with constant jerk on every interval and exact kinematics, by least squares over time
 (`ScaledWindow.near`). 2. Every piece is slowed down until all limits hold at its grid points. Slower by lam

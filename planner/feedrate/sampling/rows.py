@@ -1,5 +1,4 @@
-"""The smooth path cut into rows of one element and one block each, which the grid then divides (kernels of
-feedrate/sampling/samples.py).
+"""The smooth path cut into rows of one element and one block each, which the grid then divides.
 
 In the order of the path: the free part of a leg, then the corner behind it in two halves, or the run of spans
 that begins there. Free parts and corners are cut at all ends of blocks, spans where the motion passes changes

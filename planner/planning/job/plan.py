@@ -50,8 +50,7 @@ class Plan(Shown):
     toolpath            : the exact programmed path with its tolerances
     status, sentence    : how the solution ended
     trajectory, verdict : the motion at the interpolation period, and the verdict on it; None unless solved
-    joints              : of a program with the tool centre point on: the same motion as setpoints of the
-                          joints; `trajectory` is that of the tip
+    joints              : with the tool centre point on the motion as setpoints of the joints, else None
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
     making              : of a plan on its way what only planning needs; None in a finished one

@@ -1,14 +1,11 @@
 """Method `bezier`: paper 002. Bezier pairs, error allocation, S-curves between constant speeds.
 
 1. Every corner, and every tangent joint where the curvature jumps, is rounded by a Bezier pair that uses the
-fraction of the tolerance
-   that eq. (20) gives it (three sources: rounding, chord error, filters that follow).
-2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the axes'
-limits, jerk included, allow
-   from its one end to the other (lookahead/constant_speed_corners.py).
-3. A look-ahead over corners and what is free between them chooses the speed of every corner, or a full stop
-at its vertex where that
-   is faster (lookahead/look_ahead.py); on arcs the limits are constant.
+   fraction of the tolerance that eq. (20) gives it (rounding, chord error, filters that follow).
+2. Each corner has the largest constant speed that eq. (19) with the rest of the tolerance and the limits of
+   the axes, jerk included, allow (lookahead/constant_speed_corners.py).
+3. A look-ahead (lookahead/look_ahead.py) chooses the speed of every corner, or a full stop at its vertex
+   where that is faster; on arcs the limits are constant.
 4. What the samples of a corner may have missed is made good by slowing down; usually nothing.
 """
 

@@ -1,20 +1,15 @@
 """Method `fir`: paper 000's velocity pulses, overlapped at the corners and smoothed by two FIR filters.
 
-1. Arcs become chords. Between full stops the filters are chosen anew (baselines/fir/fastest_schedule.py),
-unless `profile_filters`
-   says which.
+1. Arcs become chords. The filters are chosen anew between full stops (baselines/fir/fastest_schedule.py),
+   unless `profile_filters` says which.
 2. At sharp corners the command waits for the gap that eq. 15 leaves of the filters' delay; through curves it
-flows without a gap,
-   at a speed at which the filters stay within the tolerance (baselines/fir/rules.py).
-3. The filtered motion is made exactly, in pieces of constant jerk (baselines/fir/superpose.py). 4. Its
-deviation from the path, its accelerations and its jerks are measured exactly, and where one is too large the
-command slows
-   down (baselines/fir/measure.py, baselines/fir/slow_down.py): what the filters promise for isolated pulses,
-   |a| <= V/T1 and |j| <= V/(T1 T2), holds for no chain of pulses (up to 2 V/T1 and 4 V/(T1 T2),
-   docs/papers.md), and eq. 14 not for short ones.
+   flows, at a speed at which the filters stay within the tolerance (baselines/fir/rules.py).
+3. The filtered motion is made exactly, in pieces of constant jerk (baselines/fir/superpose.py).
+4. Its deviation, accelerations and jerks are measured exactly, and the command slows down where one is too
+   large (baselines/fir/measure.py, slow_down.py): |a| <= V/T1 and |j| <= V/(T1 T2) hold for isolated pulses,
+   not for chains of them (docs/papers.md), and eq. 14 not for short ones.
 
 These filters make the setpoints; those that the machine has behind them (`[fir]`) come after.
-
 `plain` is the paper without 4: T1 = V/A, T2 = A/J, eq. 15 at every corner, whatever that exceeds.
 """
 

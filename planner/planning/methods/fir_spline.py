@@ -1,18 +1,15 @@
 """Method `fir-spline`: paper 001. Closed-form feed limits along a smooth path, then two FIR filters.
 
-1. The path has to be smooth: corners are rounded by Bezier pairs that use a small fraction of the tolerance.
-It becomes
-   chords so fine that they are the path (baselines/fir/chord_guide.py).
+1. Corners are rounded by Bezier pairs that use a small fraction of the tolerance. The path becomes chords so
+   fine that they are the path (baselines/fir/chord_guide.py).
 2. The command runs at the speed that the formulas allow, T1 = V/A and T2 = A/J, for a few largest speeds V of
-every run between full
-   stops (baselines/fir/chord_speeds.py).
-3. The filtered motion is made exactly, in pieces of constant jerk; error, acceleration and jerk are measured,
-and where something is
-   exceeded the command gets slower or the filters longer, until nothing is. The fastest of the V stays.
+   every run between full stops (baselines/fir/chord_speeds.py).
+3. The filtered motion is made exactly and measured; where something is exceeded the command gets slower or
+   the filters longer, until nothing is. The fastest of the V stays.
 
 `plain` is the paper as it is: v_sc at every point and its filters, without 3. The formulas assume a constant
-curvature within what the filters cover; where it varies, the verdict shows what they exceed (docs/papers.md,
-paper 001: G3).
+curvature within what the filters cover; elsewhere the verdict shows what they exceed (docs/papers.md, 001:
+G3).
 """
 
 import dataclasses

@@ -1,18 +1,14 @@
 """Method `kinematic`: paper 003's jerk-limited corners between straight legs, with look-ahead.
 
-1. Arcs are cut into chords (half of the tolerance), or run as they are with full stops at both ends where
-that is faster; curves are
-   always cut.
+1. Arcs are cut into chords (half of the tolerance), or run whole between full stops where that is faster;
+   curves are always cut.
 2. Every corner has its candidates with the largest speed that tolerance, limits and legs allow: zero entry
-acceleration, entry
-   deceleration (corners/kinematic.py), and, where the drives start and stop with a step of velocity, the
+   acceleration, entry deceleration (corners/kinematic.py), and where drives start with a step of velocity the
    vertex itself at that step.
 3. The look-ahead lowers the speeds until every leg can be run, and chooses per corner a candidate or a full
-stop, so that the whole
-   is fastest (baselines/lookahead/look_ahead.py).
-4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): the
-motion itself,
-   nothing is sampled.
+   stop, so that the whole is fastest (baselines/lookahead/look_ahead.py).
+4. Legs and corners are pieces of constant jerk of every axis (baselines/lookahead/corner_pieces.py): nothing
+   is sampled.
 
 A run between full stops that is not faster than stopping at every block is made as method `stop` makes it.
 """

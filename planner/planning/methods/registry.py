@@ -44,10 +44,8 @@ class MethodSettings(TypedDict, total=False):
     geometry : how the path is smoothed: "spline" (one spline from stop to stop), "corners" (each corner by
                itself) or "auto" (splines, or corners where they take less time); None for "auto", or for
                "corners" where `corner` is given
-    corner   : the shape of single corners: "bezier", "fir" or "kinematic", or a shape of your own
-               (corners/own.py); None for "bezier"
-    solver   : "own", "ipopt" or "fatrop" for "optimal", "reachability" or "toppra" for
-               "second-order"; None for the first of them
+    corner   : the shape of single corners: "bezier", "fir", "kinematic", or your own; None for "bezier"
+    solver   : "own", "ipopt", "fatrop"; "reachability", "toppra"; None for the method's first
     effort   : "quick", "normal" or "best": how fine grids and search are; None for "normal"
     smooth   : weight of the jerk against the time, 0 or more [-]: with more the joint search of "optimal"
                finds a smoother and slower motion; None for 0, where jerk is small as far as it costs no time

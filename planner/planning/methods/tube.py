@@ -1,11 +1,9 @@
 """Method `tube`: path and feed found together within the tolerance, from another method's motion.
 
-All other methods round the path first and then find the feed. Here the motion of the axes itself is what is
-sought (joint/rows.py, joint/nlp.py), so nothing is given away between the two. What is found is the best
-motion near the one from which the search starts, with no certificate that there is no better one elsewhere.
-Where no search ends faster than the start, its motion stays, run by run and window by window
-(joint/parts.py): the plan is never slower. `optimal` searches in the same way; this method has the reference
-solvers.
+What is found is the best motion near the one from which the search starts (joint/rows.py, joint/nlp.py), with
+no certificate that there is no better one elsewhere. Where no search ends faster than the start, its motion
+stays, run by run and window by window (joint/parts.py): the plan is never slower. `optimal` searches in the
+same way; this method has the reference solvers.
 """
 
 from dataclasses import dataclass, field, replace

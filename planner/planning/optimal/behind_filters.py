@@ -1,16 +1,13 @@
 """Corners taken slowly enough for filters, before delivery/filters.py slows down whole runs.
 
 A filtered motion passes a vertex at the mean of its positions within Td: the longer the motion takes for the
-corner itself, the less the way in and out counts. Therefore only the feed close to a corner that the filtered
-motion misses is limited; the motion brakes and speeds up as steeply as the axes allow. The error of a corner
-rises with the square of its feed by a power that depends on all that happens within Td. So each corner looks
-for the root of its own error, by secants in logarithms, between the square that was too slow and the one that
-was too fast the last time; the problem is solved again with all of them, until no corner is missed and none
-has room left. Where the contour is left away from corners, the feed is limited wherever the filters hold the
-motion at that moment.
+corner itself, the less the way in and out counts. So only the feed close to a corner that is missed is
+limited; the motion brakes and speeds up as steeply as the axes allow. The error of a corner rises with a
+power of the square of its feed: each corner looks for the root of its own error, by secants in logarithms,
+and the problem is solved again with all of them, until no corner is missed and none has room left. Where the
+contour is left away from corners, the feed is limited wherever the filters hold the motion at that moment.
 
-The rounds keep limits at grid points; what they end with keeps them between, and the tolerance.
-
+The rounds keep limits at grid points; what they end with keeps them between, and the tolerance (`kept`).
 Along arcs a closed form gives the bound beforehand (constraints/assemble.py).
 """
 

@@ -74,8 +74,7 @@ def corner_bounds(path: SmoothPath, machine: Machine) -> CornerBounds:
 def with_corners(
     rounded: SmoothPath, best: OnPath, corners: CornerBounds, job: Job, order: Order, grids: Grids
 ) -> tuple[OnPath, Array]:
-    """Corners instead of splines between the full stops where they are faster, and (L,) the runs on which
-    that was too much to find out.
+    """Corners instead of splines between the full stops where they are faster; (L,) runs not compared.
 
     rounded : the path with the corners that the splines of `best` replace
     corners : bounds on the motion on them

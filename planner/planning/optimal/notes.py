@@ -55,8 +55,7 @@ def no_spline_note(rounded: SmoothPath, shape: SplineShape) -> tuple[str, ...]:
 
 
 def not_compared_note(rounded: SmoothPath, left: Array, points: FloatArray) -> tuple[str, ...]:
-    """That single corners were not compared on some runs between full stops
-    (planning/optimal/compare_corners.py).
+    """That single corners were not compared on some runs between full stops (compare_corners.py).
 
     left   : (L,) these runs
     points : (G,) of the grid that each run would have

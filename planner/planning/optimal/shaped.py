@@ -6,25 +6,19 @@ to keep the limits and the tolerance; p does not. It follows that:
 * The copies of one mode are half a period apart. Where p accelerates for less than that, D has half of its
   acceleration and jerk, so p may be planned with up to twice the limits.
 * D cuts corners on which p moves. A sharp corner costs least time if p stops there for a moment, shorter than
-  the shaper, so that D passes it within the tolerance (paper 000's overlap of two moves). Therefore p stops
-  at every corner that turns by more than an angle, with the shortest rest that is enough. At full stops of
-  the program p rests for the whole length of the shaper, so that D stands still.
-* D cuts curves off by up to half of the normal acceleration of p times the variance of the shaper's delays
-  (planner/motion/shaping.py), about as much as moving averages do (docs/papers.md D). So the normal
-  acceleration of p is limited, and p is slow in curves only. Where D turns in less time than the shaper is
-  long it is nearer than that: there a faster p is better.
-* Where D exceeds a limit or leaves the tolerance nevertheless, p gets smaller limits in those places, at the
-  times of all copies, and is solved again. What remains then is removed by slowing down runs of p
-  (settling.py).
+  the shaper (paper 000's overlap of two moves): p stops at every corner that turns by more than an angle,
+  with the shortest rest that is enough, and at full stops of the program for the whole length of the shaper.
+* D cuts curves off by up to half of the normal acceleration of p times the variance of the shaper's delays,
+  so that is limited. Where D turns in less time than the shaper is long it is nearer: there a faster p is
+  better.
+* Where D exceeds something nevertheless, p gets smaller limits in those places, at the times of all copies,
+  and is solved again; what remains then is removed by slowing down runs of p (settling.py).
 
 A shaper that takes little of the tolerance is for the joint search what filters of its variance are: p keeps
 the limits as they are, so D does, and stops at no corner (`_searched`). Where it may take `SEARCHED` times
-the tolerance p is planned in other ways as well, of which the fastest D is taken:
-
-Of the `CANDIDATES` the fastest D is delivered, or the one with the limits as they are, stops at all corners
-and rests of the whole length, which along straight blocks keeps every limit and the tolerance. Its least time
-is known beforehand; it is planned when another one takes longer than that, and no candidate is pursued that
-takes longer than what is there.
+the tolerance p is planned by `CANDIDATES` as well, of which the fastest D is taken, or the one with the
+limits as they are, stops at all corners and rests of the whole length, which along straight blocks keeps
+everything. Its least time is known beforehand; it is planned when another one takes longer than that.
 """
 
 import dataclasses

@@ -184,8 +184,7 @@ def within_limits(
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
-    """The same motion with every run slowed down by its `excess` (L,), and by a little more; the motion
-    itself where none needs it.
+    """The same motion with every run slower by its `excess` (L,) and a little more, where that is needed.
 
     factor : the excess, if it is known
     """

@@ -130,7 +130,7 @@ class Slowed:
 
     def was_at(self, times: FloatArray) -> FloatArray:
         """(n,) the times of the motion as it was [s], at ascending times (n,) [s]."""
-        return self._theta(self._moving(times)[0])
+        return self._theta(without_stands(self.stands, times)[0])
 
     def was_at_any(self, times: FloatArray) -> FloatArray:
         """The same at times (n, m) [s] in any order."""
@@ -147,10 +147,6 @@ class Slowed:
     def _stood(self) -> FloatArray:
         """(n+1,) how much longer it has stood before each of its stands, and behind the last [s]."""
         return np.append(0.0, np.cumsum(self.stands[:, 1]))
-
-    def _moving(self, times: FloatArray) -> tuple[FloatArray, Array]:
-        """(n,) times without the stands [s], and whether the motion stands then."""
-        return without_stands(self.stands, times)
 
     @cached_property
     def _knots(self) -> tuple[FloatArray, FloatArray]:
@@ -189,7 +185,7 @@ class Slowed:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
-        tau, stands = self._moving(times)
+        tau, stands = without_stands(self.stands, times)
         theta = self._theta(tau)
         # two times next to each other may be one at another pace
         single, which = np.unique(theta, return_inverse=True)
@@ -212,7 +208,7 @@ class Slowed:
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Slowed:
         """The motion standing longer by `by` (n,) [s] where it comes to rest, at the times `at` (n,) [s]."""
-        new = np.stack([self._moving(np.sort(at))[0], by[np.argsort(at)]], axis=1)
+        new = np.stack([without_stands(self.stands, np.sort(at))[0], by[np.argsort(at)]], axis=1)
         stands = np.concatenate([self.stands, new])
         return dataclasses.replace(self, stands=stands[np.argsort(stands[:, 0], kind="stable")])
 

@@ -40,11 +40,7 @@ LEAST_STEPS = 2
 KINEMATIC_MOST = SIZES.rivals_planned  # blocks; of more `kinematic` is planned only where nothing passes
 
 
-def _searched(job: Job, settings: Settings, tried: Tried) -> bool:
-    return is_searched(job, settings)
-
-
-def is_searched(job: Job, settings: Settings) -> bool:
+def is_searched(job: Job, settings: Settings, tried: Tried | None = None) -> bool:
     """Whether the joint search knows all limits of the job, and the effort is for so many steps."""
     if not settings.joint:
         return False
@@ -72,7 +68,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
     """Whether the search of a small job has not ended; behind filters the path is planned anyway."""
-    small = tried.left and _searched(job, settings, tried) and settings.effort.search.of(tried.steps).again
+    small = tried.left and is_searched(job, settings) and settings.effort.search.of(tried.steps).again
     return small and tried.best is None and not filters_count(*job.real)
 
 
@@ -129,7 +125,7 @@ def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 ATTEMPTS = (
-    Attempt("joint search", _searched, _joint),
+    Attempt("joint search", is_searched, _joint),
     Attempt("search, once more", _not_ended, _once_more),
     Attempt("motion on the path", _not_joint, _on_path),
     Attempt("closed form", _closed_form_may_be_faster, _closed_form),

@@ -195,7 +195,8 @@ def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo
     if stays and not search.finer:
         return TubeOwn(search.gap, progress=report, smooth=search.smooth)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
-    shares = [partial(_of_whole, report, *part) for part in pairwise((ends / ends[-1]).tolist())]
+    parts = pairwise((ends / ends[-1]).tolist())
+    shares = [lambda done, a=a, b=b: report(a + done * (b - a)) for a, b in parts]
     return InTwo(
         TubeOwn(search.gap, divide=False, progress=shares[0], smooth=search.smooth),
         tuple(
@@ -203,10 +204,6 @@ def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo
             for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
         ),
     )
-
-
-def _of_whole(report: Report, begin: float, end: float, share: float) -> None:
-    report(begin + share * (end - begin))
 
 
 def searched_runs(

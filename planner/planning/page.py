@@ -36,7 +36,7 @@ from planner.planning.job.runs_alone import with_runs_alone
 from planner.planning.job.stages import Progress, Stages
 from planner.planning.job.trace import Log
 from planner.planning.optimal.effort import Settings
-from planner.planning.optimal.result import prices_of
+from planner.sensitivity.path_prices import path_prices
 
 # Runs on which the verdict finds something are planned by themselves where they are no more of all [-].
 ALONE_SHARE = 0.1
@@ -209,4 +209,5 @@ def _finished(best: Plan, job: Job) -> Plan:
     if not priced:
         return best
     with job.stage("report"):
-        return dataclasses.replace(best, prices=prices_of(priced, job.machine))
+        prices = path_prices(priced.samples, priced.problem, priced.solution, job.machine)
+        return dataclasses.replace(best, prices=prices)

@@ -33,7 +33,6 @@ from planner.planning.job.notes import job_notes
 from planner.planning.job.plan import Making, Plan
 from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Tell
-from planner.sensitivity.records import GridHistory
 from planner.verifier import OF_CHORDS, verify
 
 NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"
@@ -96,8 +95,10 @@ class Job:
         return dataclasses.replace(self, most=min(self.most, time))
 
     def with_own_clock(self) -> Job:
-        """The job for a plan inside the plan, whose progress is not told."""
-        return dataclasses.replace(self, stages=self.stages.own_clock())
+        """The job for a plan inside the plan: its steps are told too, but not its progress."""
+        stages = Stages()
+        stages.tell = self.stages.tell
+        return dataclasses.replace(self, stages=stages)
 
     def stage(self, name: str) -> AbstractContextManager[Callable[[float], None]]:
         """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
@@ -222,7 +223,10 @@ class Job:
         given_up = tuple(dict.fromkeys((*(made.notes if made else ()), *notes, *self._ringing(made, method))))
         for note in given_up:
             self.tell("given up", what=note)
-        held: dict[str, Any] = {} if tables.grid is None else {"held_by": _largest_shares(tables.grid)}
+        longest = [] if tables.grid is None else tables.grid.percents()[:3]
+        held: dict[str, Any] = (
+            {} if tables.grid is None else {"held_by": ", ".join(f"{a} {b} %" for a, b in longest)}
+        )
         self.tell(
             "plan",
             found=np.nan if trajectory is None else trajectory.cycle_time,
@@ -270,8 +274,3 @@ def _at_blocks(trajectory: Trajectory, toolpath: Toolpath, first: Array, segment
         return trajectory.at_places(first, toolpath.block[segment], toolpath.line[segment])
     segment = np.repeat(segment, np.diff(np.append(first, len(trajectory))))
     return dataclasses.replace(trajectory, block=toolpath.block[segment], line=toolpath.line[segment])
-
-
-def _largest_shares(grid: GridHistory) -> str:
-    """The three limits that hold a motion longest."""
-    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents()[:3])

@@ -24,12 +24,6 @@ class Stages:
         self.tell: Tell = tell_nobody if log is None else Teller(log)
         self._progress = progress
 
-    def own_clock(self) -> Stages:
-        """Another clock, for a plan inside the plan: it tells of its steps too, but not of its progress."""
-        other = Stages()
-        other.tell = self.tell
-        return other
-
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:
         """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""

@@ -64,14 +64,7 @@ class Tell(Protocol):
     ) -> None: ...
 
 
-def tell_nobody(
-    name: str,
-    *,
-    found: float | None = None,
-    before: float | None = None,
-    kept: bool | None = None,
-    **facts: Fact,
-) -> None:
+def tell_nobody(name: str, **told: Any) -> None:
     """A `Tell` for where nobody listens."""
 
 

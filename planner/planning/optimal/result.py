@@ -12,8 +12,6 @@ from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.sensitivity.activity import history
-from planner.sensitivity.path_prices import path_prices
-from planner.sensitivity.records import PriceList
 
 
 def plan_of_solution(
@@ -47,8 +45,3 @@ def priced(best: OnPath, machine: Machine) -> bool:
     tell, nor behind filters, of which the problem knows only a part."""
     solution = best.solution
     return solution.jerk_limited and solution.multipliers is not None and machine.fir is None
-
-
-def prices_of(best: OnPath, machine: Machine) -> PriceList | None:
-    """The prices of its limits."""
-    return path_prices(best.samples, best.problem, best.solution, machine)

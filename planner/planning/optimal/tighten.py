@@ -179,8 +179,10 @@ def within_limits(
         del motion
     planned, factor = best
     motion = slowed(planned.motion(), toolpath, machine, factor)
-    many = len(planned.samples) > MANY_POINTS
-    return planned, slower(motion, np.full(len(planned.samples.piece) - 1, SEEN_BEFORE)) if many else motion
+    if len(planned.samples) > MANY_POINTS:
+        runs = runs_of(motion)
+        motion = slower_runs(motion, runs, np.full(len(runs), SEEN_BEFORE))
+    return planned, motion
 
 
 def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatArray | None = None) -> Motion:
@@ -188,16 +190,8 @@ def slowed(motion: Motion, toolpath: Toolpath, machine: Machine, factor: FloatAr
 
     factor : the excess, if it is known
     """
-    of_run = _of_runs(motion, excess(motion, toolpath, machine) if factor is None else factor)
+    factor, runs = excess(motion, toolpath, machine) if factor is None else factor, runs_of(motion)
+    of_run = np.maximum.reduceat(factor, runs.first)
     slow = of_run > 1.0 + EXCESS_ROUNDING
-    return slower(motion, np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0)) if slow.any() else motion
-
-
-def _of_runs(motion: Motion, factor: FloatArray) -> FloatArray:
-    """(G,) the largest factor of each run."""
-    return np.maximum.reduceat(factor, np.searchsorted(motion.law.run, np.arange(motion.law.run[-1] + 1)))
-
-
-def slower(motion: Motion, factor: FloatArray) -> Motion:
-    """Every run (G,) slowed down by its factor."""
-    return slower_runs(motion, runs_of(motion), factor)
+    by = np.where(slow, of_run * (1.0 + SLOWING_MORE), 1.0)
+    return slower_runs(motion, runs, by) if slow.any() else motion

@@ -17,6 +17,7 @@ from planner.geometry.toolpath import Joint, Toolpath, lesser_end
 
 # A chord turns by at most this much [rad]: of an arc no larger than the tolerance eight chords are left.
 CHORD_ANGLE_MAX = np.pi / 4
+OF_SEGMENT = ("feed", "rapid", "held", "exact", "block", "line")  # what all chords of a segment have
 
 
 def chord_angle(radius: FloatArray, sagitta: FloatArray) -> FloatArray:
@@ -102,12 +103,7 @@ def chorded(toolpath: Toolpath, fraction: float, whole: Array) -> Toolpath:
         start=start,
         end=end,
         length=length,
-        feed=toolpath.feed[segment],
-        rapid=toolpath.rapid[segment],
-        held=toolpath.held[segment],
-        exact=toolpath.exact[segment],
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
+        **{name: getattr(toolpath, name)[segment] for name in OF_SEGMENT},
         arc=np.where(straight | chord, -1, toolpath.arc[segment]),
         curve=np.full(len(segment), -1),
         tangent_start=tangent_start,

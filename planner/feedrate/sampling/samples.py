@@ -184,42 +184,18 @@ def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathS
 
     Raises ValueError if one of the intervals is not straight: on curves a new point needs new geometry.
     """
-    table = samples.table
-    element = samples.element[interval]
-    if not straight(table.legs, element).all():
+    if not straight(samples.table.legs, samples.element[interval]).all():
         raise ValueError("insert_points: only straight intervals can be split")
-    after = interval + 1
     ds = s - samples.s[interval]
-    w = samples.w0[interval] + ds
-
-    def put(values: Array, new: Array | float) -> Array:
-        return np.insert(values, after, new, axis=0)
-
-    w0 = put(samples.w0, w)
-    w1 = put(samples.w1, samples.w1[interval])
-    place = interval + 1 + np.arange(len(interval))  # where the new points are now
-    w1[place - 1] = w
-    zero = np.zeros((len(interval), samples.d1.shape[1]))
-    return PathSamples(
-        path=samples.path,
-        table=table,
-        piece=samples.piece + np.searchsorted(interval, samples.piece, side="left"),
-        stop=samples.stop,
-        s=put(samples.s, s),
-        position=put(samples.position, samples.position[interval] + ds[:, None] * samples.d1[interval]),
-        d1=put(samples.d1, samples.d1[interval]),
-        d2_left=put(samples.d2_left, zero),
-        d2_right=put(samples.d2_right, zero),
-        d3_left=put(samples.d3_left, zero),
-        d3_right=put(samples.d3_right, zero),
-        element=put(samples.element, element),
-        w0=w0,
-        w1=w1,
-        segment=put(samples.segment, samples.segment[interval]),
-        margin=put(samples.margin, samples.margin[interval]),
-        kappa_left=put(samples.kappa_left, 0.0),
-        kappa_right=put(samples.kappa_right, 0.0),
-    )
+    w, zero = samples.w0[interval] + ds, np.zeros((len(interval), samples.d1.shape[1]))
+    new = {name: getattr(samples, name)[interval] for name in ("d1", "element", "w1", "segment", "margin")}
+    new |= {"s": s, "w0": w, "position": samples.position[interval] + ds[:, None] * samples.d1[interval]}
+    new |= dict.fromkeys(("d2_left", "d2_right", "d3_left", "d3_right"), zero)
+    new |= dict.fromkeys(("kappa_left", "kappa_right"), np.zeros(len(interval)))
+    columns = {name: np.insert(getattr(samples, name), interval + 1, of, axis=0) for name, of in new.items()}
+    columns["w1"][interval + np.arange(len(interval))] = w
+    piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
+    return replace(samples, piece=piece, **columns)
 
 
 def straight(legs: Array, element: Array) -> Array:

@@ -18,6 +18,8 @@ from planner.machine import Machine
 
 # Share of the bounds [-] for what effective curvatures miss beside the middle of an interval: up to 4e-4.
 CURVATURE_MARGIN = 5e-4
+# Of a problem what its path has.
+OF_SAMPLES = ("piece", "s", "d1", "d2_left", "d2_right", "d3_left", "d3_right", "margin")
 
 
 def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool = False) -> FeedrateProblem:
@@ -40,21 +42,14 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
     caps, limits = _caps(grid), Limits.of(machine, grid.axes)
     pieces = len(samples.piece) - 1
     problem = FeedrateProblem(
-        piece=samples.piece,
-        s=samples.s,
         axes=grid.axes,
-        d1=samples.d1,
-        d2_left=samples.d2_left,
-        d2_right=samples.d2_right,
-        d3_left=samples.d3_left,
-        d3_right=samples.d3_right,
+        **{name: getattr(samples, name) for name in OF_SAMPLES},
         velocity=limits.velocity,
         acceleration=limits.acceleration,
         jerk=limits.jerk,
         feed_sq_max=caps.feed_sq_max,
         feed_sq_bound=caps.which,
         bound_names=tuple(caps.names),
-        margin=samples.margin,
         feed_sq_start=np.zeros(pieces),
         feed_sq_end=np.zeros(pieces),
     )

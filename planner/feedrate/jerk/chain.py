@@ -12,7 +12,6 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.jerk.columns import ProblemColumns
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.start import envelope
@@ -51,7 +50,7 @@ class Task:
 
     solver: WindowSettings
     columns: ProblemColumns
-    profile: Profile
+    profile: Window
     first: int
     last: int
     tell: Callable[[int], None]

@@ -50,8 +50,8 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Chain, Task
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
-from planner.feedrate.jerk.profile import Profile
 from planner.feedrate.jerk.settings import WindowSettings
+from planner.feedrate.jerk.window import Window
 from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
 
@@ -78,7 +78,7 @@ class JerkLimited(WindowSettings):
             at = problem.s[problem.piece[short[0]]]
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
-        profile = Profile.at_rest(*problem.d1.shape)
+        profile = Window.at_rest(*problem.d1.shape)
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
         task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
         pieces = [Chain(task(first=a, last=b - 1)) for a, b in pairwise(problem.piece.tolist())]

@@ -59,7 +59,8 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Window:
-    """The profile of a window in the problem's units; rows (N, A, 4) ... as in `Multipliers`."""
+    """The profile of a window, or of a whole problem as it grows, in the problem's units; rows (N, A, 4) ...
+    as in `Multipliers`."""
 
     x: FloatArray
     u: FloatArray
@@ -71,17 +72,20 @@ class Window:
 
     def after(self, point: int) -> Window:
         """The part from a point on."""
-        own = slice(point, None)
-        return replace(
-            self,
-            x=self.x[own],
-            u=self.u[own],
-            jerk=self.jerk[own],
-            duration=self.duration[own],
-            rows=self.rows[own],
-            feed=self.feed[own],
-            dynamics=self.dynamics[own],
-        )
+        return replace(self, **{name: column[point:] for name, column in vars(self).items()})
+
+    @classmethod
+    def at_rest(cls, points: int, axes: int) -> Window:
+        """All zero, with room for multipliers at every point."""
+        x, u, jerk, duration, dynamics = np.zeros((5, points))
+        rows, feed = np.zeros((points, axes, 4)), np.zeros((points, 2))
+        return cls(x=x, u=u, jerk=jerk, duration=duration, rows=rows, feed=feed, dynamics=dynamics)
+
+    def put(self, begin: int, found: Window, count: int) -> None:
+        """Take over the first intervals of a window that begins at a point, and the state at their end."""
+        for name, column in vars(self).items():
+            beyond = count + 1 if name in ("x", "u") else count
+            column[begin : begin + beyond] = getattr(found, name)[:beyond]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

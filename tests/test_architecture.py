@@ -50,7 +50,7 @@ VERDICT_RECORDS = {
     "ThreadCheck",
     "Verdict",
 }
-JUDGING = {"verify", "verify_joints", "fit_axes"}
+JUDGING = {"verify", "verify_joints", "fit_axes", "same_path"}
 MAY_JUDGE = ("planning.job.job", "planning.job.at_tip", "commands", "report")
 HEAVY = {"casadi", "matplotlib", "toppra", "numba", "scipy", "pyarrow", "ruckig"}
 

@@ -21,6 +21,7 @@ from planner.commands.fit import fit_command
 from planner.commands.info import expand_command, info_command
 from planner.commands.machine import import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
+from planner.commands.smooth import smooth_command
 from planner.commands.studied import sweep_command, what_if_command
 from planner.commands.verify import verify_command
 
@@ -136,6 +137,7 @@ for name, (command, line) in {
     "info": (info_command, "What a program contains, and what is not supported."),
     "time": (time_command, "How long a control takes for a program as it is."),
     "expand": (expand_command, "Write a program without parameters, loops and calls."),
+    "smooth": (smooth_command, "Write a program with fewer lines, within a share of the tolerance."),
     "pulses": (pulses_command, "Make step and direction pulses of a trajectory."),
     "export": (export_command, "Write a plan for a control."),
     "report": (report_command, "Write the page of a plan that opens in a browser."),

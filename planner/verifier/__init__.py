@@ -32,6 +32,7 @@ constraint, no solver. What it checks, and how sharp each check is:
                   threads: moves in step with the spindle
     extruder.py   what the extruder of a 3-D printer does
     joints.py     setpoints of the joints, with the tool centre point on
+    rewritten.py  two programs: whether their paths and modes are the same within a distance
     ringing.py    what the machine's vibration modes do
     verdict.py    the records that come out
     judge.py      `verify` itself
@@ -45,6 +46,7 @@ from planner.verifier.excess import OF_CHORDS, Fault, Kind
 from planner.verifier.given import DERIVATIVES, WHOLE, Given, fit_axes
 from planner.verifier.joints import verify_joints
 from planner.verifier.judge import NOT_LIMITED_NAMES, verify
+from planner.verifier.rewritten import SamePath, same_path
 from planner.verifier.ringing import Ringing
 from planner.verifier.verdict import AfterFilters, LimitCheck, ThreadCheck, Verdict
 
@@ -62,9 +64,11 @@ __all__ = [
     "Known",
     "LimitCheck",
     "Ringing",
+    "SamePath",
     "ThreadCheck",
     "Verdict",
     "fit_axes",
+    "same_path",
     "verify",
     "verify_joints",
 ]

@@ -1,8 +1,8 @@
 """Whether two programs move along the same path, within a distance, in order, with the same feeds.
 
 Both paths are divided where a feed, a mode or a standstill changes, where something else happens, and where a
-move is no line and no arc. The stretches must be as many, in the same modes, and begin and end in the same
-places. Two stretches are within a distance d of each other if both can be run through side by side, never
+move is no line and no arc. The runs must be as many, in the same modes, and begin and end in the same
+places. Two runs are within a distance d of each other if both can be run through side by side, never
 going back, and never further apart: the Frechet distance, which bounds the distances both ways and keeps the
 order. Of polylines it is decided exactly, by the places of one that can be reached beside each vertex of the
 other (Alt and Godau 1995); arcs are polylines here, whose height over their chords is added.
@@ -29,13 +29,13 @@ class SamePath:
     """What was found."""
 
     within: float  # a bound of the distance of the paths, both ways and in order [mm]; inf where `fault` is not ""
-    stretches: int
+    runs: int
     fault: str  # "" if the paths are within the allowed distance and all else is the same
     line: int = 0  # of the second program, where the fault is
 
 
-class _Stretches(NamedTuple):
-    """S stretches of a path."""
+class _Runs(NamedTuple):
+    """S runs of a path."""
 
     first: Array  # (S+1,) segments where they begin, and the number of segments
     mode: FloatArray  # (S, 6) feed, rapid, exact, held, standstill at the end, curve
@@ -54,7 +54,7 @@ def same_path(
     if one.axes != other.axes:
         raise ValueError(f"axes {one.axes} and {other.axes}")
     none = np.zeros(0, dtype=np.int64)
-    mine, theirs = (_stretches(p, m) for p, m in zip((one, other), marks or (none, none), strict=True))
+    mine, theirs = (_runs(p, m) for p, m in zip((one, other), marks or (none, none), strict=True))
     count = len(mine.mode)
     fault, line = _difference(one, mine, other, theirs)
     flat, found = FLAT * allowed, 0.0
@@ -68,11 +68,11 @@ def same_path(
             fault, line = "the paths are further apart", int(other.line[theirs.first[k]])
             break
     if fault:
-        return SamePath(within=math.inf, stretches=count, fault=fault, line=line)
-    return SamePath(within=found + 2.0 * flat if found else 0.0, stretches=count, fault="")
+        return SamePath(within=math.inf, runs=count, fault=fault, line=line)
+    return SamePath(within=found + 2.0 * flat if found else 0.0, runs=count, fault="")
 
 
-def _stretches(path: Toolpath, marks: Array) -> _Stretches:
+def _runs(path: Toolpath, marks: Array) -> _Runs:
     """Divide a path."""
     bend = path.curve >= 0
     kind = np.stack([path.feed, path.rapid, path.exact, path.held, bend], axis=1)
@@ -81,11 +81,11 @@ def _stretches(path: Toolpath, marks: Array) -> _Stretches:
     new[1:] |= np.diff(np.searchsorted(marks, path.block, side="right")) > 0
     first = np.append(np.flatnonzero(new), len(path))
     mode = np.column_stack([kind[first[:-1], :4], path.dwell[first[1:]], kind[first[:-1], 4]])
-    return _Stretches(first, mode)
+    return _Runs(first, mode)
 
 
-def _difference(one: Toolpath, mine: _Stretches, other: Toolpath, theirs: _Stretches) -> tuple[str, int]:
-    """What differs beside the way from one end of a stretch to the other, and the line; "" for nothing."""
+def _difference(one: Toolpath, mine: _Runs, other: Toolpath, theirs: _Runs) -> tuple[str, int]:
+    """What differs beside the way from one end of a run to the other, and the line; "" for nothing."""
     count = min(len(mine.mode), len(theirs.mode))
     a, b = mine.first[:count], theirs.first[:count]
     last_a, last_b = mine.first[1 : count + 1] - 1, theirs.first[1 : count + 1] - 1
@@ -103,19 +103,19 @@ def _difference(one: Toolpath, mine: _Stretches, other: Toolpath, theirs: _Stret
         )
     for bad, what in (
         (bad_mode.any(axis=1), "feed, mode or standstill differs"),
-        ((np.maximum(*ends) > PLACE_ROUNDING).any(axis=1), "a stretch begins or ends elsewhere"),
+        ((np.maximum(*ends) > PLACE_ROUNDING).any(axis=1), "a run begins or ends elsewhere"),
         (shape, "a curve differs"),
     ):
         if bad.any():
             return what, int(other.line[theirs.first[int(np.argmax(bad))]])
     if len(mine.mode) != len(theirs.mode):
-        return f"{len(mine.mode):,} stretches, and {len(theirs.mode):,} in the other", int(other.line[-1])
+        return f"{len(mine.mode):,} runs, and {len(theirs.mode):,} in the other", int(other.line[-1])
     return "", 0
 
 
-def _chords(path: Toolpath, stretches: _Stretches, k: int, flat: float) -> FloatArray:
-    """(n+1, A) the points of a stretch, between which its arcs are no further than `flat` from their chords."""
-    begin, end = int(stretches.first[k]), int(stretches.first[k + 1])
+def _chords(path: Toolpath, runs: _Runs, k: int, flat: float) -> FloatArray:
+    """(n+1, A) the points of a run, between which its arcs are no further than `flat` from their chords."""
+    begin, end = int(runs.first[k]), int(runs.first[k + 1])
     arc = path.arc[begin:end]
     straight = np.vstack([path.start[begin : begin + 1], path.end[begin:end]])
     if (arc < 0).all():

@@ -1,7 +1,7 @@
 """The same program with fewer lines: successive straight moves as longer ones and arcs (fit.py).
 
 Only lines are replaced that hold a straight move and nothing else, one directly behind the other, under one F:
-so F words, S, T, M, comments and all other lines stay byte for byte where they stood, and every stretch between
+so F words, S, T, M, comments and all other lines stay byte for byte where they stood, and every run between
 them begins and ends where it did. A line that is left has the words of the last one that it replaces.
 
 What must stay as it is, with the reason that a note names: `_why_kept`.
@@ -80,7 +80,7 @@ def _why_not(program: Program) -> str:
 
 
 class _Writer:
-    """Goes through the rows once and replaces stretches of them."""
+    """Goes through the rows once and replaces runs of them."""
 
     def __init__(self, data: bytes, program: Program, machine: Machine, within: float, *, arcs: bool):
         self.program, self.within = program, within
@@ -95,19 +95,19 @@ class _Writer:
     def written(self) -> Fewer:
         """The program."""
         kept: dict[str, tuple[int, int]] = {}
-        stretch: list[Row] = []
+        run: list[Row] = []
         before = after = arcs = 0
         for row in [*self.rows, None]:
             why = None if row is None else self._why_kept(row)
-            if stretch and (why != "" or row is None or not self._goes_on(stretch[-1], row)):
-                moves, bent = self._replace(stretch)
-                after, arcs, stretch = after + moves, arcs + bent, []
+            if run and (why != "" or row is None or not self._goes_on(run[-1], row)):
+                moves, bent = self._replace(run)
+                after, arcs, run = after + moves, arcs + bent, []
             if row is None:
                 break
             straight = row.moves and row.motion == LINE
             before += straight
             if why == "":
-                stretch.append(row)
+                run.append(row)
             elif straight or why:
                 count, first = kept.get(str(why), (0, row.line))
                 kept[str(why)] = (count + 1, first)
@@ -148,35 +148,35 @@ class _Writer:
         feed = self.program.feed
         return row.line == last.line + 1 and row.first == last.last and feed[row.first] == feed[last.first]
 
-    def _replace(self, stretch: list[Row]) -> tuple[int, int]:
-        """Write a stretch anew; returns the numbers of its moves and of its arcs."""
-        first = stretch[0]
+    def _replace(self, run: list[Row]) -> tuple[int, int]:
+        """Write a run anew; returns the numbers of its moves and of its arcs."""
+        first = run[0]
         unit = MM_PER_INCH if first.inch else 1.0
         digits = INCH_DECIMALS if first.inch else DECIMALS
         offset = self.program.origins.at(first.first)[0]
-        points = self.place[first.first : stretch[-1].last + 1] - offset
+        points = self.place[first.first : run[-1].last + 1] - offset
         moves = fewest_moves(points, self.within, unit * 10.0**-digits, arcs=self.arcs)
         if moves.normal[-1] != STRAIGHT:  # what follows may count on G1 and the plane
             moves = fewest_moves(points[:-1], self.within, unit * 10.0**-digits, arcs=self.arcs)
             moves = Moves(
-                np.append(moves.end, len(stretch)),
+                np.append(moves.end, len(run)),
                 np.append(moves.normal, STRAIGHT),
                 np.vstack([moves.center, np.zeros((1, 2))]),
                 np.append(moves.sweep, 0.0),
             )
-        if len(moves.end) == len(stretch):
-            return len(stretch), 0
-        self._write(stretch, moves, points, unit, digits)
+        if len(moves.end) == len(run):
+            return len(run), 0
+        self._write(run, moves, points, unit, digits)
         return len(moves.end), int((moves.normal != STRAIGHT).sum())
 
-    def _write(self, stretch: list[Row], moves: Moves, points: FloatArray, unit: float, digits: int) -> None:
+    def _write(self, run: list[Row], moves: Moves, points: FloatArray, unit: float, digits: int) -> None:
         """Write the moves in the lines of the last rows that they replace."""
-        own = ["YZ", "XZ", "XY"].index(stretch[0].plane)
-        plane, said = own, "" if stretch[0].g() else "G1"  # in force
+        own = ["YZ", "XZ", "XY"].index(run[0].plane)
+        plane, said = own, "" if run[0].g() else "G1"  # in force
         texts: dict[str, str] = {}
         at = 0
         for m, end in enumerate(moves.end.tolist()):
-            rows, normal = stretch[at:end], int(moves.normal[m])
+            rows, normal = run[at:end], int(moves.normal[m])
             words = []
             wanted = own if normal == STRAIGHT and m == len(moves.end) - 1 else normal
             if wanted not in (STRAIGHT, plane):

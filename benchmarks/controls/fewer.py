@@ -27,6 +27,7 @@ from planner.machine import Machine, load_machine
 from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
+from planner.nc.reading import AS_USUAL
 
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
 TOLERANCES = (0.02, 0.05)  # [mm]
@@ -37,7 +38,7 @@ TIMED = ("grbl", "linuxcnc")
 def rows_of(file: Path, machine: Machine) -> list[dict[str, Any]]:
     """The rows of a program, one for each tolerance. Raises InputError for one that cannot be read or written anew."""
     data = file.read_bytes()
-    expanded = flat_program(data, machine, source=file.name)
+    expanded = flat_program(data, machine, AS_USUAL, source=file.name)
     if expanded is not None:
         data = expanded[0].encode()
     program = parse_program(data, machine, source=file.name)

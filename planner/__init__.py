@@ -11,6 +11,7 @@
     methods                  the methods: a list of names that says what each is
     compare                  several methods on one program, judged by the same verifier
     verify                   any motion, from arrays, judged against a program and a machine
+    stretched                a plan run evenly slower, to take a given time
     read_program, path       a program from a file, a text, or points
     Program                  its blocks
     Machine, load_machine    limits, interpolation period and tolerance of a machine, from a TOML file
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from planner.planning.methods.registry import plan
     from planner.planning.page import Method
     from planner.report.compare import compare
-    from planner.report.interactive.points import path, verify
+    from planner.report.interactive.points import path, stretched, verify
     from planner.verifier import Verdict
 
     __version__: str
@@ -65,6 +66,7 @@ _HOME = {
     "Method": "planner.planning.page",
     "methods": "planner.planning.methods.listing",
     "path": "planner.report.interactive.points",
+    "stretched": "planner.report.interactive.points",
     "verify": "planner.report.interactive.points",
     "compare": "planner.report.compare",
     "Machine": "planner.machine",
@@ -109,6 +111,7 @@ __all__ = [
     "path",
     "plan",
     "read_program",
+    "stretched",
     "verify",
 ]
 

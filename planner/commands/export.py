@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import ForceOption, JsonOption, TrajectoryArgument, length_option
+from planner.commands.options import ForceOption, JsonOption, TrajectoryArgument, length_option, time_option
 from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
     from planner.motion.pulses import AxisPulses
+    from planner.planning.job.plan import Plan
 
 
 class For(StrEnum):
@@ -25,12 +26,17 @@ class For(StrEnum):
 
     stream = "linuxcnc-stream"
     pvt = "pvt"
+    pt = "pt"
+    twincat = "twincat"
+    joint_trajectory = "joint-trajectory"
     grbl = "grbl"
     klipper = "klipper"
     marlin = "marlin"
     linuxcnc = "linuxcnc"
 
 
+NUMBERS = (For.pvt, For.pt, For.twincat)
+TABLES = (*NUMBERS, For.joint_trajectory)
 PROGRAMS = (For.grbl, For.klipper, For.marlin, For.linuxcnc)
 
 
@@ -51,7 +57,8 @@ def export_command(
         typer.Option(
             "--for",
             help="linuxcnc-stream: setpoints for the streamer of LinuxCNC's HAL, with the HAL files; pvt: positions, velocities, "
-            "times; grbl, klipper, marlin, linuxcnc: a program that its own planner runs well",
+            "times; pt: positions and times; twincat: times and positions of each axis; joint-trajectory: for ROS; "
+            "grbl, klipper, marlin, linuxcnc: a program that its own planner runs well",
         ),
     ],
     output: Annotated[
@@ -61,9 +68,26 @@ def export_command(
     within: Annotated[
         float | None,
         length_option(
-            "--within", "pvt: how far the cubics between rows may be from the setpoints [mm] (default 0.001)"
+            "--within",
+            "tables: how far the motion between rows may be from the setpoints [mm] (default 0.001)",
         ),
     ] = None,
+    cycle: Annotated[
+        float | None,
+        time_option("--cycle", "tables: time between rows [s], such as 4ms (default: the longest within)"),
+    ] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            "--joints", metavar="NAME,...", help="joint-trajectory: names of the axes, in their order"
+        ),
+    ] = None,
+    power: Annotated[
+        bool,
+        typer.Option(
+            "--power", help="pvt, pt, twincat: the laser's power too; under M4 it follows the real speed"
+        ),
+    ] = False,
     tolerance: Annotated[
         float | None,
         length_option(
@@ -73,18 +97,23 @@ def export_command(
     ] = None,
 ) -> None:
     """Write a plan for a control: setpoints that it plays, or a program that its own planner runs well."""
+    for given, name, users in (
+        (tolerance is not None, "--tolerance", PROGRAMS),
+        (within is not None, "--within", TABLES),
+        (cycle is not None, "--cycle", TABLES),
+        (unit is not Unit.mm, "--unit", (For.stream, *NUMBERS)),
+        (joints is not None, "--joints", (For.joint_trajectory,)),
+        (power, "--power", NUMBERS),
+    ):
+        if given and for_ not in users:
+            raise InputError(f"{name} is for {', '.join(users)}; --for {for_} does not take it")
     if for_ in PROGRAMS:
-        if within is not None or unit is not Unit.mm:
-            raise InputError(f"--within and --unit are for setpoints; --for {for_} takes --tolerance")
         _program(plan, for_, output, tolerance)
         return
-    if tolerance is not None:
-        raise InputError(f"--tolerance is for programs; --for {for_} takes every setpoint as it is")
-    from planner.controls.export.stream import WITHIN, write_pvt, write_stream
+    from planner.controls.export.stream import write_stream
+    from planner.controls.export.tables import STRAIGHT, Table, laser_power, write_table
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
-    if within is not None and for_ is not For.pvt:
-        raise InputError(f"--within is for pvt; --for {for_} takes every setpoint as it is")
     with _new_directory(output) as new:
         read = read_trajectory(trajectory_file(plan))
         trajectory = read.trajectory
@@ -98,9 +127,20 @@ def export_command(
             write_stream(new, trajectory, unit)
             text = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
         else:
-            periods, miss = write_pvt(new, trajectory, unit, WITHIN if within is None else within)
-            text = f"a row every {periods * trajectory.dt * 1e3:g} ms, cubics between them within {miss * 1e3:.2g} µm of the setpoints"
-            if between != "cubic":
+            table = Table(
+                kind=for_.value,
+                unit=unit.value,
+                within=within,
+                cycle=cycle,
+                joints=tuple(joints.split(",")) if joints else (),
+                power=laser_power(_saved(plan).program, trajectory) if power else None,
+            )
+            periods, miss = write_table(new, trajectory, table)
+            shape = "straight moves" if for_ in STRAIGHT else "cubics"
+            text = f"a row every {periods * trajectory.dt * 1e3:g} ms, {shape} between them within {miss * 1e3:.2g} µm of the setpoints"
+            if between == "cubic" and for_ in STRAIGHT:
+                raise InputError(_POSITIONS_ALONE, source=str(plan))
+            if between != "cubic" and for_ not in STRAIGHT:
                 text += f'; the verdict is on interpolation = "{between}" between the setpoints'
     _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
     say(f"{output}: {text}")
@@ -140,16 +180,22 @@ def _say_assumed(assumptions: Sequence[object]) -> None:
         say(str(line))
 
 
+def _saved(plan: Path) -> Plan:
+    """The plan of a directory. Raises InputError for a trajectory file, which has no program."""
+    from planner.report.html.saved import saved_plan
+
+    if not plan.is_dir():
+        text = "give the directory that 'plan -o' wrote: the program is needed too"
+        raise InputError(text, source=str(plan))
+    return saved_plan(plan)[0]
+
+
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
     """Write the program of a plan's directory for a control, and say what it holds."""
     from planner.controls.export.program import NO_JERK, write_program
-    from planner.report.html.saved import saved_plan
 
     with _new_directory(output) as new:
-        if not plan.is_dir():
-            text = "give the directory that 'plan -o' wrote: the program is needed too"
-            raise InputError(text, source=str(plan))
-        saved, _, _ = saved_plan(plan)
+        saved = _saved(plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
     _say_assumed(saved.program.assumptions)

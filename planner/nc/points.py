@@ -1,7 +1,7 @@
 """Programs of points, and the file that keeps one: straight moves from one point to the next, for paths that
 are no NC program.
 
-The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm], `feed` (n) [mm/s] with null for rapid
+The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm, rad], `feed` (n) [mm/s] with null for rapid
 moves, `tolerance` [mm] or null, and `curves`, the columns of a `SplineTable`, where moves are none that go
 straight. Numbers are written so that they read back exactly.
 """
@@ -9,12 +9,14 @@ straight. Numbers are written so that they read back exactly.
 import dataclasses
 import json
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
+from planner.machine.whole import ALL_AXES
 from planner.nc.program import Kind, PathControl, Program, SplineTable
 
 AXES = ("x", "y", "z")
@@ -73,8 +75,8 @@ def points_file(program: Program) -> bytes:
 
 
 def is_points(program: Program) -> bool:
-    """Whether `points_file` keeps a program: it is one of points or curves, of linear axes."""
-    return program.source in (SOURCE, CURVE) and program.axes in (AXES, AXES[:2])
+    """Whether `points_file` keeps a program: it is one of points or curves, of the axes themselves."""
+    return program.source in (SOURCE, CURVE) and _are_axes(program.axes)
 
 
 def are_points(data: bytes) -> bool:
@@ -95,14 +97,14 @@ def read_points(data: bytes, source: str) -> Program:
         feed = np.array([np.inf if value is None else value for value in entries["feed"]], dtype=np.float64)
         tolerance = None if entries["tolerance"] is None else float(entries["tolerance"])
         axes = tuple(entries["axes"])
-        known = entries["format"] == _FORMAT and axes in (AXES, AXES[:2])
+        known = entries["format"] == _FORMAT and _are_axes(axes)
         curves = SplineTable(**entries["curves"]) if "curves" in entries else None
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
     good = known and position.ndim == 2 and position.shape[1] == len(axes) and len(position) > 1
     good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
     if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
-        text = "begins like a file of points, and is none: format points, axes xyz, points (n+1, 3), n feeds above 0 or null"
+        text = "begins like a file of points, and is none: format points, axes xyz..., points (n+1, A), n feeds above 0 or null"
         raise InputError(text, source=source)
     program = program_of_points(position, feed, tolerance, source, axes)
     if curves is None:
@@ -129,3 +131,12 @@ def _join(curves: SplineTable, position: FloatArray) -> bool:
         and np.array_equal(ends[first, 0], position[block[first]])
         and np.array_equal(ends[last, 1], position[block[last] + 1])
     )
+
+
+def _are_axes(axes: tuple[str, ...]) -> bool:
+    return (axes == AXES[:2] or axes[:3] == AXES) and known_axes(axes)
+
+
+def known_axes(axes: Sequence[str]) -> bool:
+    """Whether each is the letter of an axis that plans have, and none comes twice."""
+    return len(set(axes)) == len(axes) and set(axes) <= {*ALL_AXES}

@@ -47,7 +47,7 @@ def same_path(
     """Compare two paths.
 
     allowed : the distance [mm]
-    marks   : blocks of each before which something else happens, ascending; None for none
+    marks   : (n,) and (m,) blocks of each before which something else happens, ascending; None for none
 
     Raises ValueError for paths of other axes.
     """

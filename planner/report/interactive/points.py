@@ -1,5 +1,6 @@
-"""A program of points: straight moves from one to the next, for paths that do not come from an NC program."""
+"""A program of points, for paths that do not come from an NC program; a plan run slower; any motion, judged."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -7,31 +8,51 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.machine import LINEAR_AXES, Machine, load_machine
+from planner.base.units import RAD_PER_DEG
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine, load_machine
 from planner.machine.kinematics.chain import LINEAR, kinematics_of
 from planner.machine.kinematics.directions import rotary_along
 from planner.machine.parts import TOLERANCE_MIN
-from planner.nc.points import AXES, program_of_points
-from planner.nc.program import Program
+from planner.nc.points import AXES, known_axes, program_of_points
+from planner.nc.program import Kind, Program, SplineTable
 from planner.nc.reader import read_program
+from planner.planning.job.at_tip import Judged, judged
+from planner.planning.job.plan import Plan
 from planner.planning.methods.registry import DEFAULT_MACHINE
 from planner.report.judging import judge
 from planner.report.trajectory_reader import trajectory_of_columns
-from planner.verifier import NOT_LIMITED_NAMES, Verdict
+from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
+
+_LAST = 1e-6  # of a period: a setpoint that is nearer to the end is the end
 
 
-def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float | None = None) -> Program:
-    """A program that goes straight from each point to the next.
+def path(
+    points: ArrayLike,
+    feed: ArrayLike | None = None,
+    *,
+    axes: str = "",
+    tolerance: float | None = None,
+    spline: bool = False,
+    start_velocity: float = 0.0,
+    end_velocity: float = 0.0,
+) -> Program:
+    """A program that goes straight from each point to the next, or on a spline through all of them.
 
-    points    : (n, 2) or (n, 3) x, y and z, n > 1 [mm]; z is 0 where there is none
-    feed      : [mm/s], one for all moves or (n-1,) one for each; None for rapid moves, which only the
+    points    : (n, A), n > 1 [mm, rotary axes degrees]; axes that they have not stay at 0
+    feed      : [mm/s], one for all moves or (n-1,) one for each: the speed of x, y and z together; where they stand
+                that of u, v and w, where those stand too that of a, b and c [deg/s]. None for rapid moves, which only the
                 machine's limits hold
+    axes      : letters of the columns, up to nine of x y z a b c u v w; "" for the first two or three
     tolerance : contour error budget [mm]; None for that of the machine
+    spline    : the cubic spline through the points with no curvature at its ends, over the lengths of the moves (in mm and
+                degrees): tangents and curvature go on at each point
+    start_velocity, end_velocity : 0; a motion begins and ends at rest
 
     `Program.line` counts the moves from 1.
 
-    Raises InputError for arrays of another shape, values that are not finite, feeds that are not above 0, and
-    a tolerance below 1e-5.
+    Raises InputError for arrays of another shape, values that are not finite, letters that are no axes or come twice,
+    feeds that are not above 0, a tolerance below 1e-5, splines without a feed or with a point twice running, and other
+    velocities than 0 at the ends.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -40,23 +61,103 @@ def path(points: ArrayLike, feed: ArrayLike | None = None, *, tolerance: float |
     >>> planner.plan(square, "mill", method="stop").verdict.passed
     True
     """
-    position = _points(points)
-    moves = len(position) - 1
+    for name, velocity in (("start_velocity", start_velocity), ("end_velocity", end_velocity)):
+        if velocity != 0.0:
+            raise InputError(
+                f"{name} {velocity}: a motion begins and ends at rest; add a move before the first point or behind the "
+                "last, long enough to get up to speed or to stop, and take the part between"
+            )
+    given, letters = _points(points, axes)
+    moves = len(given) - 1
     if tolerance is not None and not TOLERANCE_MIN <= tolerance < np.inf:
         raise InputError(f"tolerance {tolerance} mm; it must be {TOLERANCE_MIN:g} or more, and finite")
-    return program_of_points(
-        position, np.full(moves, np.inf) if feed is None else _feeds(feed, moves), tolerance
+    others = tuple(letter for letter in letters if letter not in AXES)
+    position = np.zeros((len(given), len(AXES) + len(others)))
+    named = (*AXES, *others)
+    unit = np.array([RAD_PER_DEG if letter in ROTARY_AXES else 1.0 for letter in letters])
+    columns = [named.index(letter) for letter in letters]
+    position[:, columns] = given * unit
+    speed = np.full(moves, np.inf) if feed is None else _feeds(feed, moves)
+    still = np.array([letter in ROTARY_AXES for letter in named])
+    turning = (np.diff(position[:, np.logical_not(still)], axis=0) == 0.0).all(axis=1)
+    program = program_of_points(
+        position, np.where(turning, speed * RAD_PER_DEG, speed), tolerance, axes=named
     )
+    return program if not spline else _on_spline(program, given, unit, columns)
 
 
-def _points(points: ArrayLike) -> FloatArray:
-    """(n, 3) the points. Raises InputError unless they are (n, 2) or (n, 3) finite numbers, n > 1."""
+def _on_spline(program: Program, points: FloatArray, unit: FloatArray, columns: list[int]) -> Program:
+    """The program on a spline through points (n, A), which times `unit` (A,) are its `columns`."""
+    from scipy.interpolate import CubicSpline  # 0.2 s
+
+    if np.isinf(program.feed).any():
+        raise InputError("a spline needs a feed, and there is none")
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    _refuse("points: row", np.append(False, length == 0.0), points, "a spline passes no point twice running")
+    at = np.append(0.0, np.cumsum(length))
+    slope = CubicSpline(at, points, bc_type="natural")(at, 1) * unit
+    places = np.vstack([program.start, program.end])
+    control = np.stack([places[:-1], places[:-1], places[1:], places[1:]], axis=1)
+    control[:, 1, columns] += slope[:-1] * length[:, None] / 3.0
+    control[:, 2, columns] -= slope[1:] * length[:, None] / 3.0
+    table = SplineTable(block=np.arange(len(length)), points=control, weights=np.ones((len(length), 4)))
+    kind = np.full(len(length), Kind.SPLINE)
+    return dataclasses.replace(program, kind=kind, splines=table)
+
+
+def stretched(plan: Plan, duration: float) -> Plan:
+    """A plan with its motion run evenly slower, so that it takes a given time: at k times the time speeds are 1/k,
+    accelerations 1/k^2 and jerks 1/k^3 of what they were, on the same path. Dwells last longer too.
+
+    duration : [s]
+
+    The motion is sampled anew at the interpolation period, between setpoints on polynomials of degree five that have
+    their positions, velocities and accelerations; the derivatives are differences of these samples. They are judged as any
+    motion is.
+
+    Raises NotSolvedError for a plan without a motion; InputError for a duration below the plan's, and for plans with threads,
+    an extruder or the tool centre point on.
+    """
+    was = plan.require().trajectory
+    assert was is not None
+    if not was.cycle_time <= duration < np.inf:
+        raise InputError(
+            f"duration {duration} s; the plan takes {was.cycle_time:.4f} s, and can only be slower"
+        )
+    if plan.toolpath.held.any() or len(was.extruder) or plan.joints is not None:
+        raise InputError("threads, an extruder and the tool centre point are not run slower")
+    if duration == was.cycle_time:
+        return plan
+    factor, dt = duration / was.cycle_time, plan.machine.dt
+    t = np.append(np.arange(np.ceil(duration / dt - _LAST)) * dt, duration)
+    theta = np.minimum(t / factor, was.t[-1])
+    k = np.clip(np.searchsorted(was.t, theta, side="right") - 1, 0, len(was) - 2)
+    from scipy.interpolate import BPoly  # 0.2 s
+
+    place = BPoly.from_derivatives(was.t, np.stack([was.position, was.velocity, was.acceleration], axis=1))(theta)
+    columns = {axis: (place * was.in_degrees)[:, i] for i, axis in enumerate(was.axes)}
+    read = trajectory_of_columns({"t": t, **columns}, "<stretched>")
+    motion, given, _ = fit_axes(read.trajectory, read.given, plan.toolpath)
+    s = np.interp(theta, was.t, was.s)
+    motion = dataclasses.replace(motion, s=s, block=was.block[k], line=was.line[k])
+    how = Judged(program=plan.program, toolpath=plan.toolpath, machine=plan.machine, given=given)
+    return dataclasses.replace(plan, trajectory=motion, verdict=judged(motion, how), grid=None, prices=None)
+
+
+def _points(points: ArrayLike, axes: str) -> tuple[FloatArray, str]:
+    """(n, A) the points, and the letters of their columns. Raises InputError unless they are finite numbers, n > 1, of
+    axes that there are."""
     given = _numbers(points, "points: not an array of numbers; give (n, 2) or (n, 3), one row for each point")
-    if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) < 2:
-        raise InputError(f"points: shape {given.shape}; it must be (n, 2) or (n, 3) with at least two points")
+    letters = axes.lower() or "".join(AXES[: given.shape[-1] if given.ndim else 0])
+    if not known_axes(letters):
+        raise InputError(f"axes '{axes}': give each letter once, of x y z a b c u v w")
+    wanted = (len(letters),) if axes else (2, 3)
+    if given.ndim != 2 or given.shape[1] not in wanted or len(given) < 2:
+        needed = f"(n, {len(letters)})" if axes else "(n, 2) or (n, 3)"
+        raise InputError(f"points: shape {given.shape}; it must be {needed} with at least two points")
     bad = np.logical_not(np.isfinite(given).all(axis=1))
     _refuse("points: row", bad, given, "every coordinate must be finite")
-    return np.pad(given, ((0, 0), (0, len(AXES) - given.shape[1])))
+    return given, letters
 
 
 def _feeds(feed: ArrayLike, moves: int) -> FloatArray:
@@ -127,7 +228,7 @@ def tip_path(
         )
     points = np.hstack([at + np.array([0.0, 0.0, chain.length]), turns])
     speed = np.full(len(at) - 1, np.inf if feed is None else feed)
-    return program_of_points(points, speed, tolerance, axes=chain.axes)
+    return program_of_points(points, speed, tolerance, "<tips>", chain.axes)
 
 
 def verify(

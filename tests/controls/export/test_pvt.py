@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from planner.base.errors import InputError
-from planner.controls.export.stream import PERIODS_MAX, longest_interval, write_pvt
+from planner.controls.export.tables import PERIODS_MAX, Table, laser_power, longest_interval, write_table
 from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
@@ -32,7 +33,7 @@ def table(directory: Path) -> dict[str, np.ndarray]:
 def test_cubics_between_rows_stay_within_the_distance(
     tmp_path: Path, motion: Trajectory, within: float
 ) -> None:
-    periods, miss = write_pvt(tmp_path, motion, within=within)
+    periods, miss = write_table(tmp_path, motion, Table(within=within))
     rows = table(tmp_path)
     assert miss <= within
     off = [
@@ -55,7 +56,7 @@ def test_a_longer_distance_takes_fewer_rows(tmp_path: Path, motion: Trajectory) 
 def test_inches(tmp_path: Path, motion: Trajectory) -> None:
     for unit in ("mm", "inch"):
         (tmp_path / unit).mkdir()
-        write_pvt(tmp_path / unit, motion, unit)
+        write_table(tmp_path / unit, motion, Table(unit=unit))
     mm, inch = table(tmp_path / "mm"), table(tmp_path / "inch")
     assert inch["vx"] * 25.4 == pytest.approx(mm["vx"], abs=1e-6)
     assert inch["t"] == pytest.approx(mm["t"])
@@ -63,6 +64,71 @@ def test_inches(tmp_path: Path, motion: Trajectory) -> None:
 
 def test_what_cannot_be_is_refused(tmp_path: Path, motion: Trajectory) -> None:
     with pytest.raises(InputError, match="must be above 0"):
-        write_pvt(tmp_path, motion, within=0.0)
+        write_table(tmp_path, motion, Table(within=0.0))
     with pytest.raises(InputError, match="no unit 'cm'"):
-        write_pvt(tmp_path, motion, "cm")
+        write_table(tmp_path, motion, Table(unit="cm"))
+
+
+def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajectory) -> None:
+    periods, miss = write_table(tmp_path, motion, Table(kind="pt", cycle=0.004))
+    read = np.genfromtxt(tmp_path / "pt.csv", delimiter=",", names=True)
+    assert read.dtype.names == ("t", "x", "y", "z")
+    assert periods == round(0.004 / motion.dt)
+    assert np.diff(read["t"])[:-1] == pytest.approx(0.004, abs=1e-9)
+    off = [
+        np.abs(np.interp(motion.t, read["t"], read[axis]) - motion.position[:, k]).max()
+        for k, axis in enumerate("xyz")
+    ]
+    assert max(off) == pytest.approx(miss, abs=2e-8)
+
+
+def test_tables_of_a_time_and_a_position(tmp_path: Path, motion: Trajectory) -> None:
+    _, miss = write_table(tmp_path, motion, Table(kind="twincat", within=1e-2))
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["x.txt", "y.txt", "z.txt"]
+    for k, axis in enumerate("xyz"):
+        t, place = np.loadtxt(tmp_path / f"{axis}.txt").T
+        assert (np.diff(t) > 0).all()
+        assert np.abs(np.interp(motion.t, t, place) - motion.position[:, k]).max() <= miss + 2e-8
+    assert miss <= 1e-2
+
+
+def test_a_message_of_ros(tmp_path: Path, motion: Trajectory) -> None:
+    _, miss = write_table(tmp_path, motion, Table(kind="joint-trajectory", joints=("one", "two", "three")))
+    said = json.loads((tmp_path / "trajectory.json").read_text())
+    assert said["joint_names"] == ["one", "two", "three"]
+    when = [point["time_from_start"] for point in said["points"]]
+    t = np.array([each["sec"] + 1e-9 * each["nanosec"] for each in when])
+    assert all(0 <= each["nanosec"] < 10**9 for each in when)
+    place = np.array([point["positions"] for point in said["points"]])
+    speed = np.array([point["velocities"] for point in said["points"]])
+    off = np.abs(1e3 * CubicHermiteSpline(t, place, speed)(motion.t) - motion.position).max()
+    assert off == pytest.approx(miss, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (Table(cycle=0.0015), "whole number"),
+        (Table(kind="pt", cycle=0.05, within=1e-6), "off the setpoints"),
+        (Table(kind="joint-trajectory", joints=("one", "two")), "3 different names"),
+        (Table(kind="joint-trajectory", joints=("one", "two", "one")), "3 different names"),
+    ],
+)
+def test_tables_that_cannot_be(tmp_path: Path, motion: Trajectory, table: Table, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        write_table(tmp_path, motion, table)
+    assert not list(tmp_path.iterdir())
+
+
+def test_laser_power_follows_the_real_speed() -> None:
+    text = "G21 F3000\nM4 S800\nG1 X10\nG0 X20\nM3\nG1 X30\nS200\nX40\nM5\nX50"
+    plan = StopMethod().plan(parse_program(text, load_machine("mill")), load_machine("mill"))
+    motion = plan.trajectory
+    assert motion is not None
+    power = laser_power(plan.program, motion)
+    x, inside = motion.position[:, 0], lambda a, b: (x > a + 1e-6) & (x < b - 1e-6)
+    speed = motion.velocity[:, 0]
+    np.testing.assert_allclose(power[inside(0, 10)], 800.0 * speed[inside(0, 10)] / 50.0, rtol=1e-6)
+    assert power[inside(0, 10)].max() == pytest.approx(800.0, rel=1e-3)
+    for (a, b), want in (((10, 20), 0.0), ((20, 30), 800.0), ((30, 40), 200.0), ((40, 50), 0.0)):
+        assert (power[inside(a, b)] == want).all()

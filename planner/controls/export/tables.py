@@ -1,0 +1,201 @@
+"""Tables of positions over time, for drives and robots.
+
+    pvt               pvt.csv: t, then position and velocity of each axis; between two rows an axis moves on a cubic
+    pt                pt.csv: t and positions; between two rows an axis moves straight
+    twincat           a file for each axis, AXIS.txt: a time and a position a line, as tables of a master's and a slave's
+                      position are read; straight between them
+    joint-trajectory  trajectory.json: trajectory_msgs/JointTrajectory of ROS, in m and rad, with velocities and without
+                      accelerations, between which its controllers go on cubics
+
+With p0, v0 at the start of an interval of length h and p1, v1 at its end, u = (t - t0) / h, the cubic is
+
+    p(u) = (1 + 2u)(1 - u)^2 p0 + u (1 - u)^2 h v0 + u^2 (3 - 2u) p1 - u^2 (1 - u) h v1
+
+which is the motion itself where its jerk is constant in the interval. So a few rows are enough:
+`longest_interval` finds the longest interval, a whole number of interpolation periods, with which the motion
+between rows stays within a given distance of every setpoint on every axis.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.base.arrays import Array, FloatArray
+from planner.base.errors import InputError
+from planner.base.units import MICROMETRE, MILLISECOND, RAD_PER_DEG
+from planner.controls.export.stream import scale_of
+from planner.machine import ROTARY_AXES
+from planner.motion.trajectory import Trajectory
+from planner.nc.program import Kind, Program
+
+WITHIN = 1e-3  # [mm]: a thousandth of a millimetre, below what contour tolerances are
+PERIODS_MAX = 64  # interpolation periods between two rows at most: feedback and feed override need some rows
+PVT, PT, TWINCAT, ROS = TABLES = ("pvt", "pt", "twincat", "joint-trajectory")
+STRAIGHT = (PT, TWINCAT)  # tables between whose rows axes move straight
+_WHOLE = 1e-6  # of a period: what a cycle may be off a whole number of them
+_NANOSECONDS = 10**9  # in a second
+_MM_PER_M = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """What a table holds.
+
+    kind   : one of `TABLES`
+    unit   : of lengths, mm or inch; rotary axes are in degrees. Of joint trajectories always m and rad
+    within : how far the motion between rows may be from the setpoints [mm], on rotary axes the same number in degrees;
+             None for `WITHIN`, and for any distance where a cycle is given
+    cycle  : time between rows [s]; None for the longest that stays within
+    joints : names of the axes in a joint trajectory; () for their letters
+    power  : (T,) the power of a laser at each setpoint, a column more; None without
+    """
+
+    kind: str = PVT
+    unit: str = "mm"
+    within: float | None = None
+    cycle: float | None = None
+    joints: tuple[str, ...] = ()
+    power: FloatArray | None = None
+
+
+def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[int, float]:
+    """Write the files into an existing directory.
+
+    Returns the interpolation periods between two rows, and the largest distance found [mm].
+
+    Raises InputError for another unit than mm or inch, a distance that is not above 0 or that the cycle exceeds, a cycle
+    that is no whole number of interpolation periods, and as many names of joints as there are no axes.
+    """
+    scale = scale_of(trajectory, table.unit)
+    within = WITHIN if table.within is None else table.within
+    if not within > 0:
+        raise InputError(f"--within must be above 0 mm, found {within:g}")
+    rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
+    allowed = np.where(rotary, within * RAD_PER_DEG * trajectory.radius, within)
+    straight = table.kind in STRAIGHT
+    if table.cycle is None:
+        periods, miss = longest_interval(trajectory, allowed, straight=straight)
+    else:
+        periods = _periods(table.cycle, trajectory.dt)
+        off = _miss(trajectory, _rows(len(trajectory), periods), straight=straight)
+        miss = float(off.max(initial=0.0))
+        if table.within is not None and (off > allowed).any():
+            raise InputError(
+                f"rows every {table.cycle / MILLISECOND:g} ms are up to {miss / MICROMETRE:.3g} um off the setpoints, "
+                f"--within allows {within / MICROMETRE:.3g}"
+            )
+    rows = _rows(len(trajectory), periods)
+    if table.kind == ROS:
+        _write_joints(directory, trajectory, rows, table.joints)
+        return periods, miss
+    columns = {"t": trajectory.t[rows]}
+    for k, axis in enumerate(trajectory.axes):
+        columns[axis] = trajectory.position[rows, k] * scale[k]
+        if table.kind == PVT:
+            columns[f"v{axis}"] = trajectory.velocity[rows, k] * scale[k]
+    if table.power is not None:
+        columns["power"] = table.power[rows]
+    if table.kind == TWINCAT:
+        t = columns.pop("t")
+        for name, column in columns.items():
+            np.savetxt(directory / f"{name}.txt", np.stack([t, column], axis=1), fmt="%.9f", delimiter="\t")
+        return periods, miss
+    with (directory / f"{table.kind}.csv").open("w", encoding="ascii", newline="") as file:
+        values = np.stack(list(columns.values()), axis=1)
+        np.savetxt(file, values, fmt="%.9f", delimiter=",", header=",".join(columns), comments="")
+    return periods, miss
+
+
+def _periods(cycle: float, dt: float) -> int:
+    """Interpolation periods in a cycle [s]. Raises InputError where that is no whole number."""
+    periods = round(cycle / dt)
+    if periods < 1 or abs(cycle / dt - periods) > _WHOLE:
+        raise InputError(
+            f"--cycle {cycle / MILLISECOND:g} ms is no whole number of interpolation periods of {dt / MILLISECOND:g} ms; plan with "
+            "a machine file whose dt divides it"
+        )
+    return periods
+
+
+def _write_joints(directory: Path, trajectory: Trajectory, rows: Array, joints: tuple[str, ...]) -> None:
+    """Write trajectory.json. Raises InputError for another number of names than of axes, or one that comes twice."""
+    names = joints or trajectory.axes
+    if len(set(names)) != len(trajectory.axes):
+        raise InputError(
+            f"--joints {','.join(names)}; give {len(trajectory.axes)} different names, of {', '.join(trajectory.axes)}"
+        )
+    rotary = [axis in ROTARY_AXES for axis in trajectory.axes]
+    scale = np.where(rotary, 1.0 / trajectory.radius, 1.0 / _MM_PER_M)
+    position, velocity = trajectory.position[rows] * scale, trajectory.velocity[rows] * scale
+    points = []
+    for t, p, v in zip(trajectory.t[rows].tolist(), position.tolist(), velocity.tolist(), strict=True):
+        sec, nanosec = divmod(round(t * _NANOSECONDS), _NANOSECONDS)
+        when = {"sec": sec, "nanosec": nanosec}
+        points.append(
+            {"positions": p, "velocities": v, "accelerations": [], "effort": [], "time_from_start": when}
+        )
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    text = json.dumps({"header": header, "joint_names": [*names], "points": points})
+    (directory / "trajectory.json").write_text(text + "\n", encoding="utf-8")
+
+
+def laser_power(program: Program, trajectory: Trajectory) -> FloatArray:
+    """(T,) the power of a laser at each setpoint, in the program's units of S: under M4 the S word times the real speed
+    over F, under M3 the S word; 0 on rapids, after M5 and before the first S, as grbl's laser mode has it."""
+    mode, word = np.zeros(len(program) + 1), np.zeros(len(program) + 1)
+    for event in program.events:  # in their order: what comes later holds from its block on
+        if event.text[0] == "S":
+            word[event.block :] = float(event.text[1:])
+        elif event.text in ("M3", "M4", "M5"):
+            mode[event.block :] = {"M3": 3, "M4": 4, "M5": 0}[event.text]
+    block = trajectory.block
+    cuts = np.isin(program.kind, [Kind.LINE, Kind.ARC, Kind.SPLINE])[block]
+    real = np.where(cuts, trajectory.feed / np.where(cuts, program.feed[block], 1.0), 0.0)
+    share = np.select([mode[block] == 4, mode[block] == 3], [np.minimum(real, 1.0), cuts.astype(float)], 0.0)
+    power: FloatArray = word[block] * share
+    return power
+
+
+def longest_interval(
+    trajectory: Trajectory, within: FloatArray, *, straight: bool = False
+) -> tuple[int, float]:
+    """Interpolation periods between two rows, and by how much the motion between them misses the setpoints at most.
+
+    within   : (A,) allowed miss of each axis [mm, rad]
+    straight : axes move straight from row to row; else on cubics
+
+    Returns the number, at most `PERIODS_MAX`, and the largest miss [mm, rad].
+    """
+    found, miss = 1, 0.0
+    periods = 2
+    while periods <= min(PERIODS_MAX, max(len(trajectory) - 1, 1)):
+        off = _miss(trajectory, _rows(len(trajectory), periods), straight=straight)
+        if (off > within).any():
+            break
+        found, miss = periods, float(off.max())
+        periods *= 2
+    return found, miss
+
+
+def _rows(samples: int, periods: int) -> Array:
+    """Indices of every so many samples, and of the last one."""
+    rows = np.arange(0, samples, periods)
+    return rows if samples == 0 or rows[-1] == samples - 1 else np.append(rows, samples - 1)
+
+
+def _miss(trajectory: Trajectory, rows: Array, *, straight: bool) -> FloatArray:
+    """(A,) largest distance of the motion between the rows from the setpoints."""
+    t, p, v = trajectory.t, trajectory.position, trajectory.velocity
+    k = np.clip(np.searchsorted(rows, np.arange(len(t)), side="right") - 1, 0, max(len(rows) - 2, 0))
+    a, b = rows[k], rows[np.minimum(k + 1, len(rows) - 1)]
+    h = (t[b] - t[a])[:, None]
+    u = np.divide((t - t[a])[:, None], h, out=np.zeros_like(h), where=h > 0)
+    if straight:
+        between = (1 - u) * p[a] + u * p[b]
+    else:
+        between = (1 + 2 * u) * (1 - u) ** 2 * p[a] + u * (1 - u) ** 2 * h * v[a]
+        between += u**2 * (3 - 2 * u) * p[b] - u**2 * (1 - u) * h * v[b]
+    off: FloatArray = np.abs(between - p).max(axis=0)
+    return off

@@ -47,6 +47,7 @@ VERDICT_RECORDS = {
     "Kind",
     "LimitCheck",
     "Ringing",
+    "SamePath",
     "ThreadCheck",
     "Verdict",
 }

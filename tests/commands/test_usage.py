@@ -82,7 +82,7 @@ def test_commands_of_trajectories_take_the_directory_of_a_plan(tmp_path: Path) -
 
 def test_every_command_has_a_line_that_fits() -> None:
     lines = run("--help").output.partition("Commands:")[2].strip().splitlines()
-    assert len(lines) == 12
+    assert len(lines) == 13
     assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 

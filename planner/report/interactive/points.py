@@ -134,7 +134,9 @@ def stretched(plan: Plan, duration: float) -> Plan:
     k = np.clip(np.searchsorted(was.t, theta, side="right") - 1, 0, len(was) - 2)
     from scipy.interpolate import BPoly  # 0.2 s
 
-    place = BPoly.from_derivatives(was.t, np.stack([was.position, was.velocity, was.acceleration], axis=1))(theta)
+    place = BPoly.from_derivatives(was.t, np.stack([was.position, was.velocity, was.acceleration], axis=1))(
+        theta
+    )
     columns = {axis: (place * was.in_degrees)[:, i] for i, axis in enumerate(was.axes)}
     read = trajectory_of_columns({"t": t, **columns}, "<stretched>")
     motion, given, _ = fit_axes(read.trajectory, read.given, plan.toolpath)

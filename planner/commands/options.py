@@ -189,6 +189,10 @@ _READING: dict[str, tuple[Any, Any]] = {
         DIALECTS,
         "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
     ),
+    "ignore_travel": (
+        bool,
+        typer.Option("--ignore-travel", help="plan what lies beyond the travel in the machine file"),
+    ),
 }
 
 

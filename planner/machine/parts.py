@@ -75,6 +75,7 @@ class Axis(Record):
               axis for each kg m2 of its moment of inertia [W/(kg m2)]
     wrapped : of a rotary axis: programs give its positions within a turn, with the sign of the direction
               (LinuxCNC's WRAPPED_ROTARY)
+    travel_min, travel_max : ends of its travel in machine coordinates [mm, deg], or None
     """
 
     velocity: AxisLimit
@@ -82,6 +83,15 @@ class Axis(Record):
     jerk: Positive
     power: Positive | None = None
     wrapped: bool = False
+    travel_min: Finite | None = None
+    travel_max: Finite | None = None
+
+    @model_validator(mode="after")
+    def _ends_in_order(self) -> Axis:
+        low, high = self.travel_min, self.travel_max
+        if low is not None and high is not None and not low < high:
+            raise ValueError(f"travel_min {low:g} must be below travel_max {high:g}")
+        return self
 
 
 class Fir(Record):

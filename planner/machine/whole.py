@@ -130,6 +130,8 @@ class Machine(Record):
                 raise ValueError(f"axis '{letter}' is not known; allowed are {', '.join(known)}")
             if axes[letter].wrapped and letter not in ROTARY_AXES:
                 raise ValueError(f"{letter}.wrapped: only rotary axes (a, b, c) can be wrapped")
+        if EXTRUDER in axes and axes[EXTRUDER].model_fields_set & {"travel_min", "travel_max"}:
+            raise ValueError(f"{EXTRUDER}: an extruder has no travel; leave travel_min and travel_max out")
         for letter in ("x", "y"):
             if letter not in axes:
                 raise ValueError(f"axis '{letter}' is missing; write a table [axes.{letter}]")

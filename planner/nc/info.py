@@ -6,6 +6,7 @@ describe only that. A corner is the turn between the end of one feed move and th
 tangents; moves of length zero are passed over, and a rapid, dwell or stop between two moves separates them.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine
-from planner.nc.arcs import IN_PLANE
 from planner.nc.bezier import at, homogeneous, lengths
+from planner.nc.extents import block_boxes, plane_axes, spokes, starts, travel_faults, work_box
 from planner.nc.faults import Fault
 from planner.nc.program import FEED_MOVES, MOVES, EventTable, Expansion, Kind, Program, ToolPoint, plain
 from planner.nc.reader import interpret, load, source_name
@@ -26,7 +27,6 @@ from planner.nc.reading import AS_USUAL, Reading
 CORNER_DEGREES = (1.0, 20.0, 60.0, 90.0, 175.0)
 LENGTH_QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 PLACES_SHOWN = 100  # of what is not supported, in tables and summaries; the others are counted
-SPLINE_PLACES = 513  # on a piece of a spline, at which its extent is looked at: good to 5e-7 of its size
 _NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding of coordinates around 1e3 mm
 
 
@@ -40,7 +40,9 @@ class ProgramInfo:
     blocks           : number of blocks by `Kind` name, in lower case; "spline" only where there are some
     full_circles     : arcs of a full turn and more;  helices : arcs that rise along their axis
     events           : number of events by letter or code ("S", "T", "M3" ...)
-    extent_min, _max : (3,) box around the start and all motion, arcs and splines included [mm]
+    extent_min, _max : (A,) box around the start and all motion, arcs and splines included, in machine
+                       coordinates [mm, rad]
+    work_extent      : (3,) ends of that box, without the start, as the program has them; None for the same
     length           : path length by kind "rapid", "line", "arc", and "spline" where there are some [mm]
     feed             : (least, largest) programmed feed [mm/s]; inf where a plotter file gives none
     feed_changes     : number of feed moves whose feed differs from the one before
@@ -64,6 +66,7 @@ class ProgramInfo:
     events: dict[str, int]
     extent_min: FloatArray
     extent_max: FloatArray
+    work_extent: tuple[FloatArray, FloatArray] | None
     length: dict[str, float]
     feed: tuple[float, float]
     feed_changes: int
@@ -85,16 +88,19 @@ def inspect_program(
     read, is empty or is not a text."""
     data = load(path)
     program, faults = interpret(data, machine, reading, source=source_name(path))
+    beyond, notes = travel_faults(program, machine, data)
+    if not reading.ignore_travel:
+        faults = [*faults, *beyond]
+    program = dataclasses.replace(program, notes=(*program.notes, *notes))
     return describe(program, lines=len(data.splitlines()), unsupported=faults)
 
 
 def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ()) -> ProgramInfo:
     """The figures of a program that has been read."""
-    start = np.vstack([program.start, program.end])[:-1]
+    start, (low, high) = starts(program), block_boxes(program)
     length = _lengths(program, start)
     is_feed = np.isin(program.kind, FEED_MOVES)
     feed = program.feed[is_feed]
-    low, high = _extents(program, start)
     kinds = [kind for kind in Kind if kind != Kind.SPLINE or len(program.splines)]
     quantiles = np.quantile(length[is_feed], LENGTH_QUANTILES).tolist() if len(feed) else [np.nan] * 5
     return ProgramInfo(
@@ -105,8 +111,9 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
         full_circles=int((np.abs(program.arc_sweep) >= 2 * np.pi - 1e-9).sum()),
         helices=int((np.abs(_rise(program, start)) > _NOWHERE).sum()),
         events=_count_events(program),
-        extent_min=low,
-        extent_max=high,
+        extent_min=np.vstack([program.start, low]).min(axis=0),
+        extent_max=np.vstack([program.start, high]).max(axis=0),
+        work_extent=work_box(program, low, high),
         length={k.name.lower(): float(length[program.kind == k].sum()) for k in MOVES if k in kinds},
         feed=(float(feed.min()), float(feed.max())) if len(feed) else (np.nan, np.nan),
         feed_changes=int((feed[1:] != feed[:-1]).sum()),
@@ -130,7 +137,7 @@ def _rise(program: Program, start: FloatArray) -> FloatArray:
 def _lengths(program: Program, start: FloatArray) -> FloatArray:
     """(B,) path length of every block [mm]; an arc whose radii differ counts with their mean."""
     length = np.linalg.norm(program.end - start, axis=1)
-    from_start, from_end = _spokes(program, start)
+    from_start, from_end = spokes(program)
     radius = (np.hypot(*from_start) + np.hypot(*from_end)) / 2.0
     length[program.arc_block] = np.hypot(radius * program.arc_sweep, _rise(program, start))
     splines = program.splines
@@ -140,45 +147,12 @@ def _lengths(program: Program, start: FloatArray) -> FloatArray:
     return length
 
 
-def _spokes(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(2, K) vectors from the centre to the start and to the end of each arc, in its plane."""
-    k = program.arc_block
-    rows = np.arange(len(k))
-    axes = _plane_axes(program)
-    centre = program.arc_center[rows, axes]
-    return start[k, axes] - centre, program.end[k, axes] - centre
-
-
-def _plane_axes(program: Program) -> Array:
-    return np.array([IN_PLANE[n] for n in range(3)])[program.arc_normal].T.reshape(2, -1)
-
-
-def _extents(program: Program, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The box around all motion. An arc reaches centre + radius along an axis where its sweep passes that
-    direction; a spline is looked at in `SPLINE_PLACES` places of each piece."""
-    splines = program.splines
-    on, _, _ = at(homogeneous(splines.points, splines.weights), np.linspace(0.0, 1.0, SPLINE_PLACES))
-    points = np.vstack([program.start, program.end, on.reshape(-1, program.end.shape[1])])
-    low, high = points.min(axis=0), points.max(axis=0)
-    (ua, ub), to_end = _spokes(program, start)
-    radius = np.maximum(np.hypot(ua, ub), np.hypot(*to_end))
-    axes, rows = _plane_axes(program), np.arange(len(radius))
-    for quarter in range(4):
-        turn = (quarter * np.pi / 2 - np.arctan2(ub, ua)) * np.sign(program.arc_sweep)
-        passed = turn % (2 * np.pi) <= np.abs(program.arc_sweep)
-        axis, side = axes[quarter % 2], 1.0 if quarter < 2 else -1.0
-        reach = program.arc_center[rows, axis] + side * radius
-        bound, extreme = (np.maximum, high) if quarter < 2 else (np.minimum, low)
-        bound.at(extreme, axis[passed], reach[passed])
-    return low, high
-
-
 def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: Array) -> dict[float, int]:
     with np.errstate(invalid="ignore", divide="ignore"):
         leaving = (program.end - start) / length[:, None]
     arriving = leaving.copy()
-    k, n, axes = program.arc_block, program.arc_normal, _plane_axes(program)
-    for spoke, tangent in zip(_spokes(program, start), (leaving, arriving), strict=True):
+    k, n, axes = program.arc_block, program.arc_normal, plane_axes(program)
+    for spoke, tangent in zip(spokes(program), (leaving, arriving), strict=True):
         size = np.maximum(length[k], _NOWHERE)
         tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
         tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size

@@ -27,6 +27,7 @@ from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, Syste
 
 _OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 P1 to P20; and G154
 _DATA = (3, 50, 52)  # tool life, parameters of the control; to G11
+NO_G54 = "G54 has no offset"
 _FANUC_TOOLS = (10, 11, 12, 13)
 _FIXTURE = 593  # the system of G10 L11
 
@@ -94,7 +95,7 @@ def take_system(state: State, block: Block, findings: Findings) -> None:
 def assume_origin(state: State, what: str, block: Block, findings: Findings) -> None:
     """Say that `what` goes by machine coordinates where those of G54 are not known."""
     if state.system == 540 and 540 not in state.systems:
-        text = f"{what} is in machine coordinates, and G54 has no offset in the machine file: 0"
+        text = f"{what} is in machine coordinates, and {NO_G54} in the machine file: 0"
         findings.assume(text, block.line, block.at["one-shot"], grave=True)
 
 

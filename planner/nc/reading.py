@@ -45,6 +45,7 @@ class Reading:
                    "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", or "auto", by what the program
                    holds
     block_delete : leave out the lines that start with "/"
+    ignore_travel : plan what the travel of the machine's axes does not reach
     """
 
     strict: bool = False
@@ -53,6 +54,7 @@ class Reading:
     extruder: str = AUTO
     dialect: str = AUTO
     block_delete: bool = True
+    ignore_travel: bool = False
 
     def __post_init__(self) -> None:
         for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS), ("dialect", DIALECTS)):

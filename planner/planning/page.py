@@ -25,6 +25,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import require_samples
+from planner.nc.extents import travel_faults
+from planner.nc.faults import require_none
 from planner.nc.program import Program
 from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
@@ -120,6 +122,8 @@ class Method(ABC):
 def job_of(program: Program, machine: Machine, tolerance: float | None, stages: Stages) -> Job:
     """The job: path and limits. Raises InputError for a program that cannot be planned."""
     with stages.stage("geometry"):
+        if not program.reading.ignore_travel:
+            require_none(travel_faults(program, machine, program.text or b"")[0], program.source)
         toolpath = toolpath_from_program(program, machine, tolerance)
         if (fed := toolpath.extrusion) is not None:
             machine = with_extruder_limit(machine, toolpath.axes, fed.limits, fed.ratio, toolpath.block)

@@ -18,6 +18,7 @@ import numpy as np
 
 from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
+from planner.nc.extents import block_boxes, work_box
 
 if TYPE_CHECKING:
     from planner.base.arrays import FloatArray
@@ -57,10 +58,27 @@ def plan_rows(plan: Plan) -> Rows:
         rows.append(("held by", held_by_text(plan.grid)))
     if plan.prices is not None and plan.trajectory is not None:
         rows += price_rows(plan.prices, plan.trajectory.cycle_time)
+    if len(plan.program):
+        low, high = block_boxes(plan.program)
+        rows += extent_rows(low.min(axis=0), high.max(axis=0), work_box(plan.program, low, high))
     rows.append(("blocks, grid points", f"{len(plan.program):,}, {plan.grid_points:,}"))
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     computing = f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-"
     return [*rows, ("computing time [s]", computing), ("solution", plan.sentence)]
+
+
+def extent_rows(low: FloatArray, high: FloatArray, work: tuple[FloatArray, FloatArray] | None) -> Rows:
+    """The ends of the programmed path in x, y and z.
+
+    low, high : (A,) in machine coordinates [mm]
+    work      : both (3,) as the program has them; None for the same
+    """
+    boxes = {"extent [mm]": (low, high), "in its own zero": work}
+    return [
+        (name, ", ".join(f"{c} {a:.3f} to {b:.3f}" for c, a, b in zip("xyz", *box, strict=False)))
+        for name, box in boxes.items()
+        if box is not None
+    ]
 
 
 def smoothing(plan: Plan) -> str:

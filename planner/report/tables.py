@@ -19,6 +19,7 @@ from planner.report.rows import (
     FAILED,
     PASSED,
     VERDICT,
+    extent_rows,
     first_of,
     hours_text,
     number_text,
@@ -131,8 +132,8 @@ def info_table(info: ProgramInfo) -> Group:
         table.add_row(
             "arcs among them", _counts({"full circles": info.full_circles, "helices": info.helices})
         )
-    ends = zip("xyz", info.extent_min, info.extent_max, strict=False)
-    table.add_row("extent [mm]", ", ".join(f"{axis} {low:.3f} to {high:.3f}" for axis, low, high in ends))
+    for row in extent_rows(info.extent_min, info.extent_max, info.work_extent):
+        table.add_row(*row)
     table.add_row(
         "length [mm]", ", ".join(f"{kind} {length:,.3f}" for kind, length in info.length.items() if length)
     )

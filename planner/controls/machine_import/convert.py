@@ -143,6 +143,9 @@ def _axes(
             if "jerk" not in own:
                 no_jerk.append(letter)
                 own["jerk"] = Sourced(own["acceleration"].value / ramp_time, "assumed")
+            low, high = found.travel.get(letter, (None, None))
+            if not low or not high or low.value < high.value:  # equal ends are those of an axis that has none
+                own |= {name: end for name, end in (("travel_min", low), ("travel_max", high)) if end}
             axes[letter] = own
     if missing:
         raise InputError(

@@ -4,7 +4,7 @@ $11 junction deviation [mm], $130-$135 travel [mm], always in mm ($13 is the uni
 import re
 
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.controls.machine_import.settings import ControlSettings, Setting, Settings, travel_note
+from planner.controls.machine_import.settings import ControlSettings, Setting, Settings, Sourced
 from planner.machine import LINEAR_AXES, ROTARY_AXES
 
 _SETTING = re.compile(r"^\s*(\$\d+)\s*=\s*([^\s(;]+)", re.MULTILINE)
@@ -25,9 +25,18 @@ def settings(text: str, source: str) -> ControlSettings:
     given.counts_last()
     ends = {letter: given.number("", f"$13{k}") for k, letter in enumerate(_LETTERS)}
     # machine coordinates of grbl end at 0
-    travel = {letter: (-abs(end.value), 0.0) for letter, end in ends.items() if end and end.value}
-    deviation, laser = given.number("", "$11"), given.number("", "$32")
-    notes = [travel_note(travel)]
+    travel = {
+        letter: (Sourced(-abs(end.value), end.place), Sourced(0.0, f"{end.place}: it ends at 0"))
+        for letter, end in ends.items()
+        if end and end.value
+    }
+    deviation, laser, bounded = (given.number("", key) for key in ("$11", "$32", "$20"))
+    notes = []
+    if travel and bounded and not bounded.value:
+        notes.append(
+            "$20 is 0, no soft limits: travel is left out, $130 and so on may be those of grbl's delivery"
+        )
+        travel = {}
     if laser and laser.value:
         notes.append("$32, laser mode, is left out: M4 and S words change no times here")
     return ControlSettings(
@@ -37,5 +46,6 @@ def settings(text: str, source: str) -> ControlSettings:
         law={}
         if deviation is None
         else {"junction_deviation": deviation._replace(value=abs(deviation.value))},
-        notes=tuple(filter(None, notes)),
+        travel=travel,
+        notes=tuple(notes),
     )

@@ -16,7 +16,6 @@ from planner.controls.machine_import.settings import (
     Settings,
     Sourced,
     least,
-    travel_note,
 )
 
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
@@ -64,6 +63,7 @@ def settings(text: str, source: str) -> ControlSettings:
             "square_corner_velocity": config.number("printer", "square_corner_velocity") or _CORNER_SPEED,
             "minimum_cruise_ratio": _cruise_ratio(config, along),
         },
+        travel=_travel(config),
         modes=tuple(modes.values()),
         notes=(*config.notes, *_notes(config)),
     )
@@ -81,15 +81,7 @@ def _cruise_ratio(config: Settings, acceleration: Sourced | None) -> Sourced:
 
 def _notes(config: Settings) -> list[str]:
     """Sentences on what a machine file does not have, and a program may ask for."""
-    travel = {}
-    for letter in "xyz":
-        low, high = (config.number(f"stepper_{letter}", f"position_{end}") for end in ("min", "max"))
-        if high is not None:
-            travel[letter] = (low.value if low else 0.0, high.value)
-    said = [
-        "velocity and acceleration are limits along the path in Klipper and of each axis here",
-        travel_note(travel),
-    ]
+    said = ["velocity and acceleration are limits along the path in Klipper and of each axis here"]
     if "extruder" in config.names:
         said.append("limits of [extruder] are left out: a table [axes.e] takes them")
     if "gcode_arcs" not in config.names:
@@ -99,4 +91,13 @@ def _notes(config: Settings) -> list[str]:
     macros = [re.fullmatch(r"gcode_macro ([GM]\d+(\.\d+)?)", name, re.IGNORECASE) for name in config.names]
     if codes := dict.fromkeys(macro[1].upper() for macro in macros if macro):
         said.append(f"codes that macros of this machine replace are read as usual: {', '.join(codes)}")
-    return [one for one in said if one]
+    return said
+
+
+def _travel(config: Settings) -> dict[str, tuple[Sourced | None, Sourced | None]]:
+    travel: dict[str, tuple[Sourced | None, Sourced | None]] = {}
+    for letter in "xyz":
+        low, high = (config.number(f"stepper_{letter}", f"position_{end}") for end in ("min", "max"))
+        if high is not None:
+            travel[letter] = low or Sourced(0.0, "Klipper's default"), high
+    return travel

@@ -31,7 +31,6 @@ from planner.controls.machine_import.settings import (
     Sourced,
     leading_number,
     least,
-    travel_note,
 )
 from planner.machine import ROTARY_AXES
 from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
@@ -116,6 +115,7 @@ class _Found:
             velocity=self._limits("MAX_VELOCITY", None, _DEFAULT),
             acceleration=self._limits("MAX_ACCELERATION", f"MAX_{linear}ACCELERATION", _DEFAULT),
             jerk=self._limits("MAX_JERK", "MAX_LINEAR_JERK", None),
+            travel={letter: self._travel(letter) for letter in self.letters},
             wrapped="".join(c for c, found in wrapped.items() if c in ROTARY_AXES and found and found.value),
             feed_max=_possible(ini.positive("TRAJ", f"MAX_{linear}VELOCITY", unit)),
             dt=ini.positive("EMCMOT", "SERVO_PERIOD", _NANOSECOND),
@@ -175,6 +175,9 @@ class _Found:
         Raises InputError for a distance that is no number.
         """
         module = self.module
+        if jointless := [letter for letter in self.letters if self.joints and letter not in self.joints]:
+            said = f"[KINS] KINEMATICS moves no axis {', '.join(jointless)}, which COORDINATES names"
+            self.notes.append(said)
         if module == "trivkins":
             return {}
         if module not in _TYPES:
@@ -224,16 +227,7 @@ class _Found:
 
     def _left_out(self) -> list[str]:
         """Sentences on what a machine file does not have, and a program may ask for."""
-        ini = self.ini
-        travel = {}
-        for letter in self.letters:
-            ends = [
-                ini.number(self.table[letter], key, self.scale[letter]) for key in ("MIN_LIMIT", "MAX_LIMIT")
-            ]
-            far = AXIS_LIMIT_MAX * self.scale[letter]
-            low, high = (end.value if end and abs(end.value) < far else None for end in ends)
-            travel[letter] = (low, high)
-        said = [travel_note(travel)]
+        ini, said = self.ini, []
         for letter in self.letters:
             if (found := ini.number(self.table[letter], "LOCKING_INDEXER_JOINT")) and found.value >= 0:
                 said.append(
@@ -246,7 +240,19 @@ class _Found:
         codes = [code for code in codes if self.module not in _JOINTS or code not in ("M428", "M429")]
         if codes:
             said.append(f"codes that this machine has of its own are left out: {', '.join(codes)} (REMAP)")
-        return [one for one in said if one]
+        return said
+
+    def _travel(self, letter: str) -> tuple[Sourced | None, Sourced | None]:
+        """The ends of an axis, and of the joints that move it alone; None for what means none, such as 1e99."""
+        scale = self.scale[letter]
+        tables = [self.table[letter], *(f"JOINT_{n}" for n, c in enumerate(self.joints) if c == letter)]
+        found = [
+            [self.ini.number(table, f"{end}_LIMIT", scale) for table in tables] for end in ("MIN", "MAX")
+        ]
+        low, high = (
+            [one for one in ends if one and abs(one.value) < AXIS_LIMIT_MAX * scale] for ends in found
+        )
+        return max(low, default=None), min(high, default=None)
 
 
 def _possible(found: Sourced | None) -> Sourced | None:

@@ -19,13 +19,14 @@ from planner.controls.machine_import.settings import (
     Settings,
     Sourced,
     least,
-    travel_note,
 )
 from planner.machine import LINEAR_AXES
 
 _COMMAND = re.compile(r"^(?:\s*echo:)?\s*([GM]\d+)\b([^;\n]*)", re.MULTILINE)
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
 _RANGE = re.compile(r"([A-Z])\s*([-+]?[\d.]+):([-+]?[\d.]+)")
+# What M211 prints beside M503: the ends, where they are in force.
+_ENDS = re.compile(r"soft endstops:\s*(?:on|1)\b.*?min:(.*?)max:([^\n]*)", re.IGNORECASE | re.DOTALL)
 _LETTERS = "".join(LINEAR_AXES)
 _DAMPING = 0.15  # [-], Marlin's own where M593 has no D
 
@@ -54,6 +55,11 @@ def settings(text: str, source: str) -> ControlSettings:
         else:
             for letter, number in words.items():
                 given.add(code, letter, Setting(number, source, line))
+    if ends := _ENDS.search(text):
+        for end, said in zip(("low", "high"), ends.groups(), strict=True):
+            for letter, number in _WORD.findall(said):
+                travel.add(letter.lower(), end, Setting(number, source))
+                travel.names += [letter.lower()]
     given.counts_last()
     travel.counts_last()
     return _settings(given, unit, travel, tuple(FoundMode(*mode, "M593") for mode in modes.items()))
@@ -98,13 +104,12 @@ def _settings(
         law={"acceleration": along, "junction_deviation": deviation},
         corner_jump={} if deviation else jumps,
         modes=modes,
-        notes=tuple(_notes(given, reprap, printing, travelling, travel)),
+        travel={c: (travel.number(c, "low"), travel.number(c, "high")) for c in dict.fromkeys(travel.names)},
+        notes=tuple(_notes(given, reprap, printing, travelling)),
     )
 
 
-def _notes(
-    given: Settings, reprap: bool, printing: Sourced | None, travelling: Sourced | None, travel: Settings
-) -> list[str]:
+def _notes(given: Settings, reprap: bool, printing: Sourced | None, travelling: Sourced | None) -> list[str]:
     said = ["M203 is in mm/min: M566 and M584 are commands of RepRapFirmware"] if reprap else []
     if printing and travelling and printing.value != travelling.value:
         said.append(
@@ -113,8 +118,4 @@ def _notes(
         )
     if given.text("M203", "E") or given.text("M201", "E"):
         said.append("limits of the extruder, E of M203 and M201, are left out: a table [axes.e] takes them")
-    ends = {}
-    for letter in dict.fromkeys(travel.names):
-        low, high = travel.number(letter, "low"), travel.number(letter, "high")
-        ends[letter] = low and low.value, high and high.value
-    return [one for one in (*said, travel_note(ends)) if one]
+    return said

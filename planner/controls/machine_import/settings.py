@@ -42,6 +42,8 @@ class ControlSettings:
     velocity: Mapping[str, Sourced]
     acceleration: Mapping[str, Sourced]
     jerk: Mapping[str, Sourced] = field(default_factory=dict)
+    # least and greatest place of the axes in machine coordinates [mm, deg]
+    travel: Mapping[str, tuple[Sourced | None, Sourced | None]] = field(default_factory=dict)
     wrapped: str = ""  # letters of rotary axes whose places are within a turn
     feed_max: Sourced | None = None  # largest feed along the path [mm/s]
     dt: Sourced | None = None  # interpolation period [s]
@@ -151,17 +153,6 @@ def leading_number(text: str) -> float | None:
     """The number with which a text begins, as C's scanf reads "3 mm"; None where it begins with none."""
     found = _BEGINS.match(text.strip())
     return float(found.group()) if found else None
-
-
-def travel_note(travel: Mapping[str, tuple[float | None, float | None]]) -> str:
-    """A sentence on how far the axes go, [mm] or degrees, which no machine file says; "" where settings have
-    none."""
-    said = [
-        f"{letter} {' to '.join('?' if end is None else f'{end:.6g}' for end in ends)}"
-        for letter, ends in travel.items()
-        if ends != (None, None)
-    ]
-    return f"travel is left out, and no plan is checked against it: {', '.join(said)}" if said else ""
 
 
 def least(*found: Sourced | None) -> Sourced | None:

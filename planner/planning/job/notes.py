@@ -9,6 +9,7 @@ from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.geometry.curves import CHORD_SHARE
 from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
+from planner.nc.extents import travel_faults
 from planner.nc.program import Kind, Program
 from planner.planning.job.plausible import short_block_notes, unit_notes
 
@@ -23,6 +24,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
     return [
         *large,
         *program.notes,
+        *_travel_notes(program, machine),
         *unit_notes(machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
@@ -30,6 +32,13 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *_radius_notes(toolpath, machine),
         *([] if large else short_block_notes(toolpath)),
     ]
+
+
+def _travel_notes(program: Program, machine: Machine) -> list[str]:
+    """What lies beyond the travel, where it was to be planned, and what of it is not known."""
+    faults, notes = travel_faults(program, machine)
+    ignored = [f"line {fault.line}: {fault.message.partition(';')[0]} (--ignore-travel)" for fault in faults]
+    return [*notes, *ignored]
 
 
 def _feed_notes(program: Program, machine: Machine) -> list[str]:

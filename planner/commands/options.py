@@ -175,7 +175,7 @@ _READING: dict[str, tuple[Any, Any]] = {
         typer.Option(
             "--ignore",
             metavar="CODE,...",
-            help="leave out what you know to be harmless: codes, axes, commands, such as M428,G187,A,$X",
+            help="leave out what you know to be harmless: codes, axes, commands, lines, such as M428,G187,A,$X,12-20",
         ),
     ),
     "arc_centres": _one_of(

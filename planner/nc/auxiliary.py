@@ -42,14 +42,14 @@ TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
 def set_feed(state: State, block: Block, findings: Findings) -> None:
-    """The feed mode and F of a block. Raises WordFault for an F that is not positive."""
+    """The feed mode and F of a block; F0 is no feed for what follows. Raises WordFault for a negative F."""
     mode = _MODES[block.g["feed mode"]] if "feed mode" in block.g else state.feed_mode
     if mode != state.feed_mode:
         state.feed_mode, state.feed, state.feed_per_turn = mode, 0.0, 0.0
     if "F" not in block.value:
         return
     feed = block.value["F"]
-    if not feed > 0:
+    if feed < 0 or (mode == "inverse time" and not feed):
         text = "a feed must be positive; write the feed of the moves that follow, such as F1000"
         raise block.fault(text, "F")
     if mode == "inverse time":
@@ -59,6 +59,7 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
         state.feed = feed * state.unit / SECONDS_PER_MINUTE * state.feed_factor
     else:
         state.feed_per_turn = feed * state.unit
+        state.feed = state.feed if feed else 0.0
     code = block.g.get("units")
     if code is not None and (code == 200) != (state.unit != 1.0):
         unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")

@@ -8,33 +8,27 @@ may move ($J jogs) and is refused.
 
 import re
 
-from planner.nc import codes, printer
+from planner.nc import codes, printer, settings
 from planner.nc.codes import Assumption
 from planner.nc.faults import LEFT_OUT, REFUSED, IgnoredWords
-from planner.nc.lexer import FAULT, LINE_MAX, Unreadable, Words
+from planner.nc.lexer import FAULT, Words
 from planner.nc.moves import NUMBER_MAX, OFFSET_NUMBER, Block, Report, unused
-from planner.nc.settings import (
-    ALWAYS_READ,
-    EVERYTHING,
-    GRBL,
-    LEFT_OUT_BY_USER,
-    TEXTS,
-    TOOL_POINT_OFF,
-    TOOL_POINT_ON,
-    Setting,
-    setting,
-)
+from planner.nc.unreadable import unreadable
 
 MESSAGE = "message"  # the rest of the line is text
-COMMAND = Assumption("command{|s} to the control ($)", "assumed not to move anything")
+COMMAND = Assumption("line{|s} to the control or its operator", "assumed not to move anything")
 _IGNORED = Assumption("command{|s} to the control", "left out, as --ignore says")
-# Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files
-# on a card.
+# Settings, unlock, parser state, build info, start-up lines, check mode, sleep, reset, spindle tuning, files on
+# a card, reference of the tool, motors; real-time characters of grbl; objects of TinyG; texts of EdingCNC.
 _HARMLESS = re.compile(
-    r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*)?", re.IGNORECASE
+    r"\$(\$|#|X|G|I\+?|C|SLP|RST=[$#*]?|N\d?(=.*)?|\d+(=.*)?|S[A-Z]*(=.*)?|L[A-Z]*|TLR|HELP|(SD|LOCALFS)/(LIST|STATUS|SHOW)\b.*"
+    r"|(ALARM|MOTOR)/\w+|M[DE])?|[?~!]|\{(?!.*\b(gc|jog\w?|hom\w?|prb\w*)\b)\s*\"?\w+\"?\s*:.*\}|((LOG|WARN|DLG)?MSG|LOGFILE|TCAGUARD)\s.*",
+    re.IGNORECASE,
 )
-_OTHER_SETTING = Assumption("setting{|s} of grbl", "assumed not to change the motion", changes=True)
-_SETTING = re.compile(r"(\$\d+)\s*=\s*(\d+\.?\d*)")
+_JSON = re.compile(r'\{\s*"?((?!gc\b|jog|hom|prb)\w+)"?\s*:\s*"?([^"{}]*?)"?\s*\}', re.IGNORECASE)
+_WAITS = ("DLG", "WAR")  # how texts begin that the operator has to answer
+_OTHER_SETTING = Assumption("setting{|s} of the control", "assumed not to change the motion", changes=True)
+_SETTING = re.compile(r"(\$[\w/]+)\s*=\s*(\d+\.?\d*)")
 _HOMING = re.compile(r"\$H\s*([XYZ]*)", re.IGNORECASE)
 _LONGEST = 80  # characters of bare axis letters that are looked at
 # Possessive: blanks go to one of two places each, and n letters that do not end the line would be tried in
@@ -43,37 +37,35 @@ _BARE = re.compile(rb"[ \t]*+((?>[XYZWO][ \t]*+0?+[ \t]*+)++)[\r\n;(]", re.IGNOR
 CODE_MAX = 1e4  # larger G and M numbers are all unknown
 _CODE_ROUNDING = 1e-4  # G1.00001 is G1, as RS274NGC rounds
 _ALWAYS = frozenset("XYZFST$@^" + codes.PARKABLE)  # words that need no code beside them
-_TOOL_POINT_CODES = tuple(10 * number for number in (*TOOL_POINT_ON, *TOOL_POINT_OFF))
+_TOOL_POINT_CODES = tuple(10 * number for number in (*settings.TOOL_POINT_ON, *settings.TOOL_POINT_OFF))
 _BARE_WORD = re.compile(r"([a-z])\s*([-+]?\d+\.?\d*|)")
 NAME_SHOWN = 20  # characters of a name in a note
 PROGRAM_NAME = Assumption("program name{|s}", "without effect")
 PROGRAM_NUMBER = Assumption("program number{|s}", "kept, without effect")
-_UNREADABLE = {
-    Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
-    Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",
-    Unreadable.COMMENT_NESTED: "a comment inside a comment is not allowed; remove the inner parenthesis",
-}
-_NO_WORD = "this character starts no word; a word is a letter and a number"
 
 
-def command(words: Words, word: int, block: Block, report: Report, ignored: IgnoredWords) -> bool:
-    """Execute `$` at the start of a line into `block`; False for none, or a refusal."""
+def command(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
+    """Execute a line to the control ($X, ?, {"xvm":1000}) or its operator into `block`; False for none, or one
+    that may move."""
     if block.g or block.m or block.value or ignored.strict:
         return False
-    if words.text(word) != "$":
-        return False
-    text = "$" + words.rest(word).split(";")[0].split("(")[0].strip()
-    if ignored.ignores("$") or ignored.ignores(text.upper()[:2]):
+    at = int(words.at[word])
+    text = words.data[at : words.line_at(at)[1]].decode("utf-8", "replace").split(";")[0].strip()
+    if ignored.ignores(text.upper()[:2]) or (text[:1] == "$" and ignored.ignores("$")):
         ignored.count(_IGNORED, text, block.line)
         return True
+    if pair := _JSON.fullmatch(text):
+        text = f"${pair[1]}={pair[2]}"
+    text = text.split("(")[0].strip() if text[:1] == "$" else text
     if homing := _HOMING.fullmatch(text):
         block.homing = homing.group(1).upper() or "XYZ"
         return True
     setting = _SETTING.fullmatch(text)
-    if setting and setting[1] in GRBL:
-        block.settings.append(Setting(setting[1], {"": float(setting[2])}, word))
+    if setting and setting[1] in settings.GRBL:
+        block.settings.append(settings.Setting(setting[1], {"": float(setting[2])}, word))
     elif setting or _HARMLESS.fullmatch(text):
-        ignored.count(_OTHER_SETTING if setting else COMMAND, text, block.line)
+        ignored.count(_OTHER_SETTING if setting or text[:1] == "{" else COMMAND, text, block.line)
+        block.stops = text[:1] == "!" or text[:3].upper() in _WAITS
     else:
         return False
     return True
@@ -102,7 +94,7 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
     owned = ""  # letters that belong to a setting
     for word in range(first, last):
         code, value = int(words.letter[word]), float(words.value[word])
-        if owned == MESSAGE or (owned == EVERYTHING and code == FAULT):
+        if owned == MESSAGE or (owned == settings.EVERYTHING and code == FAULT):
             if block.settings:
                 start, end = int(words.at[word]), words.line_at(int(words.at[word]))[1]
                 text = words.data[start:end].partition(b";")[0].decode("latin-1").lower()
@@ -110,9 +102,9 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
                 block.settings[-1].values.update(given)  # NaN where a letter has no number
             break
         if code == FAULT:
-            if homed(words, word, block, ignored) or command(words, word, block, report, ignored):
+            if homed(words, word, block, ignored) or command(words, word, block, ignored):
                 break
-            report(word, _unreadable(words, word))
+            report(word, unreadable(words, word))
             return None
         letter = chr(code)
         if letter == "%":
@@ -123,6 +115,10 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
             if name:
                 ignored.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
             block.ended = True
+        elif letter == "O" and word > first + (words.letter[first] == ord("N")):
+            text = "the letter O inside a line; write the digit 0, or an O word at the start of its line"
+            report(word, text)
+            return None
         elif letter == "O":
             if not _program_number(words, word, last, block, report, ignored):
                 return None
@@ -132,7 +128,7 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
                 return None
         elif letter in "GM":
             taken = None
-            if value * 10.0 not in ALWAYS_READ[letter] or ignored.reading.ignore:
+            if value * 10.0 not in settings.ALWAYS_READ[letter] or ignored.reading.ignore:
                 taken = _settle(words, word, (first, last), block, ignored)
             owned = taken or ""
             if taken is None:
@@ -181,14 +177,16 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
     letters = bytes(words.letter[row[0] : row[1]]).decode("latin-1")
     before = letters[: word - row[0]].replace("N", "").replace("M", "")
     behind = re.split("[GM]", letters[word + 1 - row[0] :], maxsplit=1)[0]  # up to the next code
-    found = setting(letter, code, before, behind)
+    found = settings.setting(letter, code, before, behind)
     if ignored.ignores(name):
-        ignored.count(LEFT_OUT_BY_USER, name, block.line)
+        probes = letter == "G" and code in settings.PROBES
+        ignored.count(settings.PROBING if probes else settings.LEFT_OUT_BY_USER, name, block.line)
+        block.stops, block.refused_motion = probes, probes
         block.events.append((letter, code / 10))
         block.partial = True
         block.foreign |= letter == "G"
         alone = letter == "M" and code not in codes.M_GROUP and not before
-        return found.letters if found else EVERYTHING if alone else ""
+        return found.letters if found else settings.EVERYTHING if alone else ""
     if ignored.at_tip and letter == "M" and code in _TOOL_POINT_CODES:
         block.tool_point, block.at["tool point"] = code // 10, word
         block.events.append((letter, code / 10))
@@ -196,12 +194,12 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
     if found is None or ignored.strict:
         return None
     if found.what is None:
-        block.settings.append(Setting(name, {}, word))
+        block.settings.append(settings.Setting(name, {}, word))
     else:
         ignored.count(found.what, words.text(word), block.line)
     block.events.append((letter, code / 10))
     block.stops |= found.stops
-    return MESSAGE if letter == "M" and code // 10 in TEXTS and not before else found.letters
+    return MESSAGE if letter == "M" and code // 10 in settings.TEXTS and not before else found.letters
 
 
 def _add_code(
@@ -238,6 +236,14 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
     motion code, the one in force may use them: the interpreter looks."""
     named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
     block.uses = frozenset("".join(codes.WORDS.get(name, "") for name in named))
+    if (
+        "P" in block.value
+        and "P" not in block.uses
+        and "spindle" in block.m
+        and not (ignored.strict or block.has("XYZ"))
+    ):
+        ignored.count(settings.SPINDLE_WORD, words.text(block.at["P"]), block.line)
+        del block.value["P"]
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
     if "E" in block.uses:
         ignored.used("E")
@@ -247,18 +253,3 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
         elif ignored.treatment[ord(letter)] != LEFT_OUT:
             report(block.at[letter], unused(letter))
         del block.value[letter]
-
-
-def _unreadable(words: Words, word: int) -> str:
-    kind, text = Unreadable(int(words.value[word])), words.text(word)
-    if kind in _UNREADABLE:
-        return _UNREADABLE[kind]
-    if kind is Unreadable.NUMBER:
-        after = words.data[int(words.at[word]) + len(text) :].lstrip(b" \t")[:1].decode("latin-1")
-        known = codes.CHARACTERS.get(after, "") if after not in ")/" else ""
-        return known or "a letter without a number; write digits after it, such as X1.5"
-    if text.isdigit() or text in "+-.":
-        return "a number without a letter before it; a word is a letter and one number"
-    if text.isprintable():
-        return codes.CHARACTERS.get(text, _NO_WORD)
-    return f"character {ord(text)} is not part of a text; is this a binary file?"

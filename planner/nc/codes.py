@@ -150,6 +150,11 @@ G_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys(
         (270, 290, 600), Refusal("a move by way of a reference point is", "write G0 to its end", True)
     ),
+    150: Refusal(
+        "a G code that RS274NGC does not know (Okuma's G15 H is a work system) is",
+        "write G54 to G59, or G54.1 P",
+        True,
+    ),
     435: Refusal("the tool's direction as a vector (G43.5 with I J K) is", _ANGLES, True),
     500: Refusal("presetting coordinates with G50 is", "write G92", True),
     510: Refusal("scaling is", "write the scaled coordinates out"),

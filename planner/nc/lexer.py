@@ -32,7 +32,8 @@ BOM = b"\xef\xbb\xbf"
 NUMBER = rb"[ \t]*[-+]?[\d \t]*\.?[\d \t]*(?:(?<=[\d.])(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
 _WORD = re.compile(rb"[@-Z^a-z%$:]" + NUMBER)
 # Characters by their codes: what a compiled loop compares bytes with.
-_NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END = 10, 13, 9, 32, 26
+_NEWLINE, _RETURN, _TAB, _SPACE, _DOS_END, _NUL = 10, 13, 9, 32, 26, 0
+_NO_BREAK = 0xC2, 0xA0  # the bytes of a no-break space, which editors and pages put in place of a blank
 _OPEN, _CLOSE, _SEMICOLON, _SLASH, _PERCENT, _PLUS, _MINUS, _POINT, _ZERO = 40, 41, 59, 47, 37, 43, 45, 46, 48
 _LETTER_O, _LETTER_E, _SMALL_E, _COLON, _DOLLAR, _STAR, _AT, _Z, _CARET = 79, 69, 101, 58, 36, 42, 64, 90, 94
 _POWERS_OF_TEN = np.array([10.0**k for k in range(23)])  # exact in double precision
@@ -108,10 +109,11 @@ class Words:
         return self.column_at(int(self.at[word]))
 
     def text(self, word: int) -> str:
-        """The word as written, up to what follows it; one character of what is unreadable."""
+        """The word as written, up to what follows it; a command ($X); one character of what is unreadable."""
         at = int(self.at[word])
         if self.letter[word] == FAULT and self.value[word] != Unreadable.NUMBER:
-            return self.data[at : at + 4].decode("utf-8", "replace")[:1]
+            found = self.data[at : self.line_at(at)[1]].decode("utf-8", "replace")
+            return found.split()[0] if found[:1] == "$" else found[:1]
         match = _WORD.match(self.data, at)
         return match.group().decode("ascii").strip() if match else ""
 
@@ -212,8 +214,11 @@ def _split(source, i, block_delete, letter, value, at, line, first):  # pragma: 
         line_start, row_first, blank, reading, comments = i, words, True, True, 0
         while i < end and source[i] != _NEWLINE:
             c = source[i]
-            if not reading or c in (_SPACE, _TAB, _RETURN, _DOS_END):
+            if not reading or c in (_SPACE, _TAB, _RETURN, _DOS_END, _NUL):
                 i += 1
+                continue
+            if c == _NO_BREAK[0] and i + 1 < end and source[i + 1] == _NO_BREAK[1]:
+                i += 2
                 continue
             if c == _SLASH and blank:
                 reading = not block_delete

@@ -15,26 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.nc import settings
 from planner.nc.codes import Assumption
 from planner.nc.extruder import Retraction
 from planner.nc.faults import IgnoredWords
 from planner.nc.lexer import FAULT, Words
 from planner.nc.moves import Block
-from planner.nc.settings import (
-    LEFT_OUT_BY_USER,
-    LEVELLING,
-    MACRO,
-    PARKS,
-    PRINTER_M,
-    RETRACTIONS,
-    SCALE_M,
-    SETS_LIMITS,
-    TOOLS,
-    VELOCITY_LIMIT,
-    WAIT_M,
-    Setting,
-    meaning,
-)
 
 # M codes that only printers have, and those that only printers have with a number on a line of their own.
 _COUNTS = (82.0, 83.0)
@@ -61,16 +47,16 @@ SAVE, RESTORE, OFFSET, PLACE = (
     "SET_KINEMATIC_POSITION",
 )
 OF_STATE = frozenset((SAVE, RESTORE, OFFSET, PLACE, "G60", "G61"))
-# Names of Klipper by what is said of them, in this order; of others (macros of the machine) MACRO.
+# Names of Klipper by what is said of them, in this order; of others (macros of the machine) settings.MACRO.
 _NAMES = {
-    PARKS: r"@?PAUSE|RESUME|(UN)?LOAD_FILAMENT|FILAMENT_(UN)?LOAD|CANCEL_PRINT|ACTIVATE_EXTRUDER",
-    WAIT_M: r"TEMPERATURE_WAIT",
-    SCALE_M: r"BED_MESH_(PROFILE|CLEAR|OFFSET)|SKEW_PROFILE|SET_(SKEW|INPUT_SHAPER|DUAL_CARRIAGE"
+    settings.PARKS: r"@?PAUSE|RESUME|(UN)?LOAD_FILAMENT|FILAMENT_(UN)?LOAD|CANCEL_PRINT|ACTIVATE_EXTRUDER",
+    settings.WAIT_M: r"TEMPERATURE_WAIT",
+    settings.SCALE_M: r"BED_MESH_(PROFILE|CLEAR|OFFSET)|SKEW_PROFILE|SET_(SKEW|INPUT_SHAPER|DUAL_CARRIAGE"
     r"|STEPPER_\w+|TMC_\w+|EXTRUDER_\w+)",
-    PRINTER_M: r"@.+|SET_\w+|EXCLUDE_OBJECT\w*|RESPOND|_?TIMELAPSE_\w+|SAVE_\w+|CLEAR_PAUSE|ENABLE_\w+|(QUERY|GET|DUMP|STATUS"
+    settings.PRINTER_M: r"@.+|SET_\w+|EXCLUDE_OBJECT\w*|RESPOND|_?TIMELAPSE_\w+|SAVE_\w+|CLEAR_PAUSE|ENABLE_\w+|(QUERY|GET|DUMP|STATUS"
     r"|SDCARD|UPDATE|START_PRINT_TIMER|PRINT_STATS)_\w+|TURN_OFF_HEATERS|SYNC_EXTRUDER_MOTION|MMU_\w*STATS|ACTION_\w+",
 }
-_MEANT = dict.fromkeys((98, 401, 402), LEVELLING) | {290: SCALE_M}
+_MEANT = dict.fromkeys((98, 401, 402), settings.LEVELLING) | {290: settings.SCALE_M}
 _REFUSED = ("FORCE_MOVE", "MANUAL_STEPPER")
 _CALLS = (96, 97, 98, 198)
 
@@ -138,25 +124,27 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
         return False
     name, values = found.name, found.values()
     code = int(name[1:].partition(".")[0]) if name[1:2].isdigit() else -1
-    limits = name == VELOCITY_LIMIT or (name == f"M{code}" and code in SETS_LIMITS)
+    limits = name == settings.VELOCITY_LIMIT or (name == f"M{code}" and code in settings.SETS_LIMITS)
     given = {key: _number(value) for key, value in values.items()}
     if limits or name in OF_STATE:
-        block.settings.append(Setting(name, given, word, values.get("name" if found.extended else "s", "")))
+        block.settings.append(
+            settings.Setting(name, given, word, values.get("name" if found.extended else "s", ""))
+        )
     elif name[0] == "G" and code in _ANY:
         return False
     elif ignored.ignores(name):
-        ignored.count(LEFT_OUT_BY_USER, name, block.line)
+        ignored.count(settings.LEFT_OUT_BY_USER, name, block.line)
     elif name in _STOPPING:
         block.m["stopping"], block.at["stopping"] = _STOPPING[name], word
         return True
     elif name in _HOMING:
         block.homing = "".join(axis for axis in "XYZ" if axis.lower() in values) or "XYZ"
     else:
-        if name in RETRACTIONS and (found.extended or "s" in given):
+        if name in settings.RETRACTIONS and (found.extended or "s" in given):
             before = ignored.retractions[-1] if ignored.retractions else Retraction()
             ignored.retractions.append(before.changed(name, given, block.line))
             if given.get("z"):
-                ignored.count(SCALE_M, name, block.line)
+                ignored.count(settings.SCALE_M, name, block.line)
         what, stops = _meaning(found, code, ignored)
         if what is None:
             return False
@@ -173,17 +161,17 @@ def _meaning(found: Command, code: int, ignored: IgnoredWords) -> tuple[Assumpti
     name = found.name
     if found.extended:
         of = (what for what, names in _NAMES.items() if re.fullmatch(names, name))
-        what = next(of, MACRO)
-        return what, what in (MACRO, PARKS, WAIT_M)
+        what = next(of, settings.MACRO)
+        return what, what in (settings.MACRO, settings.PARKS, settings.WAIT_M)
     if name[0] in "TP":
         changed = name[0] == "P" or ignored.extruder not in ("", name)
         ignored.extruder = name if name[0] == "T" else ""
-        return (TOOLS if changed else PRINTER_M), changed
+        return (settings.TOOLS if changed else settings.PRINTER_M), changed
     if name[0] == "G":
-        return (LEVELLING if code in _LEVELS else None), True
+        return (settings.LEVELLING if code in _LEVELS else None), True
     if 3 <= code <= 9 or (code in _CALLS and '"' not in found.rest):
         return None, False
-    what, stops = meaning(code)
+    what, stops = settings.meaning(code)
     return _MEANT.get(code, what), stops or code in _MEANT
 
 

@@ -118,21 +118,24 @@ def execute(
     tee : gets the expanded rows of a program that computes, chunk by chunk
     """
     interpreter = Interpreter(machine, source, reading)
+    data = reading.kept(data, source)
+    for first, last in reading.lines:
+        interpreter.findings.assume(f"lines {first} to {last} are left out, as --ignore says", first)
     language = detect.language_of(data) if reading.dialect == AUTO else reading.dialect
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
         interpreter.state.seconds_meant = True
         return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
-    if language != SIEMENS and not reading.strict:
-        data, leader = detect.without_leader(data)
+    if language != SIEMENS:
+        data, leader = detect.without_leader(data, reading)
         if leader:
             interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
     words = split_words(data, block_delete=reading.block_delete)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    if reading.dialect == AUTO and detect.is_siemens(words, source):
-        language = SIEMENS
+    mark = detect.siemens_mark(words, source) if reading.dialect == AUTO else ""
+    language = SIEMENS if mark else language
     prints = language != SIEMENS and not reading.strict and is_printer(words)
     if prints:
         interpreter.ignored.read_printer()
@@ -153,7 +156,11 @@ def execute(
         interpreter.ignored.refuse_extruder()
         from planner.nc.language.expand import expand
 
-        return interpreter, *expand(interpreter, words, dialect, integers, tee)
+        program, faults = expand(interpreter, words, dialect, integers, tee)
+        if mark and faults:
+            why = f"{faults[0].message} (read as a Sinumerik's because of {mark}; --dialect says otherwise)"
+            faults = [dataclasses.replace(faults[0], message=why), *faults[1:]]
+        return interpreter, program, faults
     interpreter.execute(interpreter.in_seconds(words))
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
@@ -182,10 +189,12 @@ def load(path: str | Path) -> bytes:
 
 
 def _check_text(data: bytes, source: str) -> None:
-    nul = data.find(b"\0")
-    if nul >= 0:
+    padding = len(data) - len(data.lstrip(b"\0"))  # of tapes, and of transfers in blocks
+    nul = data.strip(b"\0").find(b"\0") + padding
+    if nul >= padding and data.strip(b"\0"):
         line = data.count(b"\n", 0, nul) + 1
         column = nul - data.rfind(b"\n", 0, nul)
         is_utf16 = data[:2] in (b"\xff\xfe", b"\xfe\xff")
         what = "UTF-16 text; save it as UTF-8" if is_utf16 else "a binary file; give a text file"
-        raise InputError(f"NUL byte found: this looks like {what}", source=source, line=line, column=column)
+        text = f"NUL byte found between other characters: this looks like {what}"
+        raise InputError(text, source=source, line=line, column=column)

@@ -22,10 +22,15 @@ REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (AUTO, REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
 LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
-DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS)
+_ALIASES = {"haas": FANUC, "grbl": LINUXCNC, "sinumerik": SIEMENS}
+DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, *_ALIASES)
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
-_OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?")
-_SAY = "write G and M codes, rotary or second axes (A B C U V W) or commands of the control ($X), such as M428,G187,A"
+_OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?|[A-Z]*_\w+")
+_LINES = re.compile(r"(\d+)(?:-(\d+))?")
+_SAY = (
+    "write G and M codes, rotary or second axes (A B C U V W), commands of the control ($X, PRINT_START) or lines "
+    "(12-20), such as M428,G187,A,12-20"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +40,7 @@ class Reading:
 
     strict       : refuse everything that would be assumed
     ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands
-                   ("$X"); in one normal form
+                   ("$X", "PRINT_START"), lines of the file ("12-20"); in one normal form
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute",
                    or "auto", which is incremental unless arcs on more than one line close with absolute
                    centres only, as all of the program do
@@ -57,12 +62,30 @@ class Reading:
     ignore_travel: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "dialect", _ALIASES.get(self.dialect, self.dialect))
         for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS), ("dialect", DIALECTS)):
             if getattr(self, name) not in allowed:
                 raise InputError(f"{name} = {getattr(self, name)!r}; allowed are {', '.join(allowed)}")
         if isinstance(self.ignore, str):
             raise InputError(f"ignore = {self.ignore!r} is one text; give a tuple, such as ('M428', 'A')")
         object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
+
+    @property
+    def lines(self) -> list[tuple[int, int]]:
+        """The first and last of the lines that are left out, 1-based."""
+        found = filter(None, map(_LINES.fullmatch, self.ignore))
+        return [(int(lines[1]), int(lines[2] or lines[1])) for lines in found]
+
+    def kept(self, data: bytes, source: str) -> bytes:
+        """A program with blanks for the lines that are left out; offsets stay. Raises InputError for lines
+        beyond its end."""
+        rows = data.split(b"\n") if self.lines else []
+        count = len(rows) - (rows[-1:] == [b""])
+        for first, last in self.lines:
+            if not 1 <= first <= last <= count:
+                raise InputError(f"ignore: {first}-{last}: the program has lines 1 to {count}", source=source)
+            rows[first - 1 : last] = [b" " * len(row) for row in rows[first - 1 : last]]
+        return b"\n".join(rows) if rows else data
 
     def changed(self) -> dict[str, Any]:
         """The settings that are not the usual ones, ready for JSON; `Reading.saved` reads them."""
@@ -104,7 +127,7 @@ def _normal(entry: str) -> str:
                 f"ignore: {name} cannot be left out: it moves the axes, or what follows it has another meaning without it"
             )
         return name
-    if _OTHER.fullmatch(text):
+    if _OTHER.fullmatch(text) or _LINES.fullmatch(text):
         return text
     raise InputError(f"ignore: '{entry}' is nothing that can be ignored; {_SAY}")
 

@@ -26,9 +26,15 @@ SET_RETRACTION = "SET_RETRACTION"
 RETRACTIONS = ("M207", "M208", SET_RETRACTION)  # what G10 and G11 do on printers
 PRINTER_FEED = 25.0  # before the first F [mm/s]: Marlin's motion.cpp and Klipper's gcode_move.py
 SMOOTHNESS = "G187"  # of Haas: its E is a tolerance
-_GRBL_AXES = "xyzabc"  # grblHAL has six
-GRBL = {f"$11{k}": ("velocity", axis) for k, axis in enumerate(_GRBL_AXES)} | {
-    f"$12{k}": ("acceleration", axis) for k, axis in enumerate(_GRBL_AXES)
+# Of grbl and grblHAL, which has six axes; of TinyG and g2core; of FluidNC.
+GRBL = {
+    name: (quantity, axis)
+    for k, axis in enumerate("xyzabc")
+    for quantity, names in (
+        ("velocity", (f"$11{k}", f"${axis}vm", f"$/axes/{axis}/max_rate_mm_per_min")),
+        ("acceleration", (f"$12{k}", f"$/axes/{axis}/acceleration_mm_per_sec2")),
+    )
+    for name in names
 }
 CORNERS = "no limit of this plan, which goes around corners within the tolerance and the machine's acceleration and jerk"
 UNKNOWN_M = Assumption(
@@ -56,6 +62,13 @@ SCALE_M = Assumption(
     changes=True,
 )
 SPINDLE_LIMIT = Assumption("largest spindle speed{|s}", "they change nothing in the path")
+PROBES = frozenset((310, 350, 360, 361, 370, *range(380, 386)))  # G31, G35 to G37, G38.2 to G38.5 in tenths
+PROBING = Assumption(
+    "probing move{|s}",
+    "left out, as --ignore says: a full stop; the axes are assumed to stay where they are",
+    changes=True,
+)
+SPINDLE_WORD = Assumption("P word{|s} beside M3 to M5", "power or gear of the spindle, left out")
 LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 EXTRUDER_ZERO = Assumption("zero{|s} of the extruder", "left out with its words")
 RETRACTION = Assumption(
@@ -153,7 +166,7 @@ def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
         return CodeSetting(SPINDLE_LIMIT, "SPQR")
     if code == 1870 and "E" in behind:
         return CodeSetting(None, "EP")
-    if code == 500 or code in _G_SETTINGS:
+    if code == 500 or (code in _G_SETTINGS and not (code == 150 and "H" in behind)):
         return CodeSetting(G_SETTING, "DEHLPQRS")
     if code in (100, 110) and "L" not in behind:
         return CodeSetting(RETRACTION, "PRS")
@@ -197,5 +210,5 @@ def may_be_ignored(name: str) -> bool:
     code = round(float(number) * 10)
     if letter == "M":
         return code not in (20, 300, 970, 980, 990)
-    moving = 50 <= code <= 69 or 330 <= code <= 389 or 700 <= code <= 899  # splines, threads, probing, cycles
-    return (code not in G_GROUP or code == _TOOL_LENGTH_POINT) and not moving
+    moving = 50 <= code <= 69 or 330 <= code <= 389 or 700 <= code <= 899  # splines, threads, cycles
+    return code in PROBES or ((code not in G_GROUP or code == _TOOL_LENGTH_POINT) and not moving)

@@ -60,7 +60,8 @@ REFUSED = [
     ("T-1", 1, 1, ["T-1", "whole number"]),
     ("G43 H1.5", 1, 5, ["H1.5", "whole number"]),
     ("S-5", 1, 1, ["S-5", "negative"]),
-    ("G0 X1\nF0", 2, 1, ["F0", "positive"]),
+    ("G1 F0 X1", 1, 1, ["G1", "without a feed"]),
+    ("G93 G1 F0 X1", 1, 8, ["F0", "positive"]),
     ("F-3", 1, 1, ["F-3", "positive"]),
     # codes
     ("G0 G1 X1", 1, 4, ["G1", "G0 and G1", "motion"]),
@@ -114,7 +115,7 @@ REFUSED = [
     # other files
     ("", 1, 1, ["empty"]),
     ("(nothing)\n\n; here", 1, 1, ["empty"]),
-    ("G0 X1\nG\0", 2, 2, ["NUL", "binary"]),
+    ("G0 X1\nG\0 X2", 2, 2, ["NUL", "binary"]),
     ("G0 X1".encode("utf-16"), 1, 4, ["NUL", "UTF-16"]),
     ("F1\nG0 X30\nG2 X50 I40 J0", 3, 1, ["if its centre were absolute: write G90.1"]),
 ]
@@ -135,7 +136,7 @@ STRICTLY = [
     ("M106 S3", 1, 1, ["M106", "each machine"]),
     ("F1\nG2 X2 I1 K0", 2, 1, ["K in the x y plane"]),
     ("G4 S1", 1, 1, ["G4", "P word"]),
-    ("TEXT\n%\nG0 X1", 1, 1, ["T", "without a number"]),
+    ("TEXT\n%\nG0 X1", 1, 1, ["T", "a letter and a number"]),
     ("G15", 1, 1, ["G15", "does not know"]),
     ("G50 S1600", 1, 1, ["G50"]),
     ("G28 G0 X1", 1, 1, ["G28", "G28 and G0", "two lines"]),

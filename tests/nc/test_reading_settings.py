@@ -26,8 +26,10 @@ def test_ignored_codes_are_left_out_with_what_belongs_to_them() -> None:
 
 
 def test_the_list_of_ignored_codes_has_one_form() -> None:
-    assert ignore_list(" m007,M 428,G12.1,,a,$h,M7") == ("M7", "M428", "G12.1", "A", "$H")
-    for wrong in ("X", "M", "G1", "G81", "G5.2", "M30", "M98", "M2", "G20", "F100", "hello", "M1.23"):
+    assert ignore_list(" m007,M 428,G12.1,,a,$h,M7,print_start, 3-5,7") == (
+        *("M7", "M428", "G12.1", "A", "$H", "PRINT_START", "3-5", "7"),
+    )
+    for wrong in ("X", "M", "G1", "G81", "G5.2", "M30", "M98", "M2", "G20", "F100", "hello", "3-", "M1.23"):
         with pytest.raises(InputError, match="ignore"):
             ignore_list(wrong)
 

@@ -173,7 +173,7 @@ def test_limits_above_the_machines_are_said_first() -> None:
         ("SET_VELOCITY_LIMIT ACCEL=450 SQUARE_CORNER_VELOCITY=3", "SQUARE_CORNER_VELOCITY"),
         ("M92 X80", "shifts or scales"),
         ("M206 X2", "shifts or scales"),
-        ("$100=250", "setting of grbl"),
+        ("$100=250", "setting of the control"),
         ("M109 S200", "wait for a temperature"),
     ],
 )

@@ -53,7 +53,9 @@ def source_of(plan: Plan) -> Source:
 
 
 def _read(text: bytes, plan: Plan, how: str) -> Source:
-    reading = dataclasses.replace(plan.program.reading, dialect=AUTO)
+    usual = plan.program.reading  # lines of the text that it was written out from are not its own
+    ignore = tuple(entry for entry in usual.ignore if not entry[0].isdigit())
+    reading = dataclasses.replace(usual, dialect=AUTO, ignore=ignore)
     return rows_of(text, _same(text, plan, reading, f", {how},"), plan.machine)
 
 
@@ -136,7 +138,8 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
         (_SLASH.search(text) and not linuxcnc, "lines begin with /, which this control does not leave out"),
         (not control.paren and _PAREN.search(text), "it has comments in parentheses"),
         (program.reading.ignore and not linuxcnc, "words were left out by --ignore"),
-        (without_leader(text)[1], "there is text before the first %"),
+        (program.reading.lines, "lines were left out by --ignore"),
+        (without_leader(text, program.reading)[1], "there is text before the first %"),
         (not control.number and _NUMBER.search(text), "its lines have numbers"),
     ):
         if holds:

@@ -62,6 +62,11 @@ _MODELS = (
     ("a model (STEP)", rb"\A\s*ISO-10303-21\s*;", _CAM),
     ("a drawing (SVG)", rb"(?s)\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", _CAM),
     ("a document (PDF)", rb"\A%PDF-\d", _CAM),
+    (
+        "a CL file (APT)",
+        rb"(?mi)^[ \t]*(?:GOTO|FROM|FEDRAT|MULTAX|LOADTL|PARTNO|CUTTER)[ \t]*/",
+        "run it through the post-processor of the CAM system and give the G code",
+    ),
     ("an archive (ZIP, 3MF)", rb"\APK\x03\x04", "unpack it and give the program in it"),
     ("a machine file", rb"(?m)^\[axes\.[a-z]\]", "give the program, and the machine file as -m FILE"),
     (
@@ -104,6 +109,7 @@ _CYCLES_OF_LATHES = (90.0, 91.0, 94.0)
 _EITHER = re.compile(r"[#\[]|^(?:N\d+)?M7[0-3]$")
 _STATEMENTS = (_EITHER, _LINUXCNC, _FANUC)
 _SHOWN = 30  # characters of the text in the note
+_JSON = re.compile(rb'^[ \t]*\{[ \t]*"?gc"?[ \t]*:[ \t]*"([^"\n]*)"[^\n]*', re.MULTILINE)
 _FIRST_PERCENT = re.compile(rb"^[ \t]*%", re.MULTILINE)
 _LANGUAGE = re.compile(rb"[#\[<=]")
 _DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
@@ -133,21 +139,31 @@ def language_of(data: bytes) -> str | None:
     return HEIDENHAIN if _CONVERSATIONAL.search(data[:_LOOKED_AT]) else None
 
 
-def is_siemens(words: Words, source: str) -> bool:
-    """True if a program is one of a Sinumerik: by the ending of its file, its G codes, or a mark anywhere in
-    it."""
-    codes = words.value[words.letter == ord("G")]
-    if source.lower().endswith(_SUBPROGRAMS) or np.isin(codes, _SIEMENS_CODES).any():
-        return True
+def siemens_mark(words: Words, source: str) -> str:
+    """What says that a program is one of a Sinumerik: the ending of its file, a G code, or a line with a mark;
+    empty for other programs."""
+    if source.lower().endswith(_SUBPROGRAMS):
+        return "its name"
+    if len(codes := words.find("G", *_SIEMENS_CODES)):
+        return f"{words.text(codes[0])} in line {words.line[words.row(codes[0])]}"
     odd = words.rows_with(
         np.flatnonzero((words.letter == FAULT) | np.isin(words.letter, (ord("%"), ord("O"))))
     )
-    return any(_SIEMENS.match(words.row_text(row)) for row in odd)
+    marked = (row for row in odd if _SIEMENS.match(words.row_text(row)))
+    row = next(marked, None)
+    return "" if row is None else f"line {words.line[row]}, {words.row_text(row).strip()[:_SHOWN]!r}"
 
 
-def without_leader(data: bytes) -> tuple[bytes, str]:
-    """The program with blanks for the text before its first %, and the beginning of that text; ("" where
-    there is none). Offsets and lines stay as they are."""
+def without_leader(data: bytes, reading: Reading) -> tuple[bytes, str]:
+    """The program with blanks for the text before its first %, and the beginning of that text ("" where there
+    is none); of TinyG's {"gc":"..."} the G code alone. Offsets and lines stay as they are. Strict reading has
+    neither."""
+    if reading.strict:
+        return data, ""
+    if b"{" in data:
+        data = _JSON.sub(
+            lambda found: found[1].rjust(found.end(1) - found.start()).ljust(len(found[0])), data
+        )
     match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
     text = data[: match.start()] if match else b""
     if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
@@ -179,7 +195,7 @@ def bare(text: str) -> str:
 
 def computes(text: str) -> bool:
     """True if a bare line is a statement of a language rather than words."""
-    return any(sign.search(text) for sign in (*_STATEMENTS, _FRAME))
+    return text[:1] != "$" and any(sign.search(text) for sign in (*_STATEMENTS, _FRAME))
 
 
 def ends_frame(text: str) -> bool:

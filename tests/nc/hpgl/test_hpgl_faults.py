@@ -49,7 +49,7 @@ FAULTS = [
     ("PE<=>;PD1,1", 1, 1, ["encoded"]),
     ("", 1, 1, ["no instruction in it"]),
     (";\n;", 1, 1, ["no instruction in it"]),
-    ("PD1,1\0", 1, 6, ["NUL"]),
+    ("PD1,1\0;PU", 1, 6, ["NUL"]),
 ]  # fmt: skip
 
 

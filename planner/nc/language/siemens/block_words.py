@@ -232,7 +232,10 @@ class BlockWords(Places):
         if code in (74, 75):
             return self._home(reader, code, at)
         if code not in tables.CODES:
-            raise reader.fault(f"G{code}: {tables.UNKNOWN.format(f'G{code}')}", at - reader.start)
+            raise reader.fault(
+                f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes",
+                at - reader.start,
+            )
         more = []
         if code >= tables.SYSTEMS_FURTHER + 5 and tables.CODES[code] == (54.1,):
             more = [tree.word("P", at, float(code - tables.SYSTEMS_FURTHER))]

@@ -195,7 +195,7 @@ def test_exact_stops_and_units() -> None:
         ("G1 X=1/0 F100", "<text>:1:1: .*division by zero"),
         ("GOTOF NOWHERE", "to go to"),
         ("REPEAT NOWHERE", "no label NOWHERE"),
-        ("G187 X1", "G187: there is no such"),
+        ("G187 X1", "G187: no G code of a Sinumerik"),
         ("DEF REAL A[2]\nX=A[2]", "index 2 of an array of 2 values"),
         ("CYCLE81(1,2)", "CYCLE81 needs SDIS"),
         ("X=(1", r"\) is expected"),

@@ -1,0 +1,88 @@
+"""What is said of text that is no word: characters, names of other controls, look-alikes of digits and signs."""
+
+import re
+import unicodedata
+
+from planner.nc.codes import CHARACTERS
+from planner.nc.lexer import LINE_MAX, Unreadable, Words
+
+_OF_LINES = {
+    Unreadable.LONG: f"the line is longer than {LINE_MAX} characters, the longest that is read; is this an NC program?",
+    Unreadable.COMMENT_OPEN: "the comment is not closed on its line; write )",
+    Unreadable.COMMENT_NESTED: "a comment inside a comment is not allowed; remove the inner parenthesis",
+}
+_NO_WORD = "this character starts no word; a word is a letter and a number"
+_MINUS_SIGN, _DASHES, _INVISIBLE = "\u2212", "Pd", ("Cf", "Zs")  # one character, and categories of Unicode
+# Capitals of Cyrillic and Greek that look like those of programs.
+_CAPITALS = dict(
+    zip(
+        "\u0410\u0412\u0415\u0406\u0408\u041a\u041c\u041d\u041e\u0420\u0421\u0422\u0425\u0423\u0391\u0392\u0396\u039f\u03a7\u03a5",
+        "ABEIJKMHOPCTXYABZOXY",
+        strict=True,
+    )
+)
+# A number with a letter among its digits, and the digits that are meant.
+_LETTERS = re.compile(r"[A-Za-z][ \t]*[-+]?[\d.]*([OolI])[\d.]*(?![A-Za-z_=(])")
+_DIGITS = {"O": "0", "o": "0", "l": "1", "I": "1"}
+# How lines begin, whose they are, and what to do.
+_NAMES = (
+    (
+        r"(?:GOSUB|(?:END)?SUB|(?:END)?IF|(?:END)?WHILE|ELSE)\b",
+        "a subprogram or branch of EdingCNC's is not supported; write it as LinuxCNC has it, such as o100 sub and o100 call",
+    ),
+    (
+        r"(?:CALL|RTS|MODIN|MODOUT|NLAP|NOEX)\b|V[A-Z]*\d*\s*=|N[A-Z]+\d*\b",
+        "a word of Okuma's (OSP) is not supported; write the moves out, or post the program for a Fanuc control",
+    ),
+    (
+        r"(?:RECV|SEND|ECHO|ERROR|OK)\b",
+        "a line of what a terminal has recorded is no part of a program; give the program alone",
+    ),
+    (r"[A-Z_]{2}", "a word is a letter and a number; a name is none of RS274NGC"),
+)
+_CENTROID = (
+    "an M code of Centroid's with / moves until an input changes, waits for it or sets a home, as only the machine knows; plan "
+    "the parts before and after it"
+)
+
+
+def unreadable(words: Words, word: int) -> str:
+    """The message for a word of the letter `FAULT`."""
+    kind, text, at = Unreadable(int(words.value[word])), words.text(word), int(words.at[word])
+    if kind in _OF_LINES:
+        return _OF_LINES[kind]
+    start, end = words.line_at(at)
+    before, behind = (words.data[a:b].decode("utf-8", "replace") for a, b in ((start, at), (at, end)))
+    if kind is Unreadable.NUMBER:
+        return _without_number(behind, behind[len(text) :].lstrip(" \t")[:1])
+    if text == "/" and re.search(r"[Mm]\s*\d+\s*$", before):
+        return _CENTROID
+    if (text.isdigit() and text.isascii()) or text in "+-.":
+        return "a number without a letter before it; a word is a letter and one number"
+    return CHARACTERS.get(text[:1]) or look_alike(text) or _NO_WORD
+
+
+def _without_number(text: str, behind: str) -> str:
+    """What is said of a letter without a number, at the start of a text, and the character behind it."""
+    if letter := _LETTERS.match(text):
+        return f"{letter[0].strip()} has the letter {letter[1]} in its number; write the digit {_DIGITS[letter[1]]}"
+    known = next((what for name, what in _NAMES if re.match(name, text, re.IGNORECASE)), "")
+    known = known or (CHARACTERS.get(behind, "") if behind not in (")", "/") else "") or look_alike(behind)
+    return known or "a letter without a number; write digits after it, such as X1.5"
+
+
+def look_alike(character: str) -> str:
+    """What is said of a character beyond ASCII, or one that cannot be seen; "" for others."""
+    if not character or (character.isascii() and character.isprintable()):
+        return ""
+    category, code = unicodedata.category(character), ord(character)
+    if category in ("Cc", "Co", "Cn"):
+        return f"character {code} is not part of a text; is this a binary file?"
+    named = f"U+{code:04X} ({unicodedata.name(character, 'without a name').lower()})"
+    if category in _INVISIBLE:
+        return f"{named} is a character that cannot be seen; delete it"
+    dash = "-" if category == _DASHES or character == _MINUS_SIGN else ""
+    meant = dash or _CAPITALS.get(character.upper()) or unicodedata.normalize("NFKC", character)
+    if meant.isascii():
+        return f"{character} is {named}, which looks like {meant}; write {meant}"
+    return f"{_NO_WORD}; it is {named}"

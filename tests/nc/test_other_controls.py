@@ -1,0 +1,180 @@
+"""Lines of other controls and of their operators: each is read, moves nothing, is said first, or refused by name; and what is said of
+text that is no word."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from same_program import same_motion
+
+from planner.base.errors import InputError
+from planner.nc.program import Kind, Program
+from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
+from planner.nc.writer import retimed
+
+HEAD, TAIL = "G21 G90 F600\nG0 X1 Y2 Z3\n", "\nG1 X10 Y5\nM30\n"
+WITHOUT = parse_program(HEAD + TAIL)
+
+
+def between(line: str, reading: Reading | None = None) -> Program:
+    return parse_program(HEAD + line + TAIL, reading=reading or Reading())
+
+
+same = functools.partial(same_motion, lines=False)
+
+
+def stops(program: Program) -> int:
+    return int((program.kind == Kind.STOP).sum())
+
+
+# Lines that move nothing: grbl, grblHAL and FluidNC; TinyG and g2core; EdingCNC; UCCNC, Mach3 and Mach4; Centroid; Masso.
+NOTHING = (
+    "?", "~", "$", "$$", "$#", "$G", "$I", "$N", "$X", "$C", "$N0=G20", "$TLR", "$help", "$SD/List", "$LocalFS/List", "$MD", "$10=1",
+    "$Alarm/Disable", "$RST=*",
+    '{"sr":null}', "{sr:{line:t,posx:t}}", '{"xjm":500}', "{xfr:16000}", "$1sa=1.8", "$ej=1", "$xjm=500",
+    'MSG "drill next"', 'LogMsg "part 1"', "TCAGuard off", "LogFile \"a\" 1",
+    "M10", "M11", "M20", "M21", "M31", "M47", "M800", "G8 P1", "M3 P100", "M3 P0 S50", "M5 P1",
+    "M94/5", "M95/5", "M39", "M25", "M106", "M107", "M666", "N10 ?", "M3 $1",
+)  # fmt: skip
+STOPPING = ("!", 'DlgMsg "tool?" "length" 100', 'WarnMsg "look"', "M0", "M1")
+
+
+@pytest.mark.parametrize("line", NOTHING)
+def test_lines_that_move_nothing(line: str) -> None:
+    program = between(line)
+    assert same(program, WITHOUT)
+    assert len(program.notes) > 0 or line == "M3 $1"
+
+
+@pytest.mark.parametrize("line", STOPPING)
+def test_lines_that_wait_are_full_stops(line: str) -> None:
+    program = between(line)
+    assert stops(program) == 1
+    np.testing.assert_array_equal(program.end[program.kind != Kind.STOP], WITHOUT.end)
+
+
+@pytest.mark.parametrize(
+    "line", ["$xvm=300", "{xvm:300}", '{"xvm":300}', "$110=300", "$/axes/x/max_rate_mm_per_min=300"]
+)
+def test_a_speed_that_a_control_is_given_limits_its_axis(line: str) -> None:
+    (limit,) = between(line).limits
+    assert (limit.quantity, limit.axis, limit.value) == ("velocity", "x", 5.0)
+
+
+@pytest.mark.parametrize(
+    "text", ['{"gc":"G1 X7 Y1"}', '{gc:"g1x7y1"}', ' {"gc" : "N5 G1 X7 Y1"} \r', '{"gc":"G1 X7 Y1","n":4}']
+)
+def test_tinyg_has_g_code_in_json(text: str) -> None:
+    program = between(text)
+    assert same(program, between("G1 X7 Y1"))
+    assert same(parse_program(retimed((HEAD + text + TAIL).encode(), program, program.feed)), program)
+
+
+# Lines that are refused by name: their column, and a part of what is said.
+REFUSED = [
+    ("$J=G91 X5 F100", 1, "may move"), ("$TPW", 1, "$TPW: this command"), ("$F=part.nc", 1, "may move"),
+    ("$SD/Run=a.nc", 1, "may move"),
+    ('{"gc":"G1 X#"}', 13, ""), ("{jogx:5}", 1, "starts no word"), ("{G1 X5}", 1, "starts no word"),
+    ("GoSub drill", 1, "EdingCNC"), ("Sub drill", 1, "EdingCNC"), ("While", 1, "EdingCNC"),
+    ("CALL O100", 1, "Okuma"), ("RTS", 1, "Okuma"), ("VC1=5", 1, "Okuma"), ("NAT01", 1, "Okuma"), ("G15 H2", 1, "Okuma"),
+    ("G31 Z-5 F50", 1, "probing"), ("G38.2 Z-5", 1, "probing"), ("G38.5 Z-5", 1, "probing"), ("G00.1 X5", 1, "G00.1"),
+    ("M100/1", 5, "Centroid"), ("M115/Z-2 P1 F10", 5, "Centroid"), ("M105/X P1", 5, "Centroid"), ("M7.1", 1, "M7.1"),
+    ("M100.1 ({x:n})", 1, "M100.1"), ("M225 #100 \"depth\"", 11, ""), ("M120 \"a.txt\"", 6, "texts"), ("G12 I5", 1, "G12"),
+    ("G70 Q100", 1, "lathe cycle"), ("G71 Q100 D1", 1, "lathe cycle"), ("[ESP400]", 1, "starts neither"),
+    ("Recv: ok", 1, "terminal"), ("echo: busy", 1, "terminal"), ("@ pause", 1, "without a number"),
+    # look-alikes: the character, what it is and what to write
+    ("G1 XO Y1", 4, "digit 0"),
+    ("G1 X1O Y1", 6, "digit 0"), ("G1 X1O5", 6, "digit 0"), ("GO X5", 1, "digit 0"), ("G1 Xl5", 4, "digit 1"),
+    ("G1 X\u22125", 4, "U+2212 (minus sign), which looks like -"), ("G1 X\u20135", 4, "U+2013 (en dash)"),
+    ("G1 X\uff15", 4, "fullwidth digit five), which looks like 5"), ("\uff271 X5", 1, "write G"), ("G1 \u04255", 4, "write X"),
+    ("G1\u200b X5", 3, "cannot be seen"), ("\ufeffG1 X5", 1, "cannot be seen"), ("G1 X5\u00b0", 6, "degree sign"),
+    ("G1 X1,5", 6, "decimal comma"), ("G1 X1.5.2", 8, "without a letter"), ("G1 X\x07", 4, "character 7"),
+    ("G1 X5 \x18", 7, "character 24"),
+    ("F-5", 1, "positive"), ("hello world", 1, "a letter and a number"), ("G1 X5\0 Y1", 6, "NUL"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("line", "column", "said"), REFUSED)
+def test_lines_that_are_refused_by_name(line: str, column: int, said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        between(line)
+    assert (caught.value.line, caught.value.column) == (3, column)
+    assert said in str(caught.value)
+    assert "--ignore" not in str(caught.value)
+
+
+@pytest.mark.parametrize("line", ["GOTO/1,2,3", "FROM / 0,0,5", "FEDRAT/100,MMPM"])
+def test_a_cl_file_is_named(line: str) -> None:
+    with pytest.raises(InputError, match=r"a CL file \(APT\).*post-processor"):
+        parse_program(f"PARTNO/A\n{line}\nFINI\n")
+
+
+def test_blanks_of_pages_and_padding_are_blanks() -> None:
+    for text in ("G1\u00a0X7 Y1", "\u00a0G1 X7\u00a0Y1\u00a0"):
+        assert same(between(text), between("G1 X7 Y1"))
+    padded = b"\0" * 300 + (HEAD + TAIL).encode() + b"\0" * 300
+    assert same(parse_program(padded), WITHOUT)
+
+
+def test_f0_is_no_feed() -> None:
+    assert same(parse_program(HEAD + "G0 F0 X5\nG1 F600" + TAIL), between("G0 X5"))
+    for line in ("G0 F0 X5", "F0", "G1 F0 X5"):
+        with pytest.raises(InputError, match="without a feed"):
+            between(line)
+
+
+def test_a_mistaken_sinumerik_is_told_why() -> None:
+    with pytest.raises(InputError, match=r"because of line 3, 'X=5'; --dialect says otherwise"):
+        between("X=5")
+    with pytest.raises(InputError, match=r":3:1: X: assignments"):
+        between("X=5", Reading(dialect="linuxcnc"))
+
+
+# --- what the user says is left out ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("code", ["G38.2", "G38.3", "G38.5", "G31"])
+def test_probing_is_a_stop_if_the_user_says_so(code: str) -> None:
+    program = between(f"{code} Z-5 F50\nG0 Z3", Reading(ignore=(code,)))
+    assert stops(program) == 1
+    assert program.end[-1].tolist() == [10.0, 5.0, 3.0]
+    assert any("1 probing move: left out, as --ignore says" in said for said in program.assumptions)
+    with pytest.raises(InputError, match="motion code that is not supported"):
+        between(f"{code} Z-5 F50\nZ3", Reading(ignore=(code,)))
+
+
+@pytest.mark.parametrize(
+    "odd", ["G1 X900", "hello (", '"', "o100 while", "G71 Q100", "CYCLE81(1)", "#1=[", "M98 P7"]
+)
+def test_lines_are_left_out_before_they_are_looked_at(odd: str) -> None:
+    text = f"{HEAD}{odd}\n{odd}\nG1 X7\n{odd}{TAIL}"
+    program = parse_program(text, reading=Reading(ignore=("3-4", "6")))
+    assert same(program, between("G1 X7"))
+    assert program.assumptions[:2] == tuple(
+        f"line {k}: lines {k} to {n} are left out, as --ignore says" for k, n in ((3, 4), (6, 6))
+    )
+    assert program.line.tolist() == [2, 5, 7]
+    assert odd.encode() not in retimed(text.encode(), program, program.feed)
+
+
+def test_lines_beyond_the_program_are_none() -> None:
+    for lines in ("9-12", "0", "4-3"):
+        with pytest.raises(InputError, match="the program has lines 1 to 5"):
+            between("M0", Reading(ignore=(lines,)))
+
+
+def test_commands_are_left_out_by_name() -> None:
+    text = "M83\nG1 X5 F600\nCLEAN_NOZZLE\nG1 X9"
+    (said,) = parse_program("G21\n" + text).assumptions
+    assert "macro" in said
+    assert not parse_program("G21\n" + text, reading=Reading(ignore=("clean_nozzle",))).assumptions
+
+
+@pytest.mark.parametrize(
+    ("name", "means"), [("haas", "fanuc"), ("grbl", "linuxcnc"), ("sinumerik", "siemens")]
+)
+def test_controls_have_the_dialect_of_another(name: str, means: str) -> None:
+    assert Reading(dialect=name) == Reading(dialect=means)

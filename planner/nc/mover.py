@@ -172,7 +172,8 @@ class Mover:
             self._before_cycles = state.motion if state.motion in (0, 1) else self._before_cycles
             state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            state.motion, state.series = self._before_cycles if state.fanuc else NO_MOTION, None
+            kept = state.motion if state.motion in (0, 1) else self._before_cycles
+            state.motion, state.series = kept if state.fanuc else NO_MOTION, None
         if block.g.get("one-shot") in COVET_AXES:
             return
         if block.g.get("tool length") in (431, 432) and "motion" not in block.g:

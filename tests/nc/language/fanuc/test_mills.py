@@ -87,6 +87,7 @@ def test_parameters_of_the_control(text: str, value: str) -> None:
         "SETVN 500[A,B]\n#500=3\nPOPEN\nDPRNT[X#1[53]]\nPCLOS\nG1 X#500",
         "M19 R90.\nM19 P45\nG1 X3.",
         "G98 G81 X5. Z-5. R1. F100.\nG80\nX3.",
+        "G1 X9.\nG80\nX3.",
     ],
 )
 def test_what_sets_the_control_leads_where_it_should(text: str) -> None:

@@ -7,10 +7,10 @@ import random
 
 import numpy as np
 import pytest
+from move_by_move import leading, moves_of
 from slow_fanuc import SlowFanuc
 
 from planner.machine import ToolData, load_machine
-from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
 
 ORIGINS = {"G54": (0.0, 0.0, 0.0), "G55": (3.5, -2.0, 1.0), "G56": (-7.25, 11.0, 0.5), "T3": (0.0, 0.0, 7.0)}
@@ -114,28 +114,6 @@ def program(seed: int) -> str:
     lines = [line for piece in pieces for line in piece]
     head = ["O1000", f"G17 {unit} G90 G94 G98 G49 G80 G54 F600.", everything()]
     return "\n".join([*head, *lines, "M30", ""]) + SUBPROGRAMS
-
-
-def moves_of(read: Program) -> list[tuple[float, ...]]:
-    """Kind, place and angle of every move that leads somewhere."""
-    sweep = dict(zip(read.arc_block.tolist(), read.arc_sweep.tolist(), strict=True))
-    kinds = {Kind.RAPID: 0, Kind.LINE: 1}
-    found = []
-    for k, (kind, end) in enumerate(zip(read.kind.tolist(), read.end.tolist(), strict=True)):
-        if kind in (Kind.RAPID, Kind.LINE, Kind.ARC):
-            angle = sweep.get(k, 0.0)
-            found.append((kinds.get(kind, 3 if angle > 0 else 2), *end, angle))
-    return found
-
-
-def leading(moves: list[tuple[float, ...]]) -> np.ndarray:
-    """(n, 5) without moves that stay where they are."""
-    kept, before = [], np.zeros(3)
-    for move in moves:
-        if move[4] or np.abs(np.array(move[1:4]) - before).max() > 1e-9:
-            kept.append(move)
-        before = np.array(move[1:4])
-    return np.array(kept)
 
 
 @pytest.mark.parametrize("seed", range(60))

@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import ForceOption, JsonOption, TrajectoryArgument, length_option, time_option
+from planner.commands.options import (
+    ForceOption,
+    JsonOption,
+    TrajectoryArgument,
+    UnitsOption,
+    length_option,
+    time_option,
+)
 from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
@@ -303,6 +310,7 @@ def report_command(
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="page to write (default: DIR/report.html)"),
     ] = None,
+    units: UnitsOption = None,
     force: ForceOption = False,
 ) -> None:
     """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
@@ -315,5 +323,5 @@ def report_command(
     file = output or directory / REPORT
     check_file(file, force=force)
     plan, summary, text = saved_plan(directory)
-    write_whole(file, report_page(plan, text, summary))
+    write_whole(file, report_page(plan, text, summary, units))
     say(str(file))

@@ -138,7 +138,7 @@ def plan_command(
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)
             written = write_plan(
-                result, output, file_format=form.value, plots=plot, report=report, force=force
+                result, output, file_format=form.value, plots=plot, report=report, force=force, units=units
             )
 
     if trace is not None:

@@ -50,6 +50,7 @@ def write_plan(
     plots: bool = False,
     report: bool = False,
     force: bool = False,
+    units: str | None = None,
 ) -> list[str]:
     """Write the files of a solved plan into a directory, all of them or none.
 
@@ -57,6 +58,7 @@ def write_plan(
     plots       : write pictures too
     report      : write a page that opens in a browser, too (report/html/page.py)
     force       : replace files of these names even if no run wrote them
+    units       : of pictures and page, "mm" or "inch"; None for those of the program
 
     Returns the names of the files. The `notes` of the summary are those of the plan, followed by what was
     left out and why.
@@ -91,12 +93,12 @@ def write_plan(
         if plots:
             from planner.report.plots import write_figures
 
-            write_figures(plan, new)
+            write_figures(plan, new, units)
         if report:
             from planner.report.html.page import REPORT, report_page
 
             page = report_page(
-                plan, own_text(plan.program), {**summary(plan), "notes": [*plan.notes, *notes]}
+                plan, own_text(plan.program), {**summary(plan), "notes": [*plan.notes, *notes]}, units
             )
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)

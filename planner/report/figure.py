@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.machine import ALL_AXES, LINEAR_AXES, ROTARY_AXES
 from planner.nc.program import Kind
 from planner.planning.job.at_tip import directions_of, of_axes
+from planner.report.units import Units
 from planner.report.word_feed import WordFeed
 
 if TYPE_CHECKING:
@@ -48,15 +49,20 @@ LOW_TO_HIGH = {
 }
 
 
+OF_LIMITS = (
+    *("feed", "jerk.x", "jerk.y", "tolerance", "jerk.z"),
+    *(f"{quantity}.{axis}" for quantity in ("acceleration", "velocity") for axis in LINEAR_AXES),
+)
+LIMIT_COLOURS = dict(zip(OF_LIMITS, COLOURS, strict=True)) | {"none": GREY, "rest": LIGHT}
+
+
 def limit_colours(names: Sequence[str]) -> list[str]:
-    """A colour for each limit: grey for "none" and "rest", the others in the order of the names."""
-    others = [name for name in names if name not in ("none", "rest")]
-    return [
-        {"none": GREY, "rest": LIGHT}[name]
-        if name in ("none", "rest")
-        else COLOURS[others.index(name) % len(COLOURS)]
-        for name in names
-    ]
+    """A colour for each limit, the same on every job and picture for those in `LIMIT_COLOURS`; other names take what
+    these leave, in their order."""
+    free = [colour for name, colour in LIMIT_COLOURS.items() if name not in names and colour in COLOURS]
+    others = [name for name in names if name not in LIMIT_COLOURS]
+    taken = dict(zip(others, (*free, *COLOURS), strict=False)) | LIMIT_COLOURS
+    return [taken.get(name, COLOURS[k % len(COLOURS)]) for k, name in enumerate(names)]
 
 
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
@@ -84,6 +90,8 @@ class Panel:
 
     title: str
     series: tuple[Series, ...]
+    top: float = math.nan  # end of its axis in the unit; NaN for that of its numbers
+    said: str = ""  # of what is beyond
 
     @property
     def limited(self) -> bool:
@@ -91,18 +99,33 @@ class Panel:
         return all(math.isfinite(one.limit) for one in self.series)
 
 
-FEED = Panel(
-    title="feed",
-    series=(
-        Series(name="programmed", column="programmed", unit="mm/s", colour=DIM, dashed=True),
-        Series(name="feed", column="feed", unit="mm/s", colour=INK),
-    ),
-)
+CLIPPED, ROOM = (
+    3.0,
+    1.5,
+)  # rapids so many times as fast as feed moves end the axis at that multiple of the latter
 
 
-def profile_panels(machine: Machine, axes: Sequence[str], quantities: Sequence[str]) -> list[Panel]:
+def feed_panel(motion: MotionColumns, units: Units) -> Panel:
+    """The feed of a motion and the programmed one; where rapids dwarf the feed moves, the axis ends above these."""
+    feed = motion["feed"]
+    most, per = highest_feed(feed, motion["programmed"]), units.per_feed
+    far = float(feed.max(initial=0.0))
+    clipped = 0.0 < CLIPPED * most < far
+    series = (
+        Series(name="programmed", column="programmed", unit=units.feed, colour=DIM, dashed=True, scale=per),
+        Series(name="feed", column="feed", unit=units.feed, colour=INK, scale=per),
+    )
+    if not clipped:
+        return Panel(title="feed", series=series)
+    said = f"rapids up to {per * far:,.0f} {units.feed}"
+    return Panel(title="feed", series=series, top=ROOM * most * per, said=said)
+
+
+def profile_panels(
+    motion: MotionColumns, machine: Machine, axes: Sequence[str], quantities: Sequence[str], units: Units
+) -> list[Panel]:
     """The feed, and below it `quantities` of the axes against the machine's limits."""
-    return [FEED] + [
+    return [feed_panel(motion, units)] + [
         Panel(
             title=quantity,
             series=tuple(
@@ -110,14 +133,19 @@ def profile_panels(machine: Machine, axes: Sequence[str], quantities: Sequence[s
                     name=axis,
                     column=quantity[0] + axis,
                     unit=("°" if axis in ROTARY_AXES else "mm") + QUANTITIES[quantity],
-                    colour=COLOURS[k % len(COLOURS)],
+                    colour=COLOURS[ALL_AXES.index(axis) % len(COLOURS)],
                     limit=float(getattr(machine.axes[axis], quantity)),
                 )
-                for k, axis in enumerate(axes)
+                for axis in axes
             ),
         )
         for quantity in quantities
     ]
+
+
+def moving_axes(motion: Trajectory) -> list[str]:
+    """The axes that a motion moves."""
+    return [axis for k, axis in enumerate(motion.axes) if np.ptp(motion.position[:, k]) > 0.0]
 
 
 class MotionColumns:
@@ -157,12 +185,14 @@ def highest_feed(feed: FloatArray, programmed: FloatArray) -> float:
 
 
 def flat_view(extent: FloatArray) -> list[int] | None:
-    """The two axes that show a nearly flat path of an `extent` (2 or 3,) best; None for a path that needs
-    three."""
+    """The two axes, to the right and up, that show a nearly flat path of an `extent` (2 or 3,) best; turned parts lie. None
+    for a path that needs three."""
     if len(extent) == 2:
         return [0, 1]
     thin = int(extent.argmin())
-    return None if extent[thin] > FLAT * extent.max() else [k for k in range(len(extent)) if k != thin]
+    if extent[thin] > FLAT * extent.max():
+        return None
+    return [2, 0] if thin == 1 and extent[2] > extent[0] else [k for k in range(len(extent)) if k != thin]
 
 
 def three(shown: Trajectory) -> FloatArray:

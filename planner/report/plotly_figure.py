@@ -9,7 +9,8 @@ scene measures in those units is its aspect ratio.
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +20,10 @@ from planner.base.units import MICROMETRE
 from planner.machine import LINEAR_AXES
 from planner.report.figure import (
     AGAINST,
+    COLOURS,
     DIM,
     FLAT,
+    GREY,
     LIGHT,
     LOW_TO_HIGH,
     PRICES,
@@ -28,6 +31,8 @@ from planner.report.figure import (
     highest_feed,
     limit_colours,
 )
+from planner.report.units import Units
+from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:
     from planner.report.html.data import Samples
@@ -36,10 +41,21 @@ GAP = 0.07  # between panels, of the height of the figure [-]
 BEYOND = 112  # what is seen of an axis in per cent of limits [%]
 MARGIN = 1.08  # of the axes of a scene over the path [-]
 THIN = FLAT / 4  # an axis is as long as this share of the longest at least [-], so that a line has a scene
-FILLED = 0.8  # share of the box that the path fills [-]; titles of axes stand in the rest
+FILLED = 0.76  # share of the box that the path fills [-]; titles of axes stand in the rest
 DISTANCE = 2.0  # of the eye, in units of the scene [-]; it changes nothing in an orthographic view
 AWAY = np.array([1.2, -1.3, 0.9])  # where a path that is not flat is seen from
+LINE = {"width": 5, "showscale": True}
+BAR: dict[str, Any] = {"title": {"text": ""}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
+TICKS, LONGEST = 24, 18  # names beside a bar, and letters of each
+TINY = 1e-9  # of a scale, where nothing moves
 BARE = {"l": 0, "r": 0, "t": 0, "b": 0}
+BEYOND_NOTE = {
+    "xanchor": "right",
+    "yanchor": "bottom",
+    "showarrow": False,
+    "font": {"size": 11, "color": DIM},
+}
+SLOWER = 0.03  # of the scale of the feed, below zero: rapids [-]
 PROGRAMMED = {
     "type": "scatter3d", "mode": "lines", "name": "programmed", "hoverinfo": "skip", "opacity": 0.5,
     "line": {"width": 2, "color": DIM},
@@ -50,7 +66,7 @@ def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
     """`data` and `layout` of panels over an axis of `AGAINST`, and in `columns` of each trace what it lacks:
     `y`, the name of its column of numbers, what these are multiplied with, and what is `before` the name of
     the axis for its x."""
-    data, columns, shapes, height = [], [], [], (1.0 + GAP) / len(panels)
+    data, columns, shapes, notes, height = [], [], [], [], (1.0 + GAP) / len(panels)
     layout: dict[str, Any] = {"xaxis": {"title": {"text": AGAINST[against]}, "anchor": f"y{len(panels)}"}}
     named: set[str] = set()
     for k, panel in enumerate(panels):
@@ -65,8 +81,12 @@ def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
                 for at in (100, -100)
             ]
         else:
-            axis |= {"rangemode": "tozero"}
+            axis |= {"rangemode": "tozero"} if math.isnan(panel.top) else {"range": [0.0, panel.top]}
             axis["title"]["text"] = f"{panel.title} [{panel.series[0].unit}]"
+            if panel.said:
+                notes.append(
+                    {"text": panel.said, "xref": "paper", "yref": "paper", "x": 1, "y": top} | BEYOND_NOTE
+                )
         layout["yaxis" + y[1:]] = axis
         for one in panel.series:
             line: dict[str, Any] = {"color": one.colour, "width": 1 if one.dashed else 1.4}
@@ -83,19 +103,14 @@ def panel_figure(panels: Sequence[Panel], against: str) -> dict[str, Any]:
             named.add(one.name)
             data.append(trace)
             columns.append({"before": one.before, "y": one.before + one.column, "scale": scale})
-    return {"data": data, "layout": layout | {"shapes": shapes}, "columns": columns}
+    return {"data": data, "layout": layout | {"shapes": shapes, "annotations": notes}, "columns": columns}
 
 
-def colourings(samples: Samples) -> dict[str, dict[str, Any]]:
-    """How a path is coloured, by name: "feed", "limit" (which holds it), "deviation", and "price" of the
-    tolerance where it is known. Each has its `column` of the samples, what that is multiplied with (`scale`),
-    and on a "light" and a "dark" ground the `line` of a trace, but for its numbers."""
-    many, shades = len(samples.limits), limit_colours(samples.limits)
-    steps = [[(k + end) / many, shade] for k, shade in enumerate(shades) for end in (0, 1)]
-    ticks = {
-        "tickvals": list(range(many)),
-        "ticktext": [html.escape(one, quote=False) for one in samples.limits],
-    }
+def colourings(samples: Samples, units: Units) -> dict[str, dict[str, Any]]:
+    """How a path is coloured, by name: "feed", "limit" (which holds it), "deviation", "price" of the tolerance where
+    it is known, and the parts of the program that `Samples.parts` has. Each has its `column` of the samples, what that
+    is multiplied with (`scale`), on a "light" and a "dark" ground the `line` of a trace, but for its numbers, and the
+    feed the number of `rapid` moves, which are grey."""
     dear = [[0, LIGHT], [PRICES[0][0], LIGHT], *map(list, PRICES)]  # nothing is saved far from joints
     even = {
         ground: [[k / (len(shades) - 1), shade] for k, shade in enumerate(shades)]
@@ -104,8 +119,7 @@ def colourings(samples: Samples) -> dict[str, dict[str, Any]]:
     feed, price = highest_feed(samples.feed, samples.programmed), samples.price
     found = {}
     for column, title, scale, most, scales in (
-        ("feed", "feed [mm/s]", 1.0, feed, even),
-        ("limit", "", 1.0, many - 0.5, dict.fromkeys(even, steps)),
+        ("feed", f"feed [{units.feed}]", units.per_feed, feed, even),
         ("deviation", "deviation [µm]", 1.0 / MICROMETRE, samples.deviation.max(initial=0.0), even),
         (
             "price",
@@ -117,19 +131,42 @@ def colourings(samples: Samples) -> dict[str, dict[str, Any]]:
     ):
         if getattr(samples, column) is None:
             continue
-        bar = {"title": {"text": title}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
-        line: dict[str, Any] = {"width": 5, "showscale": True, "cmin": 0.0, "cmax": scale * float(most)}
-        line["colorbar"] = bar
-        if column == "limit":
-            line |= {"cmin": -0.5, "colorbar": bar | ticks}
-        found[column] = {"column": column, "scale": scale} | {
-            ground: line | {"colorscale": colours} for ground, colours in scales.items()
-        }
+        line: dict[str, Any] = LINE | {"cmin": 0.0, "cmax": scale * float(most)}
+        line["colorbar"] = BAR | {"title": {"text": title}}
+        found[column] = {"column": column, "scale": scale}
+        if column == "feed":
+            line["cmin"] = found[column]["rapid"] = -SLOWER * max(line["cmax"], TINY)
+            scales = {ground: _with_rapids(colours) for ground, colours in scales.items()}
+        found[column] |= {ground: line | {"colorscale": colours} for ground, colours in scales.items()}
+    named = [WORDS.get(name, name) for name in samples.limits]
+    found["limit"] = _of_names("limit", named, limit_colours(samples.limits))
+    for column, (names, _) in samples.parts.items():
+        shades = [COLOURS[k % len(COLOURS)] for k in range(len(names))]
+        found[column] = _of_names(column, names, shades)
     return found
 
 
-def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
-    """plotly's `scene` of a path, `points` (n, 3) x, y, z [mm], without a zoom, and how wide and high the
+def _with_rapids(colours: list[list[Any]]) -> list[list[Any]]:
+    """A scale with grey below zero."""
+    zero = SLOWER / (1.0 + SLOWER)
+    return [[0.0, GREY], [zero, GREY], *([zero + (1.0 - zero) * at, colour] for at, colour in colours)]
+
+
+def _of_names(column: str, names: Sequence[str], shades: Sequence[str]) -> dict[str, Any]:
+    """The colouring of a column of indices in names: one shade for each."""
+    many = len(names)
+    steps = [[(k + end) / many, shade] for k, shade in enumerate(shades) for end in (0, 1)]
+    ticks = {"tickvals": list(range(many))[:TICKS], "ticktext": [_short(name) for name in names[:TICKS]]}
+    line = LINE | {"cmin": -0.5, "cmax": many - 0.5, "colorscale": steps, "colorbar": BAR | ticks}
+    return {"column": column, "scale": 1.0, "light": line, "dark": line}
+
+
+def _short(name: str) -> str:
+    return html.escape(name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…", quote=False)
+
+
+def fitted_scene(points: FloatArray, titles: Mapping[str, str]) -> tuple[dict[str, Any], float, float]:
+    """plotly's `scene` of a path, `points` (n, 3) x, y, z, with `titles` of the axes, without a zoom, and how wide and high the
     path then is on the screen, in units of the scene: `aspectratio`, `camera`, and the ranges of the axes."""
     low, end = points.min(axis=0), points.max(axis=0)
     length = end - low
@@ -141,7 +178,7 @@ def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
     middle, half = 0.5 * (low + end), 0.5 * MARGIN * ratio * size
     scene: dict[str, Any] = {
         f"{letter}axis": {
-            "title": {"text": f"{letter} [mm]"},
+            "title": {"text": titles[letter]},
             "range": [float(middle[k] - half[k]), float(middle[k] + half[k])],
             "visible": not (flat and k == thin),
         }
@@ -156,10 +193,10 @@ def fitted_scene(points: FloatArray) -> tuple[dict[str, Any], float, float]:
     return scene, float(ratio @ np.abs(right)), float(ratio @ np.abs(up))
 
 
-def scene_in_box(points: FloatArray, room: float) -> dict[str, Any]:
-    """The scene of a path, `points` (n, 3) [mm], that fills a box; `room` is the width of that, but for the
+def scene_in_box(points: FloatArray, room: float, titles: Mapping[str, str]) -> dict[str, Any]:
+    """The scene of a path, `points` (n, 3), with `titles`, that fills a box; `room` is the width of that, but for the
     colour bar, over its height [-]."""
-    scene, wide, high = fitted_scene(points)
+    scene, wide, high = fitted_scene(points, titles)
     zoom = FILLED * 2.0 * min(room / wide, 1.0 / high)
     return scene | {"aspectratio": {axis: zoom * ratio for axis, ratio in scene["aspectratio"].items()}}
 

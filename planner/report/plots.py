@@ -4,13 +4,14 @@ readers tell apart.
 The tool path coloured by feed (report/plots.py), and the profiles over time against their limits
 (report/profiles_figure.py).
 
-The tool path coloured by feed (viridis), over the programmed path.
+The tool path coloured by feed (the scale of the page), over the programmed path.
 
 An hour of motion has millions of samples; of them one point is kept for each pixel that the motion passes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +25,10 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.nc.program import Kind
-from planner.report.figure import TOOL, MotionColumns, flat_view, three, tool_lines
+from planner.report.figure import LOW_TO_HIGH, TOOL, MotionColumns, flat_view, three, tool_lines
 from planner.report.html.data import programmed_path
 from planner.report.profiles_figure import profiles_figure
+from planner.report.units import Units, axis_titles, units_of
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
@@ -51,11 +53,12 @@ STYLE: Any = {
 }
 
 
-def write_figures(plan: Plan, directory: Path) -> None:
-    """Write `toolpath.png` and `profiles.png` of a solved plan into a directory."""
+def write_figures(plan: Plan, directory: Path, units: str | None = None) -> None:
+    """Write `toolpath.png` and `profiles.png` of a solved plan into a directory, in `units` as of the page."""
+    shown_in = units_of(plan.program, units)
     with matplotlib.rc_context(STYLE):
-        toolpath_figure(plan).savefig(directory / "toolpath.png", bbox_inches="tight")
-        profiles_figure(plan).savefig(directory / "profiles.png", bbox_inches="tight")
+        toolpath_figure(plan, shown_in).savefig(directory / "toolpath.png", bbox_inches="tight")
+        profiles_figure(plan, shown_in).savefig(directory / "profiles.png", bbox_inches="tight")
 
 
 PIXELS = 900  # about the extent of a tool path in pixels
@@ -63,36 +66,37 @@ POINTS_MAX = SIZES.picture_points
 DENSE = SIZES.picture_dense
 POINTS_PROGRAMMED = 10_000_000  # of the programmed path before one is kept for each pixel: 240 MB
 NAMES = "XYZ"
+SCALE = matplotlib.colors.LinearSegmentedColormap.from_list("feed", LOW_TO_HIGH["light"])
 TOOLS = 240  # places at which the tool is drawn
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"
 DASHED = (0, (3, 2))  # of a line: from its start, 3 widths drawn and 2 not
 
 
-def toolpath_figure(plan: Plan) -> Figure:
+def toolpath_figure(plan: Plan, units: Units) -> Figure:
     """The motion coloured by feed over the programmed path; rapids are dashed. Of a program with the tool
     centre point on the motion is that of the tip, and the tool's direction is drawn at places of its feed
     moves."""
     trajectory = plan.trajectory
     assert trajectory is not None
-    motion = three(trajectory)
+    motion, titles = three(trajectory) / units.mm, axis_titles(plan.program, units)
     view = flat_view(np.ptp(motion, axis=0))
     shown = [0, 1, 2] if view is None else view
     keep = one_per_pixel(motion[:, shown])
     points, columns = motion[keep][:, shown], MotionColumns(plan, trajectory.rows(keep))
-    feed = columns["feed"]
+    feed = units.per_feed * columns["feed"]
     rapid = plan.program.kind[columns.shown.block] == Kind.RAPID
     figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
     collection = Line3DCollection if view is None else LineCollection
     around: Any = {"color": "black", "linestyle": "", "zorder": 5}
     axes.plot(*points[:1].T, label="start", marker="o", markersize=7, markerfacecolor="white", **around)
     axes.plot(*points[-1:].T, label="end", marker="s", markersize=4, **around)
-    path = programmed_path(plan.toolpath, most=POINTS_PROGRAMMED)[:, shown]
+    path = programmed_path(plan.toolpath, most=POINTS_PROGRAMMED)[:, shown] / units.mm
     axes.plot(*path[one_per_pixel(path)].T, label="programmed", color=LIGHT, linewidth=0.5, zorder=1)
     if rapid.any():
         broken = np.where((rapid | np.append(rapid[1:], False))[:, None], points, np.nan)
         axes.plot(*broken.T, label="rapid", color=GREY, linewidth=0.6, linestyle=DASHED, zorder=2)
     ends, moving = np.stack([points[:-1], points[1:]], axis=1), ~rapid[1:]
-    line = collection(ends[moving], cmap="viridis", linewidths=1.5 if len(keep) < DENSE else 0.5, zorder=3)
+    line = collection(ends[moving], cmap=SCALE, linewidths=1.5 if len(keep) < DENSE else 0.5, zorder=3)
     line.set_array(0.5 * (feed[:-1] + feed[1:])[moving])
     if moving.any():
         line.set_clim(0.0, float(feed[1:][moving].max()))
@@ -100,18 +104,19 @@ def toolpath_figure(plan: Plan) -> Figure:
     tools = tool_lines(plan, TOOLS)
     if tools is not None:
         of_tools: Any = {"colors": TOOL, "linewidths": 0.4, "alpha": 0.6, "zorder": 2.5, "label": "tool"}
+        tools = tools / units.mm
         axes.add_collection(collection([*tools[:, :, shown]], **of_tools))
     legend: Any = {"handles": axes.get_legend_handles_labels()[0], "columnspacing": 1.6}
     legend["ncols"] = len(legend["handles"])
     if view is not None:
-        _flat_axes(axes, motion, view)
+        _flat_axes(axes, motion, view, titles)
         figure.legend(loc="outside upper center", **legend)
         bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
     else:
-        _solid_axes(axes, motion if tools is None else np.vstack([motion, tools[:, 1]]))
+        _solid_axes(axes, motion if tools is None else np.vstack([motion, tools[:, 1]]), titles)
         figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
         bar = figure.colorbar(line, cax=figure.add_axes((0.95, 0.22, 0.02, 0.5)))
-    bar.set_label("feed [mm/s]")
+    bar.set_label(f"feed [{units.feed}]")
     outline: Any = bar.outline
     outline.set_linewidth(0.5)
     return figure
@@ -121,7 +126,7 @@ def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
     """A figure of about the path's proportions."""
     if not flat:
         figure = Figure(figsize=(6.4, 5.0))
-        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.96), projection="3d", computed_zorder=False)
+        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.92), projection="3d", computed_zorder=False)
     across, up = extent / max(float(extent.max()), 1e-9)
     figure = Figure(figsize=(1.5 + max(5.0 * across, 2.4), 1.1 + max(5.0 * up, 2.0)), layout="constrained")
     return figure, figure.add_subplot()
@@ -139,21 +144,25 @@ def one_per_pixel(points: FloatArray) -> Array:
         pixel *= 1.5
 
 
-def _flat_axes(axes: Axes, motion: FloatArray, shown: list[int]) -> None:
+def _flat_axes(axes: Axes, motion: FloatArray, shown: list[int], titles: Mapping[str, str]) -> None:
     """The axes of a picture, and as its title what it leaves out."""
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
     axes.autoscale_view()
-    axes.set_xlabel(f"{NAMES[shown[0]]} [mm]")
-    axes.set_ylabel(f"{NAMES[shown[1]]} [mm]")
+    axes.set_xlabel(_capital(titles["xyz"[shown[0]]]))
+    axes.set_ylabel(_capital(titles["xyz"[shown[1]]]))
     (k,) = {0, 1, 2} - {*shown}
     low, high = motion[:, k].min(), motion[:, k].max()
     if high > low:
-        title = f"seen along {NAMES[k]} ({NAMES[k]} {low:.4g} to {high:.4g} mm)"
+        title = f"seen along {NAMES[k]} ({NAMES[k]} {low:.4g} to {high:.4g})"
         axes.set_title(title, color="#555555", fontsize=8)
 
 
-def _solid_axes(axes: Any, motion: FloatArray) -> None:
+def _capital(title: str) -> str:
+    return title[:1].upper() + title[1:]
+
+
+def _solid_axes(axes: Any, motion: FloatArray, titles: Mapping[str, str]) -> None:
     low, high = motion.min(axis=0), motion.max(axis=0)
     axes.set_proj_type("ortho")
     axes.view_init(elev=32, azim=-62)
@@ -161,11 +170,13 @@ def _solid_axes(axes: Any, motion: FloatArray) -> None:
     axes.set_ylim(low[1], high[1])
     axes.set_zlim(low[2], high[2])
     axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.08)
-    for axis, name, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), NAMES, high - low, strict=True):
+    for axis, title, size in zip(
+        (axes.xaxis, axes.yaxis, axes.zaxis), titles.values(), high - low, strict=True
+    ):
         axis.set_pane_color((1, 1, 1, 0))
         axis._axinfo["grid"].update(color="#e4e4e4", linewidth=0.5)
         axis.set_major_locator(
             matplotlib.ticker.MaxNLocator(max(2, min(6, round(6 * size / (high - low).max()))))
         )
-        axis.set_label_text(f"{name} [mm]")
+        axis.set_label_text(_capital(title))
     axes.tick_params(pad=-1)

@@ -6,6 +6,7 @@ columns: a profile keeps the least and the largest value of each column, so that
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -15,9 +16,19 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from planner.base.arrays import Array, FloatArray
-from planner.report.figure import COLOURS, GREY, LIGHT, MotionColumns, limit_colours, profile_panels
+from planner.report.figure import (
+    COLOURS,
+    GREY,
+    LIGHT,
+    MotionColumns,
+    Panel,
+    limit_colours,
+    moving_axes,
+    profile_panels,
+)
 from planner.report.html.data import used_limits
 from planner.report.rows import held_by_rows
+from planner.report.units import Units
 from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:
@@ -30,15 +41,14 @@ HELD = 7  # limits with the largest shares of the time, which the legend has
 QUANTITIES = ("acceleration", "jerk")
 
 
-def profiles_figure(plan: Plan) -> Figure:
+def profiles_figure(plan: Plan, units: Units) -> Figure:
     """Feed with the active limit below it, then acceleration and jerk of each moving axis with their limits,
-    over time."""
+    over time; the feed in `units`."""
     trajectory = plan.trajectory
     assert trajectory is not None
     motion = MotionColumns(plan, trajectory, plan.joints)
-    position, axes = motion.joints.position, motion.joints.axes
-    moving = [axis for k, axis in enumerate(axes) if np.ptp(position[:, k]) > 0]
-    below = profile_panels(plan.machine, moving, QUANTITIES)[1:]
+    moving = moving_axes(motion.joints)
+    first, *below = profile_panels(motion, plan.machine, moving, QUANTITIES, units)
     band = plan.grid is not None and len(plan.grid.t) > 1
     heights = [2.4, *([0.28] if band else []), *([1.0] * len(below) * len(moving))]
     figure = Figure(figsize=(6.8, 0.55 + 0.85 * sum(heights)), layout="constrained")
@@ -48,7 +58,7 @@ def profiles_figure(plan: Plan) -> Figure:
     scale, unit = _time_unit(trajectory.cycle_time)
     t = motion["t"] * scale
 
-    _feed_row(rows[0], motion, t)
+    _feed_row(rows[0], motion, t, first)
     if band:
         handles = _band_row(rows[1], plan, scale)
         figure.legend(
@@ -79,18 +89,22 @@ def profiles_figure(plan: Plan) -> Figure:
     return figure
 
 
-def _feed_row(panel: Axes, motion: MotionColumns, t: FloatArray) -> None:
-    feed, programmed = motion["feed"], motion["programmed"]
+def _feed_row(panel: Axes, motion: MotionColumns, t: FloatArray, said: Panel) -> None:
+    per, unit = said.series[0].scale, said.series[0].unit
+    feed, programmed = per * motion["feed"], per * motion["programmed"]
     asked = programmed[np.isfinite(programmed)]
     if np.count_nonzero(np.diff(asked)) < COLUMNS:  # a feed for each block says nothing at this size
         panel.plot(t, programmed, color="black", linestyle=(0, (4, 3)), linewidth=0.7, zorder=1)
-    draw_profile(panel, t, feed, BLUE)
-    top = 1.08 * max(float(feed.max()), 1e-9)
+    draw_profile(panel, t, feed, said.series[1].colour)
+    top = 1.08 * max(float(feed.max()), 1e-9) if math.isnan(said.top) else said.top
     panel.set_ylim(0.0, top)
     if asked.min(initial=np.inf) > top and len(asked):
-        said = f"programmed feed {asked.min():.4g} mm/s is never reached"
-        panel.text(0.995, 0.96, said, transform=panel.transAxes, ha="right", va="top", fontsize=7.5)
-    panel.set_ylabel("feed\n[mm/s]")
+        beyond = f"programmed feed {asked.min():.4g} {unit} is never reached"
+    else:
+        beyond = said.said
+    if beyond:
+        panel.text(0.995, 1.01, beyond, transform=panel.transAxes, ha="right", va="bottom", fontsize=7.5)
+    panel.set_ylabel(f"feed\n[{unit}]")
 
 
 def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:

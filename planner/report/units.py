@@ -3,13 +3,16 @@ them. Inside the package and in files everything stays in mm and s."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.nc.language.detect import LATHE_NOTE
 from planner.nc.points import UNIT_WORD, own_text
 from planner.nc.program import Program
 
 INCH = b"20"
+DIAMETERS = re.compile(rb"^[^(;\n]*?[Gg]0?7(?![\d.])", re.MULTILINE)  # LinuxCNC's word for them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,3 +43,12 @@ def units_of(program: Program, asked: str | None = None) -> Units:
         return UNITS[asked]
     found = None if program.pen else UNIT_WORD.search(own_text(program) or b"")
     return UNITS["inch" if found is not None and found[1] == INCH else "mm"]
+
+
+def axis_titles(program: Program, units: Units) -> dict[str, str]:
+    """A title for x, y and z [mm], that of x with what it is where the program writes diameters."""
+    text = None if program.pen else own_text(program)
+    turned = (
+        any(LATHE_NOTE in note for note in program.assumptions) or DIAMETERS.search(text or b"") is not None
+    )
+    return {axis: f"{axis} {'radius ' if turned and axis == 'x' else ''}[{units.length}]" for axis in "xyz"}

@@ -25,6 +25,7 @@ from planner.report.profiles_figure import profiles_figure
 from planner.report.rows import verdict_rows
 from planner.report.tables import plan_table
 from planner.report.trajectory_reader import read_trajectory
+from planner.report.units import UNITS
 from tests.quick import slow_but
 from tests.report.html.columns import column
 
@@ -129,7 +130,7 @@ def test_everything_says_the_same(name: str, tmp_path: Path) -> None:
     assert told["held by"] == ", ".join(f"{limit} {percent} %" for limit, percent in percents.items())
     assert about["summary"]["held_by"] == said["held_by"]
     assert max(percents.values()) <= 100
-    legend = [label.get_text() for label in profiles_figure(plan).legends[0].get_texts()]
+    legend = [label.get_text() for label in profiles_figure(plan, UNITS["mm"]).legends[0].get_texts()]
     assert [label.partition(" (")[0] for label in legend] == [
         f"{one} {percent} %" for one, percent in percents.items()
     ][:7]

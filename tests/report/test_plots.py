@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from quick import slow_but
 
 from planner.report import plots, profiles_figure
+from planner.report.units import UNITS
 
 PROGRAMS = {
     "flat": "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n",
@@ -31,7 +32,7 @@ def test_figures(tmp_path: Path, name: str) -> None:
 
 def test_profiles_show_limits_and_what_limits() -> None:
     plan = make_plan()
-    figure = profiles_figure.profiles_figure(plan)
+    figure = profiles_figure.profiles_figure(plan, UNITS["mm"])
     labels = [axes.get_ylabel().split("\n")[0] for axes in figure.axes]
     assert len(labels) == 2 + 2 * 2  # feed, band, and two moving axes
     said = [label.get_text() for label in figure.legends[0].get_texts()]
@@ -44,7 +45,7 @@ def test_profiles_show_limits_and_what_limits() -> None:
 def test_a_plan_without_a_grid_has_no_band() -> None:
     plan = make_plan()
     plan.grid = None
-    assert len(profiles_figure.profiles_figure(plan).axes) == 1 + 2 * 2
+    assert len(profiles_figure.profiles_figure(plan, UNITS["mm"]).axes) == 1 + 2 * 2
 
 
 def test_the_envelope_keeps_every_peak() -> None:

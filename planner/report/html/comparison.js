@@ -39,7 +39,8 @@
   function paths() {
     return shown.map((k) => {
       const n = c[`m${k}_t`].length, step = Math.max(1, Math.ceil(n / POINTS_OF_PATH)), keep = (name) => c[`m${k}_${name}`].filter((_, i) => i % step === 0 || i === n - 1);
-      return visible({ type: "scatter3d", mode: "lines", x: keep("x"), y: keep("y"), z: keep("z"), name: rows[k].method,
+      const place = (name) => keep(name).map((value) => value / about.units.mm);
+      return visible({ type: "scatter3d", mode: "lines", x: place("x"), y: place("y"), z: place("z"), name: rows[k].method,
         line: { width: 3, color: about.colours[k] }, customdata: keep("line"), hovertemplate: `${rows[k].method}, line %{customdata}<extra></extra>` }, k);
     });
   }

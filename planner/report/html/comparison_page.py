@@ -3,6 +3,7 @@ file that opens off-line."""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from planner.report.figure import AGAINST, COLOURS, Panel, Series, three
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import fitted_scene, panel_figure
 from planner.report.summary import json_ready
+from planner.report.units import axis_titles, units_of
 
 if TYPE_CHECKING:
     from planner.nc.program import Program
@@ -30,7 +32,7 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
 
     Raises InputError if plotly is not installed.
     """
-    best = best_of(rows)
+    best, units = best_of(rows), units_of(program)
     columns: dict[str, Array] = {}
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(rows))]
     shown = {k: row.shown for k, row in enumerate(rows) if row.shown is not None}
@@ -52,7 +54,7 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
             ),
         )
         for name, title, unit, scale in (
-            ("feed", "feed", "mm/s", 1.0),
+            ("feed", "feed", units.feed, units.per_feed),
             ("deviation", "distance", "µm", 1.0 / MICROMETRE),
         )
     ]
@@ -64,8 +66,11 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
         "colours": colours,
         "rows": json_ready([_row(row, best) for row in rows]),
         "against": AGAINST,
+        "units": dataclasses.asdict(units),
         "profile": panel_figure(panels, "t") if paths else None,
-        "view": fitted_scene(np.concatenate(paths)) if paths else None,
+        "view": fitted_scene(np.concatenate(paths) / units.mm, axis_titles(program, units))
+        if paths
+        else None,
     }
     return page_of("comparison", "methods side by side", source, about, columns)
 

@@ -7,22 +7,25 @@ the highest feed of each step beside its first sample, so that no peak of the fe
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
+from planner.controls.timing.times import named_parts, tools_of
 from planner.geometry.chords import polyline
 from planner.geometry.distance import distance_near
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
+from planner.nc.points import own_text
 from planner.planning.job.at_tip import of_axes
 from planner.report.word_feed import WordFeed, planned_blocks
 
 if TYPE_CHECKING:
     from planner.geometry.toolpath import Toolpath
+    from planner.nc.program import Program
     from planner.planning.job.plan import Plan
 
 SAMPLES_MAX = SIZES.page_samples
@@ -48,6 +51,8 @@ class Samples:
     # (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is
     # not known
     price: FloatArray | None
+    # by "tool", "operation" and "layer", where there are several: their names and the index (N,) of each sample
+    parts: dict[str, tuple[list[str], Array]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -94,7 +99,24 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
         programmed=word.programmed(plan.program, shown.block),
         deviation=distance_near(plan.toolpath, shown.position, segment),
         price=_price(plan, shown.position, segment),
+        parts=_parts(plan.program, shown.block),
     )
+
+
+def _parts(program: Program, block: Array) -> dict[str, tuple[list[str], Array]]:
+    """Tools, operations (line types of slicers) and layers that the blocks `block` (n,) stand in, where they are
+    several."""
+    operations, layers = named_parts(program, own_text(program) or b"")
+    found = {}
+    for kind, of_block in {"tool": tools_of(program), "operation": operations, "layer": layers}.items():
+        if of_block is None:
+            continue
+        names = list(dict.fromkeys(of_block))
+        if len(names) > 1:
+            index = {name: k for k, name in enumerate(names)}
+            of = np.array([index[name] for name in of_block])
+            found[kind] = [name or "before" for name in names], of[np.clip(block, 0, None)]
+    return found
 
 
 def _price(plan: Plan, position: FloatArray, segment: Array) -> FloatArray | None:

@@ -22,10 +22,12 @@ from planner.machine import LINEAR_AXES
 from planner.report.figure import (
     AGAINST,
     CIVIDIS,
+    GREY,
     TOOL,
     MotionColumns,
     highest_feed,
     limit_colours,
+    moving_axes,
     profile_panels,
     three,
     tool_lines,
@@ -35,6 +37,7 @@ from planner.report.html.parts import page_of
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
 from planner.report.rows import plan_rows
 from planner.report.summary import json_ready, summary
+from planner.report.units import Units, axis_titles, units_of
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
@@ -46,17 +49,20 @@ CORNERS_MAX = SIZES.page_corners
 CALLS_MAX = SIZES.page_calls
 
 
-def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None) -> str:
+def report_page(
+    plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None, units: str | None = None
+) -> str:
     """The page of a plan.
 
     text : the program as it was read; None where it is not known
     said : the summary to show; None for that of the plan
+    units : "mm" or "inch"; None for those of the program
 
     Raises InputError if plotly is not installed. Raises ValueError for a plan without a trajectory.
     """
     if plan.trajectory is None:
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
-    columns, about = _columns(plan)
+    columns, about = _columns(plan, units_of(plan.program, units))
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
     about["summary"] = told = {"told": plan_rows(plan)} | (said or summary(plan))
     return page_of("report", "planned", told["program"], about, columns, PICTURE=path_picture(plan, PICTURE))
@@ -64,19 +70,28 @@ def report_page(plan: Plan, text: bytes | None = None, said: dict[str, Any] | No
 
 # Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start
 # apart.
-TYPES = {"t": "f8", "line": "i4", "frame": "i4", "limit": "u1", "line_line": "i4", "line_limit": "u1"}
+TYPES = {
+    "t": "f8",
+    "line": "i4",
+    "frame": "i4",
+    "limit": "u1",
+    "line_line": "i4",
+    "line_limit": "u1",
+} | dict.fromkeys(("tool", "operation", "layer"), "i4")
 
 
-def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
+def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]]:
     """Columns of numbers by name, and what the page has to know of them."""
     samples = samples_of(plan)
     shown, program, machine = samples.shown, plan.program, plan.machine
     motion = MotionColumns(plan, shown)
-    panels = profile_panels(machine, motion.joints.axes, ["acceleration", "jerk"])
+    panels = profile_panels(motion, machine, moving_axes(motion.joints), ["acceleration", "jerk"], units)
+    titles = axis_titles(program, units)
     figure, path = panel_figure(panels, "t"), programmed_path(plan.toolpath)
     names = {"t", "s", "line", *shown.axes, *(of["y"] for of in figure["columns"])}
     columns: dict[str, Array] = {name: motion[name] for name in sorted(names)}
     columns |= {"limit": samples.limit, "deviation": samples.deviation, "path": path.ravel()}
+    columns |= {name: of for name, (_, of) in samples.parts.items()}
     if samples.price is not None:
         columns["price"] = samples.price
     lines = lines_of(plan, samples)
@@ -88,11 +103,14 @@ def _columns(plan: Plan) -> tuple[dict[str, Array], dict[str, Any]]:
         "linear": [axis for axis in shown.axes if axis in LINEAR_AXES],
         "limits": list(samples.limits),
         "colours": limit_colours(samples.limits),
-        "colourings": colourings(samples),
+        "colourings": colourings(samples, units),
+        "units": dataclasses.asdict(units) | {"per_feed": units.per_feed},
+        "axes": ", ".join(titles[axis] for axis in shown.axes if axis in LINEAR_AXES),
+        "layers": samples.parts.get("layer", ([],))[0],
         "programmed": PROGRAMMED,
         "profile": figure,
         "against": AGAINST,
-        "view": fitted_scene(np.concatenate([three(shown), path])),
+        "view": fitted_scene(np.concatenate([three(shown), path]) / units.mm, titles),
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "corners": json_ready(_corners(plan)),
@@ -146,13 +164,16 @@ def path_picture(plan: Plan, size: float) -> str:
     width, height = extent * scale + 8.0
     columns = MotionColumns(plan, shown)
     feed = columns["feed"]
-    highest = highest_feed(feed, columns["programmed"])
+    programmed = columns["programmed"]
+    highest, rapid = highest_feed(feed, programmed), len(CIVIDIS)
     colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
+    colour[~np.isfinite(programmed)] = rapid
+    shades = [*CIVIDIS, GREY]
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
     )
     lines += "".join(
-        f'<polyline points="{_points(points[first : last + 1])}" stroke="{CIVIDIS[colour[first]]}"/>'
+        f'<polyline points="{_points(points[first : last + 1])}" stroke="{shades[colour[first]]}"/>'
         for first, last in _runs(colour)
     )
     return (

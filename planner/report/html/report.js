@@ -43,7 +43,7 @@
       head.append(make("th", "more of"), make("th", "saves [s]"));
       element("prices").append(head);
       for (const [name, seconds] of saved.sort((a, b) => b[1] - a[1]).slice(0, 8)) {
-        if (!(seconds > 1e-6)) continue;
+        if (!(seconds >= 5e-4 * summary.cycle_time_s)) continue; // as in the terminal
         const row = make("tr"), more = name === "tolerance" ? `${1000 * prices.more_tolerance_mm} µm` : `${100 * prices.more_limit} %`;
         const hint = (prices.hints || []).includes(name) ? "about " : "";
         row.append(make("td", `${name}, ${more}`), make("td", hint + digits(seconds, 3)));
@@ -56,6 +56,7 @@
 
   // The first picture is painted with the header; what takes longer follows (a page in the background paints nothing, and goes on).
   await Promise.race([new Promise((painted) => requestAnimationFrame(() => setTimeout(painted, 0))), new Promise((late) => setTimeout(late, 500))]);
+  element("axes").textContent = about.axes.replaceAll(` [${about.units.length}]`, "") + ` in ${about.units.length}`;
   mark("first picture");
   const script = make("script", element("plotly").textContent);
   element("plotly").remove();
@@ -63,49 +64,50 @@
   mark("plotly");
   await Promise.all(Object.entries(about.columns).map(([name, type]) => unpack(name, type)));
   mark("columns");
-  const N = c.t.length, linear = about.linear;
+  const N = c.t.length, linear = about.linear, { mm, per_feed: perFeed, feed: feedUnit } = about.units;
   const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
-  const limits = about.limits.map(escaped);
+  const word = { none: "nothing", rest: "dwells" }, limitNames = about.limits.map((name) => word[name] || name), limits = limitNames.map(escaped);
   const text = new TextDecoder().decode(c.program);
   const programLines = text.length ? text.split(/\r\n|\n|\r/) : [];
 
   // The path
   const colourings = about.colourings;
-  if (!colourings.price) document.querySelector("#colours [data-colour=price]").remove();
-  let colouring = "feed", range = [0, N - 1], against = "t", now = 0;
+  for (const button of [...element("colours").children]) if (!colourings[button.dataset.colour]) button.remove();
+  let colouring = "feed", range = [0, N - 1], against = "t", now = 0, top = about.layers.length;
   // Samples that are drawn: all that are in sight, or every so many where these are too many; farther away a tenth as many.
   let sight = () => true;
+  const below = (k) => !c.layer || c.layer[k] <= top;
   function pathRows() {
     const [first, last] = range, seen = [];
-    for (let k = first; k <= last; k++) if (sight(k)) seen.push(k);
+    for (let k = first; k <= last; k++) if (below(k) && sight(k)) seen.push(k);
     const step = Math.max(1, Math.ceil(seen.length / POINTS_OF_PATH)), far = Math.max(1, Math.ceil(10 * (last - first + 1) / POINTS_OF_PATH));
     const rows = [];
     let inSight = 0;
     for (let k = first; k <= last; k++) {
+      if (!below(k)) continue;
       const drawn = sight(k) ? inSight++ % step === 0 : k % far === 0;
       if (drawn || k === first || k === last) rows.push(k);
     }
     return rows;
   }
-  const pick = (column, rows) => Array.from(rows, (k) => column[k]);
   const calls = (k) => (c.frame && about.calls[c.frame[k]]) || ""; // that led to the line, in an expanded program
-  const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] : 0));
+  const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] / mm : 0));
   function pathTrace() {
-    const rows = pathRows(), how = colourings[colouring], line = { ...how[dark ? "dark" : "light"], color: rows.map((k) => how.scale * c[how.column][k]) };
-    const at = [0, 1, 2].map((a) => (a < linear.length ? pick(c[linear[a]], rows) : rows.map(() => 0)));
+    const rows = pathRows(), how = colourings[colouring], line = { ...how[dark ? "dark" : "light"], color: rows.map((k) => (how.rapid && !(c.programmed[k] > 0) ? how.rapid : how.scale * c[how.column][k])) };
+    const at = [0, 1, 2].map((a) => (a < linear.length ? rows.map((k) => c[linear[a]][k] / mm) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,
-      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? colourings.price.scale * c.price[k] : 0]),
-      hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} mm/s<br>held by %{customdata[2]}<br>" +
+      customdata: rows.map((k) => [calls(k) ? c.line[k] + calls(k) : c.line[k], perFeed * c.feed[k], limits[c.limit[k]], c.t[k], 1000 * c.deviation[k], c.price ? colourings.price.scale * c.price[k] : 0]),
+      hovertemplate: "line %{customdata[0]}<br>feed %{customdata[1]:.4g} " + feedUnit + "<br>held by %{customdata[2]}<br>" +
         "t %{customdata[3]:.4f} s<br>deviation %{customdata[4]:.2g} µm" +
         (c.price ? "<br>saved per µm %{customdata[5]:.3g} µs" : "") + "<extra></extra>",
     };
   }
   const programmed = { x: [], y: [], z: [] };
   for (let k = 0; k + 2 < c.path.length; k += 3) {
-    programmed.x.push(c.path[k]);
-    programmed.y.push(c.path[k + 1]);
-    programmed.z.push(c.path[k + 2]);
+    programmed.x.push(c.path[k] / mm);
+    programmed.y.push(c.path[k + 1] / mm);
+    programmed.z.push(c.path[k + 2] / mm);
   }
   const marker = () => {
     const [x, y, z] = place(now);
@@ -147,6 +149,12 @@
     return Plotly.react(pathPlot, [pathPlot.data[0], trace, pathPlot.data[2]], pathPlot.layout, bare);
   }
   choice("colours", "colour", (name) => { colouring = name; redrawPath(); });
+  if (about.layers.length) {
+    const slider = element("layer"), told = element("top");
+    slider.max = slider.value = top = about.layers.length - 1;
+    told.textContent = about.layers[top];
+    slider.oninput = () => { top = Number(slider.value); told.textContent = about.layers[top]; redrawPath(); };
+  } else element("layers").remove();
 
   // The profiles
   function drawProfile() {
@@ -181,6 +189,7 @@
     const box = element(id), height = 20, spacer = make("div"), drawn = new Map();
     let marked = -1;
     spacer.style.height = count * height + "px";
+    box.style.height = Math.min(box.clientHeight, Math.max(count, 3) * height + 16) + "px";
     box.append(spacer);
     const draw = () => {
       const first = Math.max(0, Math.floor(box.scrollTop / height) - 5), last = Math.min(count, first + Math.ceil(box.clientHeight / height) + 10);
@@ -240,39 +249,40 @@
       const made = make("div", undefined, wide);
       headings.forEach((heading, n) => {
         const value = columns[n](order[k]);
-        made.append(make("span", typeof value === "number" ? (heading.whole ? String(value) : digits(value)) : value ?? "–", heading.text ? "text" : ""));
+        const shown = typeof value === "number" ? (heading.whole ? String(value) : short(value)) : value ?? "–";
+        made.append(make("span", shown, heading.text ? "text" : ""));
+        made.lastChild.title = shown;
       });
       return made;
     }, (k) => goToLine(lineOf[order[k]]));
   }
   table("lines", [
     { name: "line", whole: true }, { name: "text", text: true }, { name: "planned [s]" }, { name: "at F [s]" }, { name: "planned / at F" },
-    { name: "highest feed [mm/s]" }, { name: "held by", text: true }, { name: "deviation [µm]" },
+    { name: `highest feed [${feedUnit}]` }, { name: "held by", text: true }, { name: "deviation [µm]" },
     ...(c.line_more ? [{ name: "10 % more F saves [ms]" }, { name: "10 % more of all limits saves [ms]" }] : []),
   ], [
     (k) => c.line_line[k], (k) => (programLines[c.line_line[k] - 1] || "").trim(), (k) => c.line_planned[k], (k) => c.line_programmed[k],
-    (k) => c.line_planned[k] / c.line_programmed[k], (k) => c.line_highest[k], (k) => about.limits[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
+    (k) => c.line_planned[k] / c.line_programmed[k], (k) => perFeed * c.line_highest[k], (k) => limitNames[c.line_limit[k]], (k) => 1000 * c.line_deviation[k],
     ...(c.line_more ? [c.line_more_feed, c.line_more].map((saved) => (k) => Math.round(1e6 * saved[k]) / 1e3) : []),
   ], c.line_line, c.line_more ? "cells ten" : "cells");
   const corner = about.corners;
   if (corner.line && corner.line.length) {
     table("corners", [
-      { name: "line", whole: true }, { name: "angle [deg]" }, { name: "feed [mm/s]" }, { name: "eq. 19: feed / allowed" }, { name: "eq. 18: error / budget" },
-      { name: "eq. 20 [mm/s]" }, { name: "feed / eq. 20" },
-    ], ["line", "angle", "feed", "eq19", "eq18", "eq20", "gain"].map((name) => (k) => corner[name][k]), corner.line, "cells seven");
+      { name: "line", whole: true }, { name: "angle [deg]" }, { name: `feed [${feedUnit}]` }, { name: "eq. 19: feed / allowed" }, { name: "eq. 18: error / budget" },
+      { name: `eq. 20 [${feedUnit}]` }, { name: "feed / eq. 20" },
+    ], ["line", "angle", "feed", "eq19", "eq18", "eq20", "gain"].map((name) => (k) => (name === "feed" || name === "eq20" ? perFeed : 1) * corner[name][k]), corner.line, "cells seven");
     element("corner-count").textContent = `${corner.line.length.toLocaleString()} of ${summary.corners.count.toLocaleString()} corners`;
   } else element("corners-box").hidden = true;
 
   // Shares of the time
   {
-    const word = { none: "nothing", rest: "dwells" };
     const held = Object.entries(summary.held_by || {}).filter(([, share]) => Math.floor(100 * share + 0.5) > 0).reverse();
     const colour = (name) => about.colours[about.limits.indexOf(name)] || "#606060";
     if (held.length) {
       await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(word[name] || name)), x: held.map(([, share]) => 100 * share),
         marker: { color: held.map(([name]) => colour(name)) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
-        hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
-      { ...look, margin: { l: 110, r: 14, t: 6, b: 40 }, xaxis: { title: { text: "share of the cycle time, each in full [%]" } }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
+        textposition: "outside", cliponaxis: false, textangle: 0, hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
+      { ...look, margin: { l: 110, r: 44, t: 6, b: 40 }, xaxis: { title: { text: "share of the cycle time, each in full [%]" } }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
     } else element("share").remove();
   }
 
@@ -280,7 +290,7 @@
   function show(k, scroll) {
     now = k;
     element("clock").textContent = c.t[k].toFixed(3) + " s";
-    element("where").textContent = `line ${c.line[k]}${calls(k)}, ${digits(c.feed[k])} mm/s, ${about.limits[c.limit[k]]}`;
+    element("where").textContent = `line ${c.line[k]}${calls(k)}, ${digits(perFeed * c.feed[k])} ${feedUnit}, ${limitNames[c.limit[k]]}`;
     programList.mark(c.line[k] - 1, scroll);
     Plotly.restyle(pathPlot, marker(), [2]);
     Plotly.relayout(profilePlot, { "shapes[0].x0": c[against][k], "shapes[0].x1": c[against][k] });
@@ -295,15 +305,15 @@
 
   let playing = null;
   element("play").onclick = () => {
-    if (playing !== null) { cancelAnimationFrame(playing); playing = null; element("play").textContent = "▶"; return; }
-    element("play").textContent = "⏸";
+    if (playing !== null) { cancelAnimationFrame(playing); playing = null; element("play").textContent = "play"; return; }
+    element("play").textContent = "pause";
     if (now >= N - 1) show(0, true);
     let before = performance.now(), time = c.t[now], drawn = 0;
     const frame = (at) => {
       time += (at - before) / 1000 * Number(element("speed").value);
       before = at;
       if (at - drawn > 60) { drawn = at; show(find(c.t, Math.min(time, c.t[N - 1])), true); }
-      if (time >= c.t[N - 1]) { show(N - 1, true); playing = null; element("play").textContent = "▶"; return; }
+      if (time >= c.t[N - 1]) { show(N - 1, true); playing = null; element("play").textContent = "play"; return; }
       playing = requestAnimationFrame(frame);
     };
     playing = requestAnimationFrame(frame);

@@ -11,6 +11,7 @@ const make = (tag, text, className) => {
   return made;
 };
 const digits = (value, n = 4) => (value === null || value === undefined || !Number.isFinite(value) ? "–" : Number(value.toPrecision(n)).toString());
+const short = (value) => (Math.abs(value) < 5e-5 ? "0" : digits(value)); // in narrow columns
 const fixed = (value, n) => (Number.isFinite(value ?? NaN) ? value.toFixed(n) : "–"); // so many digits after the point
 const ARRAYS = { f8: Float64Array, f4: Float32Array, i4: Int32Array, u1: Uint8Array };
 function bytesOf(text) {

@@ -1,10 +1,10 @@
 // What the pages draw alike: figures in plotly's words (plotly_figure.py), whose traces name columns instead of numbers.
-const BUCKETS = 1200, COLOURBAR = 120, FILLED = 0.8;
+const BUCKETS = 1200, COLOURBAR = 120, FILLED = 0.76;
 // Okabe and Ito's colours, told apart with red-green blindness too, and those of text, where the ground is dark.
 const ON_DARK = { "#0072B2": "#56B4E9", "#56B4E9": "#0072B2", "#009E73": "#2fc49a", "#1d2430": ink, "#667085": dim };
 const shade = (colour) => (dark && ON_DARK[colour]) || colour;
 const grid = { gridcolor: rule, zerolinecolor: rule }, inSpace = { ...grid, color: dim, showbackground: false, tickangle: 0 };
-const bare = { displaylogo: false, responsive: true };
+const bare = { displaylogo: false, responsive: true, displayModeBar: innerWidth > 700 };
 const look = {
   paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink }, modebar: { bgcolor: "rgba(0,0,0,0)", color: dim, activecolor: ink },
   template: { layout: { xaxis: grid, yaxis: grid, scene: { xaxis: inSpace, yaxis: inSpace, zaxis: inSpace } } },
@@ -43,7 +43,8 @@ function panels(figure, against, range) {
     return { ...trace, line: { ...trace.line, color: shade(trace.line.color) }, ...bucketed(base, c[y], scale, range || [0, base.length - 1]) };
   });
   const xaxis = { ...figure.layout.xaxis, title: { text: about.against[against] } };
-  return [data, { ...look, ...figure.layout, xaxis, margin: { l: 62, r: 14, t: 8, b: 42 } }];
+  const annotations = (innerWidth > 700 ? figure.layout.annotations || [] : []).map((note) => ({ ...note, font: { ...note.font, color: dim } }));
+  return [data, { ...look, ...figure.layout, annotations, xaxis, margin: { l: 62, r: 14, t: 8, b: 42 } }];
 }
 
 // Buttons of which one is on; name: of their choice in the page

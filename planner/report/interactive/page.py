@@ -25,7 +25,15 @@ from planner.machine import LINEAR_AXES
 from planner.nc.points import own_text
 from planner.planning.job.at_tip import joints_of
 from planner.report.export import check_places, write_plan
-from planner.report.figure import COLOURS, FEED, QUANTITIES, MotionColumns, Panel, profile_panels, three
+from planner.report.figure import (
+    QUANTITIES,
+    MotionColumns,
+    Panel,
+    feed_panel,
+    limit_colours,
+    profile_panels,
+    three,
+)
 from planner.report.html.data import Samples, programmed_path, samples_of
 from planner.report.html.page import REPORT, path_picture, report_page
 from planner.report.plotly_figure import BARE, PROGRAMMED, colourings, panel_figure, scene_in_box
@@ -33,7 +41,9 @@ from planner.report.replace import check_file, write_whole
 from planner.report.rows import VERDICT, plan_rows
 from planner.report.trajectory_file import trajectory_columns, units
 from planner.report.trajectory_reader import Format
+from planner.report.units import Units, axis_titles, units_of
 from planner.report.word_feed import WordFeed
+from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:
     import pandas
@@ -108,7 +118,6 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
 
 
 SIZE = 320.0  # of the picture, its longer side [px]
-BAR = COLOURS[0]
 # Rows of the table of a plan that are shown, besides what more of the limits saves.
 SHOWN = (
     "cycle time",
@@ -157,9 +166,11 @@ def _held(plan: Plan) -> str:
     """The active limits, each with its share of the cycle time as a bar."""
     if plan.grid is None:
         return ""
+    colour = dict(zip(plan.grid.active_names, limit_colours(plan.grid.active_names), strict=True))
+    colour |= {word: colour[name] for name, word in WORDS.items() if name in colour}
     rows = "".join(
         f'<div style="display:flex;align-items:center;gap:6px"><span style="flex:0 0 120px">{html.escape(name)} {percent} %</span>'
-        f'<span style="background:{BAR};height:8px;width:{2 * percent}px"></span></div>'
+        f'<span style="background:{colour[name]};height:8px;width:{2 * percent}px"></span></div>'
         for name, percent in plan.grid.percents()[:HELD]
     )
     return f"<small>held by{rows}</small>"
@@ -193,20 +204,24 @@ class PlanFigures:
         """
         known_name("colouring", color, COLOURINGS)
         samples = self._samples
-        xyz, programmed = three(samples.shown), programmed_path(self._plan.toolpath)
-        how = colourings(samples)[color]
+        units = self._units
+        xyz, programmed = three(samples.shown) / units.mm, programmed_path(self._plan.toolpath) / units.mm
+        how = colourings(samples, units)[color]
+        shade = how["scale"] * getattr(samples, how["column"])
+        if "rapid" in how:
+            shade = np.where(np.isfinite(samples.programmed), shade, how["rapid"])
         named = np.array(samples.limits)[samples.limit]
         motion = {
             **{"type": "scatter3d", "mode": "lines", "name": "motion"},
             **dict(zip(LINEAR_AXES, xyz.T, strict=True)),
-            "line": how["light"] | {"color": how["scale"] * getattr(samples, how["column"])},
+            "line": how["light"] | {"color": shade},
             "customdata": np.stack(
-                [samples.shown.line, samples.feed, named, samples.shown.t], axis=1
+                [samples.shown.line, units.per_feed * samples.feed, named, samples.shown.t], axis=1
             ).tolist(),
-            "hovertemplate": "line %{customdata[0]}<br>feed %{customdata[1]:.4~g} mm/s<br>held by %{customdata[2]}"
+            "hovertemplate": f"line %{{customdata[0]}}<br>feed %{{customdata[1]:.4~g}} {units.feed}<br>held by %{{customdata[2]}}"
             "<br>t %{customdata[3]:.4f} s<extra></extra>",
         }
-        scene = scene_in_box(np.concatenate([xyz, programmed]), ROOM)
+        scene = scene_in_box(np.concatenate([xyz, programmed]), ROOM, axis_titles(self._plan.program, units))
         behind = PROGRAMMED | dict(zip(LINEAR_AXES, programmed.T, strict=True))
         return self._figure(
             [behind, motion], {"scene": scene, "margin": BARE | {"t": 30}, "showlegend": False}, 560
@@ -217,7 +232,7 @@ class PlanFigures:
 
         Raises InputError for another horizontal axis.
         """
-        return self._panels([FEED], against, 340)
+        return self._panels([feed_panel(self._columns, self._units)], against, 340)
 
     def profiles(self, against: Literal["t", "s"] = "t") -> Figure:
         """Velocity, acceleration and jerk of the axes in per cent of their limits, below the feed.
@@ -225,7 +240,12 @@ class PlanFigures:
         Raises InputError for another horizontal axis.
         """
         axes = self._columns.joints.axes
-        return self._panels(profile_panels(self._plan.machine, axes, [*QUANTITIES]), against, 820)
+        panels = profile_panels(self._columns, self._plan.machine, axes, [*QUANTITIES], self._units)
+        return self._panels(panels, against, 820)
+
+    @cached_property
+    def _units(self) -> Units:
+        return units_of(self._plan.program)
 
     @cached_property
     def _samples(self) -> Samples:

@@ -252,7 +252,9 @@ def test_page_answers_to_clicks(browser: Any, plan: Plan) -> None:
     hovered = "return document.getElementById('path').data[1].customdata[50]"
     line, feed = browser.execute_script(hovered)[:2]
     assert plan.trajectory is not None
-    assert (line, feed) == pytest.approx((plan.trajectory.line[50], plan.trajectory.feed[50]), rel=1e-6)
+    assert (line, feed) == pytest.approx(
+        (plan.trajectory.line[50], 60.0 * plan.trajectory.feed[50]), rel=1e-6
+    )
     head = browser.find_elements(By.CSS_SELECTOR, "#lines-head button")
     head[2].click()  # planned time, the longest first
     rows = (

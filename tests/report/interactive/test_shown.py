@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import planner
+from planner.nc.program import Kind
 from planner.planning.job.plan import Plan
 
 TEXT = "G21 F3000 (<script>)\nG1 X40 Y3\nG3 X40 Y33 J15\nG1 X0 Z-2\nG0 X0 Y0 Z0\n"
@@ -101,9 +102,11 @@ def test_figures_hold_the_numbers_of_the_plan(plan: Plan) -> None:
     assert plan.trajectory is not None
     by_feed, by_limit = plan.plot.path(), plan.plot.path("limit")
     np.testing.assert_array_equal(by_feed.data[1].x, plan.trajectory.position[:, 0])
-    np.testing.assert_array_equal(by_feed.data[1].line.color, plan.trajectory.feed)
-    assert by_feed.data[1].line.cmax == pytest.approx(50.0, rel=1e-3), "rapids do not stretch the scale"
-    assert set(by_limit.data[1].line.colorbar.ticktext) >= {"none"}
+    shade, cut = by_feed.data[1].line.color, plan.program.kind[plan.trajectory.block] != Kind.RAPID
+    np.testing.assert_array_equal(shade[cut], 60.0 * plan.trajectory.feed[cut])
+    assert set(shade[~cut]) == {by_feed.data[1].line.cmin}, "grey"
+    assert by_feed.data[1].line.cmax == pytest.approx(3000.0, rel=1e-3), "rapids do not stretch the scale"
+    assert set(by_limit.data[1].line.colorbar.ticktext) >= {"nothing"}
     assert plan.plot.path(color="deviation").data[1].line.cmin == 0
     np.testing.assert_array_equal(plan.plot.feed("s").data[1].x, plan.trajectory.s)
     limits = [np.abs(trace.y).max() for trace in plan.plot.profiles().data[2:]]

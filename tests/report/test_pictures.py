@@ -131,3 +131,13 @@ def test_turned_parts_lie() -> None:
     assert flat_view(np.array([50.0, 0.0, 20.0])) == [0, 2]
     assert flat_view(np.array([50.0, 40.0, 1.0])) == [0, 1]
     assert flat_view(np.array([50.0, 40.0, 30.0])) is None
+
+
+def test_lines_of_a_pen_as_fast_as_the_machine_are_no_rapids() -> None:
+    """Without VS nothing has a speed, pen down or up."""
+    program = planner.read_program(
+        text="IN;SP1;PU200,0;PD1400,0;PD1400,900;PU;", machine=load_machine("plotter")
+    )
+    samples = samples_of(planner.plan(program, "plotter", method="stop"))
+    assert not np.isfinite(samples.programmed).any()
+    assert 0 < samples.rapid.sum() < len(samples.rapid)

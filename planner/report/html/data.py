@@ -20,6 +20,7 @@ from planner.geometry.distance import distance_near
 from planner.machine import LINEAR_AXES
 from planner.motion.trajectory import Trajectory, joined
 from planner.nc.points import own_text
+from planner.nc.program import Kind
 from planner.planning.job.at_tip import of_axes
 from planner.report.word_feed import WordFeed, planned_blocks
 
@@ -47,6 +48,7 @@ class Samples:
     limits: tuple[str, ...]  # their names; the last one is `NO_LIMIT`
     feed: FloatArray  # (N,) as F words mean it [mm/s, deg/s where rotary axes move alone]
     programmed: FloatArray  # (N,) F of the block; inf for rapids
+    rapid: Array  # (N,) whether the block is a rapid move
     deviation: FloatArray  # (N,) distance from the programmed path near the block of the sample [mm]
     # (N,) time saved per tolerance at the joint beside the sample [s/mm], 0 far from joints; None where it is
     # not known
@@ -97,6 +99,7 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
         limits=names,
         feed=word.of(shown),
         programmed=word.programmed(plan.program, shown.block),
+        rapid=plan.program.kind[np.clip(shown.block, 0, None)] == Kind.RAPID,
         deviation=distance_near(plan.toolpath, shown.position, segment),
         price=_price(plan, shown.position, segment),
         parts=_parts(plan.program, shown.block),

@@ -19,6 +19,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
+from planner.nc.program import Kind
 from planner.report.figure import (
     AGAINST,
     CIVIDIS,
@@ -75,6 +76,7 @@ TYPES = {
     "line": "i4",
     "frame": "i4",
     "limit": "u1",
+    "rapid": "u1",
     "line_line": "i4",
     "line_limit": "u1",
 } | dict.fromkeys(("tool", "operation", "layer"), "i4")
@@ -90,7 +92,12 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
     figure, path = panel_figure(panels, "t"), programmed_path(plan.toolpath)
     names = {"t", "s", "line", *shown.axes, *(of["y"] for of in figure["columns"])}
     columns: dict[str, Array] = {name: motion[name] for name in sorted(names)}
-    columns |= {"limit": samples.limit, "deviation": samples.deviation, "path": path.ravel()}
+    columns |= {
+        "limit": samples.limit,
+        "rapid": samples.rapid,
+        "deviation": samples.deviation,
+        "path": path.ravel(),
+    }
     columns |= {name: of for name, (_, of) in samples.parts.items()}
     if samples.price is not None:
         columns["price"] = samples.price
@@ -167,7 +174,7 @@ def path_picture(plan: Plan, size: float) -> str:
     programmed = columns["programmed"]
     highest, rapid = highest_feed(feed, programmed), len(CIVIDIS)
     colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
-    colour[~np.isfinite(programmed)] = rapid
+    colour[plan.program.kind[np.clip(shown.block, 0, None)] == Kind.RAPID] = rapid
     shades = [*CIVIDIS, GREY]
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends

@@ -23,7 +23,7 @@
       pair.append(make("dt", name), make("dd", value.split(":")[0]));
       element("figures").append(pair);
     }
-    const rows = [["limit", "largest ratio"], ...Object.entries(summary.verdict.limits).map(([name, ratio]) => [name, digits(ratio, 6), ratio])];
+    const rows = [["limit", "largest ratio"], ...Object.entries(summary.verdict.limits).filter(([, ratio]) => ratio > 0).map(([name, ratio]) => [name, digits(ratio, 6), ratio])];
     rows.forEach(([name, value, ratio], k) => {
       const row = make("tr");
       row.append(make(k ? "td" : "th", name), make(k ? "td" : "th", value, ratio > 1 + 1e-6 ? "bad" : ""));
@@ -93,7 +93,7 @@
   const calls = (k) => (c.frame && about.calls[c.frame[k]]) || ""; // that led to the line, in an expanded program
   const place = (k) => [0, 1, 2].map((a) => (a < linear.length ? c[linear[a]][k] / mm : 0));
   function pathTrace() {
-    const rows = pathRows(), how = colourings[colouring], line = { ...how[dark ? "dark" : "light"], color: rows.map((k) => (how.rapid && !(c.programmed[k] > 0) ? how.rapid : how.scale * c[how.column][k])) };
+    const rows = pathRows(), how = colourings[colouring], line = { ...how[dark ? "dark" : "light"], color: rows.map((k) => (how.rapid && c.rapid[k] ? how.rapid : how.scale * c[how.column][k])) };
     const at = [0, 1, 2].map((a) => (a < linear.length ? rows.map((k) => c[linear[a]][k] / mm) : rows.map(() => 0)));
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], line, name: "motion", rows,

@@ -209,7 +209,7 @@ class PlanFigures:
         how = colourings(samples, units)[color]
         shade = how["scale"] * getattr(samples, how["column"])
         if "rapid" in how:
-            shade = np.where(np.isfinite(samples.programmed), shade, how["rapid"])
+            shade = np.where(samples.rapid, how["rapid"], shade)
         named = np.array(samples.limits)[samples.limit]
         motion = {
             **{"type": "scatter3d", "mode": "lines", "name": "motion"},

@@ -93,14 +93,14 @@ def travel_faults(
 
     text : of the program, for the column of the axis' word
     """
-    ends = np.array([_travel(machine, letter) for letter in program.axes]).reshape(-1, 2)
+    ends = np.array([travel_of(machine, letter) for letter in program.axes]).reshape(-1, 2)
     if not len(program) or not np.isfinite(ends).any():
         return [], []
     assert machine is not None
     low, high = _of_joints(program, machine) if program.tool_point else block_boxes(program)
     moves = (low != high) | (starts(program) != program.end)
     faults, notes = [], []
-    known = "g54" in machine.work_offsets or (machine.control and machine.control.name in NO_OFFSETS)
+    known = coordinates_known(machine)
     lines = text.splitlines()
     for a, letter in enumerate(program.axes):
         on = np.flatnonzero(moves[:, a])
@@ -143,7 +143,13 @@ def travel_faults(
     return sorted(faults, key=lambda fault: fault.line), notes
 
 
-def _travel(machine: Machine | None, letter: str) -> tuple[float, float]:
+def coordinates_known(machine: Machine) -> bool:
+    """Whether the machine coordinates of a program are known: by G54, or where the control has no offsets."""
+    control = machine.control
+    return "g54" in machine.work_offsets or (control is not None and control.name in NO_OFFSETS)
+
+
+def travel_of(machine: Machine | None, letter: str) -> tuple[float, float]:
     """The travel of an axis [mm, deg]; infinite where none is known, and on a wrapped axis, which turns on."""
     axis = machine.axes.get(letter) if machine else None
     if axis is None or axis.wrapped:

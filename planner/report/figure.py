@@ -17,6 +17,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.machine import ALL_AXES, LINEAR_AXES, ROTARY_AXES
+from planner.nc.extents import coordinates_known, travel_of
 from planner.nc.program import Kind
 from planner.planning.job.at_tip import directions_of, of_axes
 from planner.report.units import Units
@@ -146,6 +147,21 @@ def profile_panels(
 def moving_axes(motion: Trajectory) -> list[str]:
     """The axes that a motion moves."""
     return [axis for k, axis in enumerate(motion.axes) if np.ptp(motion.position[:, k]) > 0.0]
+
+
+# The edges of a box in one line: the corners that it passes, each with the lower (0) or upper (1) end of x, y and z.
+EDGES = "000 100 110 010 000 001 101 100 101 111 110 111 011 010 011 001"
+
+
+def travel_box(plan: Plan) -> FloatArray | None:
+    """(n, 3) a line along the edges of the travel of x, y and z [mm]; 0 for an axis that the plan has not. None where
+    one of them, or the place of the program in it, is not known, and for motions of the tool's tip."""
+    axes = plan.program.axes
+    ends = np.array([travel_of(plan.machine, axis) if axis in axes else (0.0, 0.0) for axis in LINEAR_AXES])
+    if not np.isfinite(ends).all() or plan.joints is not None or not coordinates_known(plan.machine):
+        return None
+    corners = np.array([[int(digit) for digit in corner] for corner in EDGES.split()])
+    return np.take_along_axis(ends.T, corners, axis=0)
 
 
 class MotionColumns:

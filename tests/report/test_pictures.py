@@ -10,7 +10,7 @@ import pytest
 from hand_made import make_plan
 
 import planner
-from planner.machine import load_machine
+from planner.machine import Machine, load_machine
 from planner.planning.job.plan import Plan
 from planner.report.figure import (
     CLIPPED,
@@ -23,6 +23,7 @@ from planner.report.figure import (
     flat_view,
     highest_feed,
     limit_colours,
+    travel_box,
 )
 from planner.report.html.data import samples_of
 from planner.report.html.page import report_page
@@ -141,3 +142,19 @@ def test_lines_of_a_pen_as_fast_as_the_machine_are_no_rapids() -> None:
     samples = samples_of(planner.plan(program, "plotter", method="stop"))
     assert not np.isfinite(samples.programmed).any()
     assert 0 < samples.rapid.sum() < len(samples.rapid)
+
+
+def test_the_box_of_the_travel_has_twelve_edges_between_its_ends() -> None:
+    limits = load_machine("mill").model_dump(exclude_none=True)
+    ends = {"x": (-5.0, 300.0), "y": (-10.0, 200.0), "z": (-120.0, 0.0)}
+    for axis, (low, high) in ends.items():
+        limits["axes"][axis] |= {"travel_min": low, "travel_max": high}
+    known = Machine(**limits | {"work_offsets": {"g54": {"x": 20.0, "y": 20.0, "z": -60.0}}})
+    plan = planner.plan(planner.read_program(text="G21 F900\nG1 X9\n", machine=known), known, method="stop")
+    box = travel_box(plan)
+    assert box is not None
+    np.testing.assert_array_equal([box.min(axis=0), box.max(axis=0)], np.array([*ends.values()]).T)
+    edges = {frozenset(map(tuple, pair)) for pair in zip(box[:-1].tolist(), box[1:].tolist(), strict=True)}
+    assert len(edges) == 12
+    assert all(np.count_nonzero(np.subtract(*map(np.array, edge))) == 1 for edge in edges)
+    assert travel_box(planner.plan("planner/examples/bracket.ngc", "mill", method="stop")) is None

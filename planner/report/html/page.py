@@ -12,6 +12,7 @@ script, some five megabytes, is run and the columns are unpacked.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from planner.report.figure import (
     profile_panels,
     three,
     tool_lines,
+    travel_box,
 )
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
@@ -113,6 +115,7 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
         "colourings": colourings(samples, units),
         "units": dataclasses.asdict(units) | {"per_feed": units.per_feed},
         "axes": ", ".join(titles[axis] for axis in shown.axes if axis in LINEAR_AXES),
+        "travel": _travel(plan, np.concatenate([three(shown), path]), units, titles),
         "layers": samples.parts.get("layer", ([],))[0],
         "programmed": PROGRAMMED,
         "profile": figure,
@@ -124,6 +127,15 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
         "calls": [program.called(frame) for frame in range(min(len(program.frames), CALLS_MAX))],
     }
     return {name: column.astype(TYPES.get(name, "f4")) for name, column in columns.items()}, about
+
+
+def _travel(plan: Plan, points: FloatArray, units: Units, titles: Mapping[str, str]) -> dict[str, Any] | None:
+    """The box of the axes' travel, by axis, and the view of it with a path, `points` (n, 3) [mm]; None without one."""
+    box = travel_box(plan)
+    if box is None:
+        return None
+    view = fitted_scene(np.concatenate([points, box]) / units.mm, titles)
+    return {"box": dict(zip(LINEAR_AXES, (box / units.mm).T.tolist(), strict=True)), "view": view}
 
 
 def _corners(plan: Plan) -> dict[str, list[Any]]:

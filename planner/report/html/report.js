@@ -121,6 +121,7 @@
     pathTrace(),
     { type: "scatter3d", mode: "markers", x: [place(0)[0]], y: [place(0)[1]], z: [place(0)[2]], hoverinfo: "skip",
       marker: { size: 7, color: dark ? "#ffffff" : "#000000" }, name: "here" },
+    ...(about.travel ? [{ ...about.programmed, ...about.travel.box, name: "travel", visible: false }] : []),
   ], view, bare);
   mark("path");
   // Zoomed in, the part in sight is drawn finer: the samples near the axis of sight. The scene's own lengths are those of its aspect ratio.
@@ -146,9 +147,15 @@
   });
   function redrawPath() {
     const trace = pathTrace();
-    return Plotly.react(pathPlot, [pathPlot.data[0], trace, pathPlot.data[2]], pathPlot.layout, bare);
+    return Plotly.react(pathPlot, [pathPlot.data[0], trace, ...pathPlot.data.slice(2)], pathPlot.layout, bare);
   }
   choice("colours", "colour", (name) => { colouring = name; redrawPath(); });
+  if (about.travel) element("travel").onclick = () => {
+    const on = element("travel").classList.toggle("on"), seen = pathLayout(on ? about.travel.view : about.view, pathPlot);
+    const drawn = [...pathPlot.data.slice(0, 3), { ...pathPlot.data[3], visible: on }];
+    Plotly.react(pathPlot, drawn, { ...seen, uirevision: on ? "travel" : "keep" }, bare);
+  };
+  else element("travel").remove();
   if (about.layers.length) {
     const slider = element("layer"), told = element("top");
     slider.max = slider.value = top = about.layers.length - 1;
@@ -283,7 +290,10 @@
         marker: { color: held.map(([name]) => colour(name)) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
         textposition: "outside", cliponaxis: false, textangle: 0, hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
       { ...look, margin: { l: 110, r: 44, t: 6, b: 40 }, xaxis: { title: { text: "share of the cycle time, each in full [%]" } }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
-    } else element("share").remove();
+    } else {
+      element("share").remove();
+      element("share-box").hidden = !element("prices").children.length;
+    }
   }
 
   // One place of the motion, shown everywhere

@@ -249,12 +249,10 @@ def test_page_answers_to_clicks(browser: Any, plan: Plan) -> None:
     ).startswith("length")
     browser.find_elements(By.CSS_SELECTOR, "#program .row")[3].click()
     assert browser.execute_script("return report.state().line") == 4
-    hovered = "return document.getElementById('path').data[1].customdata[50]"
-    line, feed = browser.execute_script(hovered)[:2]
     assert plan.trajectory is not None
-    assert (line, feed) == pytest.approx(
-        (plan.trajectory.line[50], 60.0 * plan.trajectory.feed[50]), rel=1e-6
-    )
+    line, feed = browser.execute_script("return document.getElementById('path').data[1].customdata[50]")[:2]
+    there = plan.trajectory.line[50], 60.0 * plan.trajectory.feed[50]
+    assert (line, feed) == pytest.approx(there, rel=1e-6)
     head = browser.find_elements(By.CSS_SELECTOR, "#lines-head button")
     head[2].click()  # planned time, the longest first
     rows = (

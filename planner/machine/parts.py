@@ -128,11 +128,23 @@ class Plotter(Record):
 
 class ToolData(Record):
     """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42
-    use [mm]."""
+    use [mm]. What F and S are compared with (planning/job/cutting.py): its number of `flutes`,
+    `feed_per_tooth_max` [mm], `surface_speed_max` [m/min] and `spindle_max` [1/min], or None."""
 
     length: Finite = 0.0
     x: Finite = 0.0
     diameter: NotNegative = 0.0
+    flutes: Annotated[int, Field(gt=0)] | None = None
+    feed_per_tooth_max: Positive | None = None
+    surface_speed_max: Positive | None = None
+    spindle_max: Positive | None = None
+
+    @model_validator(mode="after")
+    def _what_limits_need(self) -> ToolData:
+        for key, needed in (("feed_per_tooth_max", "flutes"), ("surface_speed_max", "diameter")):
+            if getattr(self, key) is not None and not getattr(self, needed):
+                raise ValueError(f"{key} needs {needed}")
+        return self
 
 
 class Times(Record):

@@ -11,6 +11,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.nc.extents import travel_faults
 from planner.nc.program import Kind, Program
+from planner.planning.job.cutting import cutting_notes
 from planner.planning.job.plausible import short_block_notes, unit_notes
 
 # A tolerance above this share of the part's extent is noted [-]: little is left of a part's shape.
@@ -25,6 +26,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *large,
         *program.notes,
         *_travel_notes(program, machine),
+        *cutting_notes(program, machine),
         *unit_notes(machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),

@@ -106,6 +106,7 @@ NUMBERS: dict[str, tuple[str, Switch]] = {
     "MOST": ("search", _set(refine, "MOST", run.HALF)),
     "PASSED": ("search", _set(run, "PASSED", 0.0)),
     "SHORTENED": ("search", _set(own, "SHORTENED", np.inf)),
+    "LASTS": ("search", _set(own, "LASTS", 1e-9)),
     "SEARCHED": ("shaped", _set(shaped, "SEARCHED", np.inf)),
     "NOT_SEARCHED": ("shaped", _set(shaped, "NOT_SEARCHED", np.inf)),
 }

@@ -44,7 +44,7 @@ from planner.joint.window_solver import Asked
 WHOLE, WINDOW = SIZES.searched_whole, SIZES.searched_window
 OVERLAP, LEAST = SIZES.searched_overlap, SIZES.searched_least
 # A window of steps far shorter than what shapes a corner (`unit_of`) is longer than `WINDOW`: it lasts so many units on
-# the mean [-], or has `WHOLE` steps.
+# the mean [-], or has `WHOLE` steps (`python -m benchmarks.net.ablation ROWS --net NET --without LASTS`).
 LASTS = 50.0
 # A join is where the motion uses least of its limits and of the tolerance, at most so many steps from where
 # it would be.

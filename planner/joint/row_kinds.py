@@ -9,11 +9,6 @@ from planner.joint.normal_rows import BETWEEN
 # Vectors y, in this order.
 P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, LONG, NEXT = range(13)
 VECTORS = 13
-VECTOR_OF_NODE = (
-    P,
-    NEXT,
-    V,
-)  # second vectors: of the first and of the second inner control point on arcs, and of `SWITCH`
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
 # lower), in this order.
 H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance

@@ -249,7 +249,7 @@ class _Search:
         tuning = Tuning(PULL, PROX, self.settings.gap, MISSED, self.settings.least, *START)
         tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
         needed, beside, taken = near(run.laws, begun), no_rows_beside(hi - lo, len(run.axis)), False
-        for number in range(TOLD if len(run.laws) else TIGHTENED):
+        for number in range(TOLD if len(run.laws) or run.switch.any() else TIGHTENED):
             which = np.flatnonzero(needed)
             window = window_of(run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside)
             done, iterations, z = yield Asked(window, tuning)

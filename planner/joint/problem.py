@@ -173,8 +173,10 @@ def _limits(
     more[:, rows.SWITCH] = of_switch >= 0
     more[0, rows.SWITCH] = False
     own_pace = pace(cut.state[lo : hi + 1, 1])
-    side = np.where(near_by, run.switch[of_switch], 0.0)[:, None] * cut.state[lo:hi, 1] / own_pace[:, None]
-    more[:, rows.SIDE] = more[:, rows.SWITCH] & near_by
+    side = (
+        np.where(beside.again, run.switch[of_switch], 0.0)[:, None] * cut.state[lo:hi, 1] / own_pace[:, None]
+    )
+    more[:, rows.SIDE] = more[:, rows.SWITCH] & beside.again
     return StepLimits(
         leg=leg,
         passed=passed,

@@ -49,7 +49,7 @@ class StepLimits(NamedTuple):
     h_min: FloatArray  # (N,)
     switch: FloatArray  # (N,) 1 at the vertex where the feed falls and before it, -1 where it rises and behind it; else 0
     switch_at: FloatArray  # (N, A) the place that stands for that vertex
-    side: FloatArray  # (N, A) about the direction of the start there, with that sign, where a row beside is asked for; else 0
+    side: FloatArray  # (N, A) about the direction of the start there, with that sign, where a row was asked for twice; else 0
     smooth: FloatArray  # (N,) weight of (jerk/limit)^2 of every axis, against the step's time
     centre: FloatArray  # (N,) weight of the row of the node's tolerance, against the step's time
     aside: float  # how far inside its bound the row of that has to be [-]

@@ -39,8 +39,8 @@ Where legs of different feeds meet at a vertex V the node may not be on the slow
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
 on p and, through `Rows.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
 comes nearer to V once more on the other side, nodes there have the row too, about a place further on (switches.py).
-Round V, at one distance, v is across p - V everywhere: so those nodes may not be beyond the plane through V either that
-is across the direction t of the start, m (p - V).t <= 0.
+Round V, at one distance, v is across p - V everywhere: so where that is not enough those nodes may not be beyond the
+plane through V either that is across the direction t of the start, m (p - V).t <= 0.
 """
 
 from planner.base.kernels import CONTRACT, njit

@@ -26,20 +26,22 @@ FURTHER = 1.002  # by how much more than was missed a node is to be further [-]
 
 class Beside(NamedTuple):
     """Nodes of N steps that have the row of a change of feed: the leg (N,) that begins at the vertex, -1 of others;
-    the place (N, A) that stands for the vertex [mm]."""
+    the place (N, A) that stands for the vertex [mm]; whether they have been asked for before (N,)."""
 
     leg: Array
     at: FloatArray
+    again: Array
 
     def add(self, others: "Beside") -> None:
         """Take in others of the same nodes."""
         new = others.leg >= 0
+        self.again[new] = self.leg[new] >= 0
         self.leg[new], self.at[new] = others.leg[new], others.at[new]
 
 
 def no_rows_beside(steps: int, axes: int) -> Beside:
     """Of no nodes."""
-    return Beside(np.full(steps, -1), np.zeros((steps, axes)))
+    return Beside(np.full(steps, -1), np.zeros((steps, axes)), np.zeros(steps, dtype=bool))
 
 
 @njit(cache=True, error_model="numpy")
@@ -169,7 +171,7 @@ def switches_missed(
         if node < end and rows.leg[node] < 0:
             rows.leg[node], rows.at[node] = r, vertex
     rows.leg[: begin + 1] = -1
-    return Beside(rows.leg[part], rows.at[part]) if (rows.leg[part] >= 0).any() else None
+    return Beside(*(column[part] for column in rows)) if (rows.leg[part] >= 0).any() else None
 
 
 def _slow(run: TubeRun, r: int, begin: FloatArray, end: FloatArray, h: FloatArray) -> bool:

@@ -54,7 +54,7 @@ def expand_command(
         raise InputError("--force has no effect without a file to write; name one with -o FILE")
     from planner.nc.language.flat import flat_program
     from planner.nc.reader import load, source_name
-    from planner.report.replace import write_new
+    from planner.report.replace import refuse_inputs, write_new
 
     data = load(job)
     found = flat_program(data, machine_named(machine), reading, source=source_name(job))
@@ -62,6 +62,7 @@ def expand_command(
     if output is None:
         typer.echo(text, nl=False)
         return
+    refuse_inputs([output], [job])
     write_new(output, text, force=force)
     if found is None:
         say(f"{output}: nothing to expand, the program is copied")

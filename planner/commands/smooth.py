@@ -48,10 +48,11 @@ def smooth_command(
     from planner.controls.export.fewer import fewer_lines
     from planner.geometry.build import toolpath_from_program
     from planner.nc.reader import load, parse_program, source_name
-    from planner.report.replace import write_new
+    from planner.report.replace import refuse_inputs, write_new
 
     if not 0.0 < share <= 1.0:
         raise InputError(f"--share {share:g}; it must be above 0, and 1 at most")
+    refuse_inputs([output], [job])
     limits = machine_named(machine)
     data = load(job)
     program = parse_program(data, limits, reading, source=source_name(job))
@@ -76,7 +77,7 @@ def smooth_command(
         f"{whole / MICROMETRE:.3g} µm"
     )
     for why, (count, line) in made.kept.items():
-        say(f"  kept as they are: {count:,} lines, first line {line}: {why}")
+        say(f"  kept as they are: {count:,} line{'s' * (count > 1)}, first line {line}: {why}")
 
 
 def compared(program: Program, again: Program, machine: Machine, allowed: float) -> SamePath:

@@ -36,6 +36,11 @@ def test_command(tmp_path: Path) -> None:
     assert said["lines_after"] == sum(read(out.read_bytes()).kind > 0) < said["lines_before"] == 400
     assert said["arcs"] > 0
     assert run("smooth", job, "-o", out).exit_code == 2  # it exists
+    assert (
+        run("smooth", job, "-o", job, "--force").exit_code == 2
+    )  # a program that is read is not overwritten
+    assert run("expand", job, "-o", job, "--force").exit_code == 2
+    assert job.read_text() == text
     done = run("smooth", job, "-o", out, "--force", "--lines", "--share", "1")
     assert done.exit_code == 0
     assert not len(read(out.read_bytes()).arc_block)

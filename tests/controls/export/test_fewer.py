@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,6 +196,23 @@ def test_numbers_units_line_ends_and_offsets(unit: tuple[str, float, int], end: 
     numbers = [int(found[1]) for line in written if (found := re.match(r"N(\d+) ", line))]
     assert numbers == sorted(numbers)
     assert "\r" not in made.text.decode().replace("\r\n", "")
+
+
+@pytest.mark.skipif(
+    shutil.which("rs274") is None, reason="LinuxCNC's rs274 is missing (package linuxcnc-uspace)"
+)
+def test_linuxcnc_reads_the_arcs(tmp_path: Path) -> None:
+    """By its own interpreter, in all planes: as many arcs, no error, and the end in the same place."""
+    text = HEAD + "".join(
+        "G0 X0 Y0 Z0\nG1 " + lines_through(curve(8.0, 3.0, 90, plane)) for plane in ("XY", "XZ", "YZ")
+    )
+    made = fewer(text + "M2\n")
+    file = tmp_path / "job.ngc"
+    file.write_bytes(made.text)
+    done = subprocess.run(["rs274", "-g", str(file)], capture_output=True, text=True, check=False)
+    assert made.arcs >= 3
+    assert done.stdout.count("ARC_FEED") == made.arcs
+    assert "PROGRAM_END" in done.stdout
 
 
 def test_plane_and_g1_are_in_force_again_behind() -> None:

@@ -24,20 +24,10 @@ from planner.joint.window_solver import Asked, Solved, kind_of, solve_windows
 WAITING = 8 * WIDTH
 IN_LANES = SIZES.searched_in_lanes  # steps: windows of searches of fewer together are solved one at a time
 QUIET = SIZES.windows_shared  # steps: searches of fewer together are worth no thread
-Task = Generator[Asked, Solved, bool]  # returns whether it has ended well
-
-
-class Sweep(NamedTuple):
-    """Tasks that do not depend on one another, and whether all of them are needed: then the first one that does
-    not end well ends the sweep."""
-
-    tasks: list[Task]
-    all_needed: bool
-
-
+Task = Generator[Asked, Solved, None]
+Sweep = list[Task]  # that do not depend on one another
 T = TypeVar("T")
-# Is sent how the tasks of its sweep have ended, those that have, in any order.
-Search = Generator[Sweep, list[bool], T]
+Search = Generator[Sweep, None, T]
 
 
 def searched(searches: Iterable[Search[T]], steps: int, tell: Callable[[], None] = lambda: None) -> list[T]:
@@ -60,18 +50,12 @@ class _Running:
 
     tasks : of its sweep, those that have not been begun
     left  : how many have not ended
-    ended : how the others have; None before the first sweep
     """
 
     def __init__(self, number: int, search: Search[Any]):
         self.number, self.search = number, search
         self.tasks = deque[Task]()
-        self.left, self.all_needed = 0, False
-        self.ended: list[bool] | None = None
-
-    def given_up(self) -> bool:
-        """Whether a task that was needed has not ended well."""
-        return self.all_needed and not all(self.ended or ())
+        self.left = 0
 
 
 class _Ready(NamedTuple):
@@ -168,44 +152,31 @@ class Groups:
 
     def _resume(self, running: _Running, task: Task, solved: Solved | None = None) -> None:
         """Go on with a task to its next window, or its end."""
-        asked, ended = None, list[bool]()
         try:
             asked = next(task) if solved is None else task.send(solved)
-        except StopIteration as end:
-            ended.append(end.value)
+        except StopIteration:
+            asked = None
         with self._changed:
-            assert running.ended is not None
-            running.ended += ended
-            if asked is not None and not running.given_up():
+            if asked is not None:
                 kind = None if self.width == 1 else kind_of(asked)
                 sort = Sort(len(asked.window.u), kind)
                 self._ready.append(_Ready(running, task, asked, sort))
                 return
             running.left -= 1
-            if running.given_up():
-                self._forget(running)
             over = not running.left
         if over:
             self._go_on(running)
-
-    def _forget(self, running: _Running) -> None:
-        """Begin and solve nothing else of a sweep."""
-        others = [one for one in self._ready if one.running is not running]
-        running.left -= len(self._ready) - len(others) + len(running.tasks)
-        running.tasks.clear()
-        self._ready, self._going = others, [one for one in self._going if one is not running]
 
     def _go_on(self, running: _Running) -> None:
         """Go on with a search to its next sweep, or its end."""
         while not running.left:
             try:
-                ended = running.ended
-                sweep = next(running.search) if ended is None else running.search.send(ended)
+                sweep = next(running.search)
             except StopIteration as end:
                 self.found[running.number] = end.value
                 return
             with self._changed:
-                running.tasks.extend(sweep.tasks)
-                running.left, running.all_needed, running.ended = len(sweep.tasks), sweep.all_needed, []
+                running.tasks.extend(sweep)
+                running.left = len(sweep)
                 if running.left:
                     self._going.append(running)

@@ -37,7 +37,7 @@ from planner.joint.problem import NARROWED, StepWindow, window_of
 from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
 from planner.joint.switches import Beside, no_rows_beside, switches_missed
-from planner.joint.window_solver import Asked
+from planner.joint.window_solver import Asked, Solved
 
 # Steps of a run that is one window, of a window of others at most, on each side of a join that is searched once more, and
 # of the smallest part that a window which fails is divided into.
@@ -72,9 +72,8 @@ class TubeOwn:
     """Settings of the search.
 
     gap      : complementarity at its end, share of the time [-]
-    divide   : divide windows that fail, and keep the guess where nothing faster is found. Otherwise the guess
-               need not keep the limits and no part of it is kept: windows may end slower than it, and the
-               search ends at the first one that fails and has found nothing
+    stays    : the guess keeps all limits, and stays where nothing faster is found. Otherwise it need not, and no part
+               of it is kept: windows may end slower than it, and the search ends where nothing is found on a part
     progress : called with the share of the steps that are done [-], in any thread
     smooth   : weight of the jerk against the time at least [-] (numbers.py); above 0 what is found may be
                slower than the guess
@@ -83,7 +82,7 @@ class TubeOwn:
     """
 
     gap: float = 1e-5
-    divide: bool = True
+    stays: bool = True
     progress: Callable[[float], None] | None = None
     smooth: float = 0.0
     least: float = 1.0
@@ -106,7 +105,7 @@ class TubeOwn:
                 iterations=sum(search.iterations),
                 solve_time=took,
                 windows=search.windows,
-                solved=search.solved,
+                solved=sum(search.undivided),
             )
         share = float(guess.h[search.kept].sum() / guess.h.sum())
         sentence = FOUND if not share else f"{FOUND}; on {share:.2g} of the time {KEPT}"
@@ -116,7 +115,7 @@ class TubeOwn:
             iterations=sum(search.iterations),
             solve_time=took,
             windows=search.windows,
-            solved=search.solved,
+            solved=sum(search.undivided),
             steps=search.steps(),
             place=search.places(),
             kept=search.kept,
@@ -144,7 +143,7 @@ class _Search:
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
         self.price = np.zeros((len(guess), columns(run)))
-        self.iterations, self.windows, self.solved = list[int](), 0, 0
+        self.iterations, self.windows, self.undivided = list[int](), 0, list[bool]()
         self._keeps = keeps_of(run)
         self._begun = guess
         self._done, self._all = list[int](), len(guess)  # steps of all windows
@@ -153,27 +152,36 @@ class _Search:
     def _strain(self) -> FloatArray:
         return strain(self.run, self._begun)
 
-    def sweeps(self) -> Generator[Sweep, list[bool], bool]:
-        """All windows, and then all joins; whether it was not given up."""
+    def sweeps(self) -> Generator[Sweep, None, bool]:
+        """All windows, then all joins, then what is still kept; whether that may be."""
         steps = len(self.guess)
         parts = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
         parts = 1 if steps <= WHOLE else int(max(parts, np.ceil(steps / WHOLE)))
         even = np.linspace(0, steps, parts + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
-        if not self.settings.divide:  # no step of the guess is kept
-            self._slow(joins)
+        self._slow(joins)
         self._all = steps + 2 * OVERLAP * len(joins)
-        whole = yield from self._sweep([0, *joins], [*joins, steps], self.settings.divide)
-        if whole and joins:
-            yield from self._sweep(
-                [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
-            )
-        return whole
+        yield from self._sweep([0, *joins], [*joins, steps])
+        yield from self._sweep(
+            [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
+        )
+        yield from self._sweep(*self._around_kept())
+        return self.settings.stays or not self.kept.any()
+
+    def _around_kept(self) -> tuple[list[int], list[int]]:
+        """Where the windows begin and end that reach from what was found before steps that are kept to what was found
+        behind them."""
+        steps, before = np.arange(len(self.kept)), np.append(0, np.cumsum(self.kept))
+        behind = np.minimum(steps + OVERLAP, len(steps) - 1) + 1
+        around = before[behind] > before[np.maximum(steps - OVERLAP, 0)]
+        begin, end = np.flatnonzero(np.diff(around, prepend=False, append=False)).reshape(-1, 2).T
+        some = [0 < self.kept[lo:hi].sum() < hi - lo <= WHOLE for lo, hi in zip(begin, end, strict=True)]
+        return begin[some].tolist(), end[some].tolist()
 
     def _slow(self, nodes: list[int]) -> None:
-        """Make the guess slower at nodes that will stay, where the steps beside them would exceed limits as
-        narrowed as they may be: no motion keeps them there."""
-        if not nodes:
+        """Make a guess that need not keep its limits slower at nodes that will stay, where the steps beside them would
+        exceed limits as narrowed as they may be: no motion keeps them there."""
+        if not nodes or self.settings.stays:
             return
         run, at = self.run, np.array(nodes, dtype=int)
         state, leg, h = self.guess.state, self.guess.leg, self.guess.h
@@ -202,48 +210,43 @@ class _Search:
         place = np.where(begins, self.run.offset[self.guess.leg], self.guess.place[:, 0])
         return np.append(place, self.run.offset[-1])
 
-    def _sweep(
-        self, begin: list[int], end: list[int], parts: bool = True
-    ) -> Generator[Sweep, list[bool], bool]:
-        """The windows from `begin` to `end`, no two of which have a step in common; where `parts` of them are
-        of no use, the first one that fails gives the search up. Whether none did."""
-        tasks = [self._window(lo, hi) for lo, hi in zip(begin, end, strict=True)]
-        ended = yield Sweep(tasks, all_needed=not parts)
-        self.windows += len(tasks)
-        self.solved += sum(ended)
-        return parts or all(ended)
+    def _sweep(self, begin: list[int], end: list[int]) -> Generator[Sweep, None, None]:
+        """The windows from `begin` to `end`, no two of which have a step in common."""
+        if begin:
+            yield [self._window(lo, hi) for lo, hi in zip(begin, end, strict=True)]
+            self.windows += len(begin)
 
     def _window(self, lo: int, hi: int) -> Task:
         """Improve the steps lo .. hi - 1, and tell so."""
-        solved = yield from self._improve(lo, hi)
+        found = yield from self._improved(lo, hi)
+        self.undivided.append(found)
+        if not found:
+            yield from self._in_halves(lo, hi)
         self._done.append(hi - lo)
         if self.settings.progress is not None:
             self.settings.progress(min(sum(self._done) / self._all, 1.0))
-        return solved
 
     def _join(self, near: int) -> int:
         """A node to join windows at."""
         begin = max(near - JOIN_WITHIN, 0)
         return begin + int(np.argmin(self._strain[begin : near + JOIN_WITHIN]))
 
-    def _improve(self, lo: int, hi: int) -> Task:
-        """The steps lo .. hi - 1; where that fails both halves of them, and then all of them once more from
-        what these have found. Whether it did not fail."""
-        if (yield from self._improved(lo, hi)):
-            return True
-        if hi - lo < 2 * LEAST or not self.settings.divide:
-            return False
+    def _in_halves(self, lo: int, hi: int) -> Task:
+        """Improve both halves of the steps lo .. hi - 1, and then all of them once more from what these have found."""
+        if hi - lo < 2 * LEAST:
+            return
         middle = (lo + hi) // 2
         reach = min(JOIN_WITHIN, (hi - lo) // 4)
         middle += int(np.argmin(self._strain[middle - reach : middle + reach])) - reach
+        self._slow([middle])
         before = float(self.guess.h[lo:hi].sum())
-        yield from self._improve(lo, middle)
-        yield from self._improve(middle, hi)
-        if self.guess.h[lo:hi].sum() < before:
+        for begin, end in ((lo, middle), (middle, hi)):
+            if not (yield from self._improved(begin, end)):
+                yield from self._in_halves(begin, end)
+        if not self.settings.stays or self.guess.h[lo:hi].sum() < before:
             yield from self._improved(lo, hi)
-        return False
 
-    def _improved(self, lo: int, hi: int) -> Task:
+    def _improved(self, lo: int, hi: int) -> Generator[Asked, Solved, bool]:
         """Whether an optimum of the steps lo .. hi - 1 was found; if it is faster it takes their place."""
         run, smooth = self.run, self.settings.smooth
         tuning = Tuning(PULL, PROX, self.settings.gap, MISSED, self.settings.least, *START)
@@ -308,7 +311,8 @@ class _Search:
         if missed is not None:
             beside.add(missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))
-        if not self.settings.divide or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
+        needed = not self.settings.stays and self.kept[lo:hi].any()
+        if needed or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = along
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False

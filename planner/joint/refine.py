@@ -148,7 +148,7 @@ def searched_again(
 
     finer : that motion, divided
     """
-    again = yield from replace(solver, divide=True).search(run, finer.guess)
+    again = yield from replace(solver, stays=True).search(run, finer.guess)
     if again.steps is None:
         return None
     price = again.price

@@ -191,16 +191,16 @@ class InTwo(NamedTuple):
 
 
 def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
-    """The solver as the effort has it; where the start `stays`, windows that fail are divided."""
+    """The solver as the effort has it."""
     if stays and not search.finer:
         return TubeOwn(search.gap, progress=report, smooth=search.smooth)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
     parts = pairwise((ends / ends[-1]).tolist())
     shares = [lambda done, a=a, b=b: report(a + done * (b - a)) for a, b in parts]
     return InTwo(
-        TubeOwn(search.gap, divide=False, progress=shares[0], smooth=search.smooth),
+        TubeOwn(search.gap, stays=False, progress=shares[0], smooth=search.smooth),
         tuple(
-            (cut, TubeOwn(gap, divide=stays, progress=share, smooth=search.smooth))
+            (cut, TubeOwn(gap, stays=stays, progress=share, smooth=search.smooth))
             for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
         ),
     )
@@ -209,7 +209,7 @@ def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo
 def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun]:
-    """The solution on each run; where the start `stays` it is divided where it fails."""
+    """The solution on each run."""
     size = np.array([len(start.guess(k, run)) for k, run in enumerate(runs)])
     order, done = np.argsort(-size, kind="stable").tolist(), np.zeros(len(runs))  # shares
 

@@ -56,16 +56,14 @@ def asked_for(steps: int, axes: int = 3) -> SimpleNamespace:
     return SimpleNamespace(window=window, tuning=SimpleNamespace(gap=1e-3))
 
 
-def task(windows: list[SimpleNamespace], well: bool = True):
+def task(windows: list[SimpleNamespace]):
     for one in windows:
         assert (yield one) == one.window.u.shape
-    return well
 
 
-def search(sweeps: list[list[groups.Task]], told: list[list[bool]], all_needed: bool = False):
-    for tasks in sweeps:
-        told.append((yield Sweep(tasks, all_needed)))
-    return len(told)
+def search(sweeps: list[Sweep]):
+    yield from sweeps
+    return len(sweeps)
 
 
 @pytest.fixture
@@ -90,16 +88,10 @@ def test_all_windows_are_solved_once_in_groups_of_one_kind_and_about_one_length(
         [[asked_for(int(n), int(rng.integers(2, 4))) for n in rng.integers(10, 90, 3)] for _ in range(4)]
         for _ in range(30)
     ]
-    told: list[list[list[bool]]] = [[] for _ in windows]
     found = searched(
-        [
-            search([[task(w) for w in one[:3]], [], [task(w, False) for w in one[3:]]], t)
-            for one, t in zip(windows, told, strict=True)
-        ],
-        LONG,
+        [search([[task(w) for w in one[:3]], [], [task(w) for w in one[3:]]]) for one in windows], LONG
     )
     assert found == [3] * 30
-    assert all([sorted(sweep) for sweep in one] == [[True] * 3, [], [False]] for one in told)
     shapes = [shape for group in solved for shape in group]
     assert sorted(shapes) == sorted(w.window.u.shape for one in windows for t in one for w in t)
     assert max(map(len, solved)) == LANES
@@ -129,7 +121,7 @@ def test_windows_side_by_side_are_straight_and_of_few_axes():
 @pytest.mark.parametrize("threads", [1, 3])
 def test_searches_of_few_steps_have_their_windows_solved_one_at_a_time(solved, threads):
     use_threads(threads)
-    searched([search([[task([asked_for(20)])]], []) for _ in range(50)], groups.IN_LANES)
+    searched([search([[task([asked_for(20)])]]) for _ in range(50)], groups.IN_LANES)
     assert [len(group) for group in solved] == [1] * 50
 
 
@@ -141,23 +133,12 @@ def test_searches_are_begun_when_windows_are_wanted(solved):
         nonlocal going
         going += 1
         begun_at.append(going)
-        yield from search([[task([asked_for(20), asked_for(20)])]], [])
+        yield from search([[task([asked_for(20), asked_for(20)])]])
         going -= 1
 
     searched((one() for _ in range(500)), LONG)
     assert going == 0
     assert max(begun_at) <= groups.WAITING + LANES
-
-
-def test_where_all_are_needed_the_first_that_fails_ends_the_sweep(solved):
-    use_threads(1)
-    told: list[list[bool]] = []
-    tasks = [task([asked_for(1000 - k)] * 2, k != 1) for k in range(500)]
-    assert searched([search([tasks, [task([asked_for(5)])]], told, all_needed=True)], LONG) == [2]
-    assert sorted(told[0])[0] is False
-    assert len(told[0]) < 20
-    assert told[1] == [True]
-    assert len(solved) < 2 * groups.WAITING
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -178,7 +159,7 @@ def test_an_error_or_an_interrupt_ends_all_searches(monkeypatch, solved, threads
     for steps in (LONG, 0):
         many = 0
         with pytest.raises(error):
-            searched([search([[task([asked_for(20)] * 3)]], []) for _ in range(5_000)], steps)
+            searched([search([[task([asked_for(20)] * 3)]]) for _ in range(5_000)], steps)
         assert threading.active_count() == before
         assert many < 5_000
 
@@ -193,7 +174,7 @@ def small_windows(monkeypatch) -> None:
 def jobs():
     """Searches of runs of lines, arcs, laws of the user and turning axes, and what each finds by itself, one after
     the other."""
-    solvers = [TubeOwn(gap=1e-3), TubeOwn(gap=1e-3, divide=False)]
+    solvers = [TubeOwn(gap=1e-3), TubeOwn(gap=1e-3, stays=False)]
     runs = [*map(begun, NAMES), begun_on(PROGRAMS["pentagon"], machine=MACHINE.with_own([Fence()]))]
     made = [(solver, *run) for run in runs for solver in solvers]
     use_threads(1)
@@ -240,45 +221,41 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed)
             assert getattr(one.steps, column.name).tobytes() == getattr(other.steps, column.name).tobytes()
 
 
-@pytest.mark.parametrize(
-    ("divide", "width", "asked_for"), [(True, 1, 9), (True, 4, 9), (False, 1, 2), (False, 4, 4)]
-)
-def test_where_parts_are_of_no_use_the_first_window_that_fails_ends_the_search(
-    monkeypatch, divide, width, asked_for
+@pytest.mark.parametrize("width", [1, 4])
+@pytest.mark.parametrize("stays", [True, False])
+@pytest.mark.parametrize("around", [True, False])
+def test_what_is_left_of_the_start_is_searched_once_more_from_inside_of_what_was_found(
+    monkeypatch, stays, around, width
 ):
-    """The second of five fails: neither the others nor the joins are asked for, and nothing of the run is found,
-    whatever the group; where parts are of use, all are."""
+    """The second of five windows fails, and is found from further outside; where that fails too the start stays there,
+    or nothing of the run is found, whatever the group."""
     run, guess = begun("pentagon")
     for name in ("WHOLE", "WINDOW"):
         monkeypatch.setattr(own, name, len(guess) // 5 + 1)
     monkeypatch.setattr(own, "OVERLAP", len(guess) // 20)
     monkeypatch.setattr(own, "JOIN_WITHIN", 5)
     monkeypatch.setattr(own, "LEAST", len(guess))  # no window is divided
-    monkeypatch.setattr(groups, "together", lambda asked: list(range(len(asked)))[-width:])
-    windows, solve = set[bytes](), groups.solve_windows
-    second = None
+    begun_at, solve = list[bytes](), groups.solve_windows
 
-    def second_fails(asked, _):
-        nonlocal second
-        for one in asked:
-            windows.add(one.window.origin.tobytes())
-            if len(windows) == 2 and second is None:
-                second = one.window.origin.tobytes()
+    def some_fail(asked, _):
         found = solve(asked, 1 if width == 1 else LANES)
-        return [
-            one._replace(done=False) if window.window.origin.tobytes() == second else one
-            for one, window in zip(found, asked, strict=True)
-        ]
+        for k, one in enumerate(asked):
+            origin = one.window.origin.tobytes()
+            begun_at.extend([origin] if origin not in begun_at else [])
+            # of five windows, four joins, and the one around what is left
+            if begun_at.index(origin) == 1 or (begun_at.index(origin) == 9 and not around):
+                found[k] = found[k]._replace(done=False)
+        return found
 
-    monkeypatch.setattr(groups, "solve_windows", second_fails)
+    monkeypatch.setattr(groups, "solve_windows", some_fail)
     use_threads(1)
-    found = TubeOwn(divide=divide).solve(run, guess)
-    assert len(windows) == asked_for
-    if divide:
-        assert found.kept is not None
-        assert found.kept.any()
-    else:
+    found = TubeOwn(stays=stays).solve(run, guess)
+    assert len(begun_at) == 10
+    if not around and not stays:
         assert found.steps is None
+    else:
+        assert found.kept is not None
+        assert found.kept.any() == (not around)
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from planner.planning.optimal.effort import EFFORTS
 
 def found_in_long_steps(name: str) -> tuple[TubeRun, np.ndarray, TubeSolution]:
     run, guess = begun(name, Cut(per_unit=1.0, of_leg=1.0))
-    found = TubeOwn(gap=1e-3, divide=False).solve(run, guess)
+    found = TubeOwn(gap=1e-3, stays=False).solve(run, guess)
     assert found.steps is not None
     return run, guess.leg, found
 

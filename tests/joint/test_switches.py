@@ -141,7 +141,7 @@ def test_a_node_before_a_step_that_comes_back_is_to_be_further_from_the_vertex()
 @pytest.mark.parametrize("program", [arc_and_line(285, 2400, 900), line_and_arc(900, 2400)])
 def test_on_an_arc_of_more_than_half_a_turn_what_is_found_is_taken(program):
     """In one window, as it is: nothing of the start is left."""
-    found = TubeOwn(divide=False).solve(*begun_on(program))
+    found = TubeOwn(stays=False).solve(*begun_on(program))
     assert found.steps is not None
     assert not found.kept.any()
 
@@ -151,7 +151,7 @@ def test_where_a_faster_leg_comes_nearer_the_search_gets_rows_beside_the_vertex(
     way to the vertex turns, and is nearer elsewhere. With rows there too no node of a faster leg is nearer."""
     program = "G21 G90 G17 G94\nG64 P0.2\nG1 X5 F1500\nX6 Y1 F500\nX10 Y3 F1500\nM2\n"
     run, guess = begun_on(parse_program(program))
-    found = TubeOwn(divide=False).solve(run, guess)
+    found = TubeOwn(stays=False).solve(run, guess)
     assert found.steps is not None
     assert found.windows == 1
     p, v, a = found.steps.position, found.steps.velocity, found.steps.acceleration

@@ -9,7 +9,7 @@ then it stays where the search does not end.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.base.arrays import Array
 from planner.corners.budget import filters_count
 from planner.feedrate.solution import Status
 from planner.joint.groups import Search as Searching
@@ -166,7 +167,7 @@ def joint_plan(
         sentence=sentence,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         tables=tables,
-        notes=(*made.notes, *path_notes(job.toolpath, planned), *notes),
+        notes=(*made.notes, *path_notes(job.toolpath, planned, _stays(job, found, made.plans)), *notes),
     )
     if slower is None:
         return Joint(plan, steps)
@@ -180,6 +181,15 @@ def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list
     if found.whole or (stays and found.steps is not None):
         return parts_of(job.toolpath, found, start)
     return [start] if stays else None
+
+
+def _stays(job: Job, found: list[FoundRun], alone: Container[int]) -> Array:
+    """(M+1,) the joints of the runs on which something of the motion on the path is delivered."""
+    at = np.zeros(len(job.toolpath) + 1, bool)
+    for k, one in enumerate(found):
+        if not one.whole and k not in alone:
+            at[one.run.first] = True
+    return at
 
 
 class InTwo(NamedTuple):

@@ -9,15 +9,17 @@ from planner.planning.optimal.on_path import OnPath
 from planner.smoothing.spline_path import SplineShape
 
 
-def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
-    """The notes of a motion on a path: splines, corners that are not rounded, full stops of the solver.
+def path_notes(toolpath: Toolpath, best: OnPath, stays: Array | None = None) -> list[str]:
+    """The notes of a motion on a smooth path: splines, corners that are not rounded, full stops of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion
+    stays    : (M+1,) the toolpath's joints where this motion is the one that is delivered; None for all
     """
     notes: list[str] = []
     path, at = best.path, best.path.legs.first
-    added = (path.joint == Joint.STOP) & (toolpath.resting().joint[at] != Joint.STOP)
+    here = np.ones(len(at), bool) if stays is None else stays[at]
+    added = (path.joint == Joint.STOP) & (toolpath.resting().joint[at] != Joint.STOP) & here
     exact = added & np.isin(at, exact_stops(toolpath))
     notes += exact_note(toolpath, at[exact])
     added &= ~exact
@@ -28,10 +30,11 @@ def path_notes(toolpath: Toolpath, best: OnPath) -> list[str]:
     on_spline = np.zeros(len(path.joint), bool)
     for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):
         on_spline[first : last + 1] = True
-    sharp = (path.joint == Joint.CORNER) & (path.d == 0.0) & ~on_spline
+    sharp = (path.joint == Joint.CORNER) & (path.d == 0.0) & ~on_spline & here
     if sharp.any():
         notes.append(_at(toolpath, at[sharp], "corner", "not rounded: there is no room for it"))
     lost = _standstills(best)
+    lost = lost[stays[lost]] if stays is not None else lost
     if len(lost):
         notes.append(_at(toolpath, lost, "full stop", "where the solver did not converge"))
     return notes

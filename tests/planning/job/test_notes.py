@@ -72,10 +72,15 @@ def test_what_a_path_gives_up_is_noted() -> None:
     ]
     assert path_notes(toolpath, solved([2, 4]))[0].startswith("line 3: the first of 2 full stops")
 
+    stays = np.arange(len(toolpath) + 1) != 2  # elsewhere another motion is delivered
+    assert path_notes(toolpath, solved([2]), stays) == []
+    assert path_notes(toolpath, solved([2, 4]), stays)[0].startswith("line 5: a full stop")
+
     still = np.flatnonzero(whole.samples.segment == 3)[1]
     feed_sq = whole.solution.feed_sq.copy()
     feed_sq[still] = 0.0
     stuck = dataclasses.replace(whole, solution=dataclasses.replace(whole.solution, feed_sq=feed_sq))
+    assert path_notes(toolpath, stuck, np.arange(len(toolpath) + 1) < 4) == []
     assert path_notes(toolpath, stuck) == ["line 5: a full stop where the solver did not converge"]
 
     d = whole.path.d.copy()

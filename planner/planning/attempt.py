@@ -18,6 +18,8 @@ class Tried:
     best: Plan | None = None  # the fastest plan; None before there is one
     # the time-optimal motion on a path, its limits kept between grid points, not delivered; None before
     path: tuple[OnPath, Motion] | None = None
+    # plans the motion `path` once, and what the joint search has planned of it is not planned again; None before
+    kept: Callable[[Job], tuple[OnPath, Motion] | None] | None = None
     slower: Plan | None = None  # of a search whose motion passes only when it is run slower in places
     joint: bool = False  # whether the best is of the joint search
     steps: int = 0  # of constant jerk, that the joint search has

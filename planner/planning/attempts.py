@@ -29,7 +29,11 @@ from planner.planning.optimal.path_motion import first_motion, kept_on_path, pla
 from planner.planning.page import best_of, tolerant
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from planner.motion.timing import Motion
     from planner.planning.joint_search import Others
+    from planner.planning.optimal.on_path import OnPath
 
 # A motion of more steps than the second that takes no more than the first over what its feed asks for is not
 # searched [-]: on 30,000 lines of dense chords that found nothing; on ten blocks it found 9e-4.
@@ -62,8 +66,10 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     if steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
-    found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings))
-    return Tried(best=found.plan, joint=found.plan is not None, steps=found.steps, slower=found.slower)
+    kept = cache(partial(kept_on_path, settings=settings))
+    found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
+    joint = found.plan is not None
+    return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower)
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -76,12 +82,15 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The joint search from a motion on splines that keeps its limits everywhere, and stays where that fails."""
     from planner.planning.joint_search import joint_plan
 
-    path = kept_on_path(job, settings)
+    kept = tried.kept or cache(partial(kept_on_path, settings=settings))
+    path = kept(job)
     if path is None:
-        return tried
-    found = joint_plan(job, settings, path[0], settings.effort.search, _others(ON_PATH, settings), path[1])
+        return dataclasses.replace(tried, kept=None)
+    others = _others(ON_PATH, settings, kept)
+    found = joint_plan(job, settings, path[0], settings.effort.search, others, path[1])
     slower = min(filter(None, (tried.slower, found.slower)), key=counted_time, default=None)
-    return dataclasses.replace(tried, best=found.plan, path=path, joint=found.plan is not None, slower=slower)
+    joint = found.plan is not None
+    return dataclasses.replace(tried, best=found.plan, path=path, kept=None, joint=joint, slower=slower)
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -179,9 +188,13 @@ RETRIES = (
 )
 
 
-def _others(attempts: tuple[Attempt, ...], settings: Settings) -> Others:
+def _others(
+    attempts: tuple[Attempt, ...],
+    settings: Settings,
+    kept: Callable[[Job], tuple[OnPath, Motion] | None],
+) -> Others:
     """What there is of runs that the search does not find: these attempts at each, with less tolerance or
-    slower in places where that does not pass, and the motion on a path."""
+    slower in places where that does not pass, and the motion on a path, `kept`."""
     from planner.planning.joint_search import Others
 
     known: dict[tuple[int, int], Plan] = {}  # of a run, when the search begins once more in long steps
@@ -193,7 +206,7 @@ def _others(attempts: tuple[Attempt, ...], settings: Settings) -> Others:
             known[blocks] = tolerant(run, made, partial(best_of, attempts, settings=settings))
         return known[blocks]
 
-    return Others(alone, cache(lambda job: kept_on_path(job, settings)))
+    return Others(alone, kept)
 
 
 def _least_steps(job: Job) -> int:

@@ -68,7 +68,7 @@ def with_runs_alone(
         noted = (note for plan in plans.values() if plan.making for note in plan.making.given_up)
         found = Alone(made, begin, dict(plans), frozenset(stays), tuple(dict.fromkeys(noted)))
         if made.verdict.passed:
-            return found
+            return found if made.trajectory.cycle_time <= least else slowed
         if made.slower is not None and (time := made.slower.trajectory.cycle_time) < least:
             least, slowed = time, found
         broken = broken_runs(begin, made.verdict)

@@ -60,7 +60,7 @@ def test_jobs_are_verified_and_faster_than_what_they_start_from(name):
     assert made.trajectory.cycle_time < start or (
         made.trajectory.cycle_time == start and "stays on" in made.sentence
     )
-    assert float(re.search(r"its start \(.*\) took ([0-9.]+) s", made.sentence)[1]) == pytest.approx(
+    assert float(re.search(r"before that \(.*\) ([0-9.]+) s", made.sentence)[1]) == pytest.approx(
         start, rel=1e-5
     )
     np.testing.assert_allclose(made.trajectory.position[-1], made.toolpath.end[-1], atol=1e-9)

@@ -86,7 +86,6 @@ def plan_command(
         (file_format is not None and nowhere, f"--format is the format of the trajectory {IN_OUTPUT}"),
         (corners and as_json, "--corners adds to the table, and --json prints none; leave one out"),
         (verbose and quiet, "--verbose tells what --quiet keeps quiet; leave one out"),
-        (verbose and as_json, "--verbose adds to the table, and --json prints all; leave one out"),
         (
             force and nowhere and trace is None,
             "--force is for files, and without -o or --trace there are none; leave one out",

@@ -11,7 +11,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
-from planner.sensitivity.records import GridHistory, PriceList
+from planner.sensitivity.records import DearCorners, GridHistory, PriceList
 from planner.verifier import Claims, CornerCheck, Fault, Kind, Known
 
 SQUARE = "G21 G90 G17\nF3000\nG1 X10\nY10\nX0\nY0\nM2\n"
@@ -20,6 +20,21 @@ TOO_FAST = Fault(
     kind=Kind.LIMIT,
     name="velocity.y",
     found="101 mm/s, 1.01 of the limit 100 mm/s at t = 0.1 s, X10 Y0, line 3",
+)
+DEAR = DearCorners(
+    line=np.array([7, 4]),
+    position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+    theta=np.array([np.pi / 2, np.pi / 3]),
+    price=np.array([-0.5, -0.25]),
+    saved=np.array([0.0044, 0.00216]),
+)
+PRICES = PriceList(
+    limits={"velocity.x": 0.0, "acceleration.y": -2e-5, "jerk.y": -3e-7},
+    feed=-0.4,
+    tolerance=-1.5,
+    saved={"velocity.x": 0.0, "acceleration.y": 0.0381, "jerk.y": 1e-5, "feed": 0.05, "tolerance": 0.0131},
+    corners=DEAR,
+    ranges={"acceleration.y": (0.0381, 0.0381), "feed": (0.049, 0.051), "tolerance": (0.01, 0.0162)},
 )
 
 

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hand_made import make_plan
+from hand_made import PRICES, make_plan
 from typer.testing import CliRunner
 
 from planner.base.names import CORNER_SHAPES, GEOMETRIES, METHODS
@@ -15,7 +15,6 @@ from planner.cli import app
 from planner.report.brief import brief_rows
 from planner.report.rows import plan_rows
 from planner.report.units import UNITS
-from tests.report.test_optimum import PRICES
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

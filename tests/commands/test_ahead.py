@@ -23,7 +23,7 @@ def cycle_time(job: Path, package: Path, **variables: str) -> str:
     command = [sys.executable, "-P", "-m", "planner", "plan", str(job), "--quiet"]
     done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    found = re.search(r"cycle time +(\S+)", done.stdout)
+    found = re.search(r"^time +(\S+)", done.stdout, re.MULTILINE)
     assert found
     return found.group(1)
 

@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_made import make_plan
+from hand_made import DEAR, PRICES, make_plan
 from test_tables import text
 
 import planner
@@ -16,23 +16,6 @@ from planner.nc.reader import parse_program
 from planner.report.rows import held_by_text, price_rows
 from planner.report.summary import summary
 from planner.report.tables import plan_table
-from planner.sensitivity.records import DearCorners, PriceList
-
-DEAR = DearCorners(
-    line=np.array([7, 4]),
-    position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
-    theta=np.array([np.pi / 2, np.pi / 3]),
-    price=np.array([-0.5, -0.25]),
-    saved=np.array([0.0044, 0.00216]),
-)
-PRICES = PriceList(
-    limits={"velocity.x": 0.0, "acceleration.y": -2e-5, "jerk.y": -3e-7},
-    feed=-0.4,
-    tolerance=-1.5,
-    saved={"velocity.x": 0.0, "acceleration.y": 0.0381, "jerk.y": 1e-5, "feed": 0.05, "tolerance": 0.0131},
-    corners=DEAR,
-    ranges={"acceleration.y": (0.0381, 0.0381), "feed": (0.049, 0.051), "tolerance": (0.01, 0.0162)},
-)
 
 
 def test_what_holds_the_motion() -> None:

@@ -63,7 +63,7 @@ def plan_command(
     ] = False,
     verbose: Annotated[
         bool,
-        typer.Option("-v", "--verbose", help="print everything, and on standard error the steps of planning"),
+        typer.Option("-v", "--verbose", help="print all rows, and the steps of planning on standard error"),
     ] = False,
     units: options.UnitsOption = None,
     trace: Annotated[

@@ -57,7 +57,12 @@ class Tally:
             return
         try:
             assert not canon.error, f"only LinuxCNC refuses: {canon.error}"
-            assert_same_motion(program, canon, centre=1e-6, feeds=kind not in ("lathe", "together"))
+            slow = any(
+                "G93 asks for less" in said for said in program.assumptions
+            )  # whose feed LinuxCNC raises
+            assert_same_motion(
+                program, canon, centre=1e-6, feeds=kind not in ("lathe", "together") and not slow
+            )
         except AssertionError as fault:
             self.wrong += (f"{text}\n{fault}",)
         self.read += 1

@@ -39,7 +39,7 @@ ASSUMED = [
     ("G21 G0 X1\nG55\nX2", 2, 1, "G55 has no offset", None),
     ("G21 T4 M6\nG42 F100\nG1 X9\nX20", 2, 1, "tool 4 has no diameter", None),
     ("G21 F100\nG81 Z-1 R2", 2, 1, "before any G98 or G99", "G21 F100\nG99 G81 Z-1 R2"),
-    ("G21\nT4 M6", 2, 4, "it has no time", None),
+    ("G21\nT4 M6", 2, 4, "its time is not included", None),
     ("G21 G0 X1\nM60", 2, 1, "pallet change", "G21 G0 X1\nM0"),
 ]
 

@@ -37,6 +37,9 @@ from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 # Nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s].
 _FEED_LEAST = 1.0 / SECONDS_PER_MINUTE
 _END_OF_DATA = 11.0  # G code
+_OF_DATA = list(
+    b"NPRLTHDQS"
+)  # letters of data lines behind G10 L50; what has others ends the data without G11
 _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
@@ -142,9 +145,11 @@ class Interpreter:
                 self.table.frame = int(words.frame[after])
                 if self.state.entering:
                     letters, values = words.of_rows(after)
-                    self.state.entering = not ((letters == ord("G")) & (values == _END_OF_DATA)).any()
-                    row = after + 1
-                    continue
+                    ended = ((letters == ord("G")) & (values == _END_OF_DATA)).any()
+                    self.state.entering = not ended and bool(np.isin(letters, _OF_DATA).all())
+                    if ended or self.state.entering:
+                        row = after + 1
+                        continue
                 block = read_block(words, after, self.findings.report, self.ignored)
                 if block is not None and block.ended:
                     self.ended = self._begun  # the first % starts the program

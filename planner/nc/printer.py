@@ -142,7 +142,8 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     else:
         if name in settings.RETRACTIONS and (found.extended or "s" in given):
             before = ignored.retractions[-1] if ignored.retractions else Retraction()
-            ignored.retractions.append(before.changed(name, given, block.line))
+            now = before.changed(name, given, block.line)
+            ignored.retractions += [now] * (now.length > 0.0)
             if given.get("z"):
                 ignored.count(settings.SCALE_M, name, block.line)
         what, stops = _meaning(found, code, ignored)

@@ -88,8 +88,11 @@ def test_a_firmware_retraction_goes_back_and_forward_once(
     assert not any("retraction" in note for note in program.notes)
 
 
-def test_without_settings_a_retraction_feeds_nothing_and_is_said() -> None:
-    program = read("G21 F600\nM83\nG1 X1 E1\nG10\nG1 X9\nG11\n")
+@pytest.mark.parametrize(
+    "settings", ["", "M207 Sx F100\n", "M207 S-1\n", "SET_RETRACTION RETRACT_LENGTH=abc\n"]
+)
+def test_without_settings_a_retraction_feeds_nothing_and_is_said(settings: str) -> None:
+    program = read(f"G21 F600\nM83\n{settings}G1 X1 E1\nG10\nG1 X9\nG11\n")
     assert np.count_nonzero(program.extruded) == 1
     assert any("retractions of an extruder" in text for text in program.assumptions)
 

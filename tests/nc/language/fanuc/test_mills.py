@@ -83,6 +83,7 @@ def test_parameters_of_the_control(text: str, value: str) -> None:
     "text",
     [
         "G10 L50\nN1220 P1 R100.\nN1320 P2 R-5.\nG11\nG1 X3.",
+        "G10 L50\nN1 P1 R5.\nG2 X3. Y0 R9.",
         "G22 X100. Y100. Z100. I0 J0 K0\nG23\nG62\nG63\nG64\nG1 X3.",
         "SETVN 500[A,B]\n#500=3\nPOPEN\nDPRNT[X#1[53]]\nPCLOS\nG1 X#500",
         "M19 R90.\nM19 P45\nG1 X3.",

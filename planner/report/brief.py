@@ -14,6 +14,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.controls.timing.times import TIMED, ControlTimes, by_name, control_times, tools_of
+from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.planning.job.notes import tolerance_notes
 from planner.report.rows import FAILED, PASSED, VERDICT, Rows, beside_rows, first_of, hours_text
 from planner.report.units import Units
@@ -32,7 +33,7 @@ NAMES = {
 }  # of controls, as they write themselves
 FURTHER = {
     "feed": "the programmed feed",
-    "acceleration.tangential": "acceleration along the path",
+    TANGENTIAL.name: "acceleration along the path",
     "none": "nothing",
     "rest": "dwells",
 }

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.feedrate.constraints.limits import JERK
 from planner.machine import ALL_AXES, LINEAR_AXES, ROTARY_AXES
 from planner.nc.extents import coordinates_known, travel_of
 from planner.nc.program import Kind
@@ -51,7 +52,7 @@ LOW_TO_HIGH = {
 
 
 OF_LIMITS = (
-    *("feed", "jerk.x", "jerk.y", "tolerance", "jerk.z"),
+    *("feed", JERK.called("x"), JERK.called("y"), "tolerance", JERK.called("z")),
     *(f"{quantity}.{axis}" for quantity in ("acceleration", "velocity") for axis in LINEAR_AXES),
 )
 LIMIT_COLOURS = dict(zip(OF_LIMITS, COLOURS, strict=True)) | {"none": GREY, "rest": LIGHT}

@@ -61,7 +61,7 @@ def test_ctrl_c_at_random_times(job: Path, tmp_path: Path) -> None:
             time.sleep(rng.uniform(0.0, 0.8) * takes)
             process.send_signal(signal.SIGINT)
             err = process.communicate(timeout=60)[1]
-        assert process.returncode in (ENDED_BY_US, ENDED_BY_PYTHON, 0)
+        assert process.returncode in (ENDED_BY_US, ENDED_BY_PYTHON, 0), err
         if process.returncode == ENDED_BY_US:
             assert err == "interrupted\n"
         assert sorted(os.listdir(tmp_path / "out")) == written

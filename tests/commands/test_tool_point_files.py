@@ -17,6 +17,7 @@ from planner.report.figure import tool_lines
 from planner.report.html.page import path_picture
 from planner.report.html.saved import saved_plan
 from planner.report.plots import toolpath_figure
+from planner.report.units import UNITS
 from planner.report.word_feed import planned_blocks
 from tests.commands.command_line import run
 
@@ -134,7 +135,7 @@ def test_info_tells_it(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_picture_has_the_tool(made: Path) -> None:
     plan, _, _ = saved_plan(made / "out")
-    figure = toolpath_figure(plan)
+    figure = toolpath_figure(plan, UNITS["mm"])
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert "tool" in labels
     lines = tool_lines(plan, 500)

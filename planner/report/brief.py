@@ -16,7 +16,7 @@ from planner.base.errors import InputError
 from planner.controls.timing.times import TIMED, ControlTimes, by_name, control_times, tools_of
 from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.planning.job.notes import tolerance_notes
-from planner.report.rows import FAILED, PASSED, VERDICT, Rows, beside_rows, first_of, hours_text
+from planner.report.rows import FAILED, PASSED, SAVED_SHOWN, VERDICT, Rows, beside_rows, first_of, hours_text
 from planner.report.units import Units
 from planner.report.word_feed import planned_blocks
 
@@ -132,7 +132,7 @@ def _saved(plan: Plan, tolerance: float | None) -> str:
     if not np.isfinite(takes):
         return "not known"
     saved = takes - time
-    if saved > 0.0:
+    if saved > SAVED_SHOWN * takes:
         return f"{saved:.4g} s, {100.0 * saved / takes:.0f} %, against {other}: {takes:.4f} s of motion"
     limited = plan.verdict is not None and "jerk" not in plan.verdict.not_limited
     why = ", which limits no jerk," if found is not None and limited else ""

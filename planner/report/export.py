@@ -28,6 +28,7 @@ from planner.report.replace import (
     SUMMARY,
     check_output,
     checksums,
+    is_ours,
     refuse_inputs,
     replacing,
 )
@@ -72,7 +73,7 @@ def write_plan(
     run_id = uuid.uuid4().hex
     beside = program_to_keep(plan)
     kept = {name for name in (PLANNED, *beside) if _is_source(plan, directory / name)}
-    kept |= {name for name, text in beside.items() if _holds(directory / name, text)}
+    kept |= {name for name, text in beside.items() if _is_users_own(directory / name, text)}
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
         trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
@@ -211,6 +212,6 @@ def _is_source(plan: Plan, file: Path) -> bool:
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
 
 
-def _holds(file: Path, text: bytes) -> bool:
-    """Whether a file is one that no run has to write: it is there with that text, perhaps a user's own."""
-    return file.is_file() and file.read_bytes() == text
+def _is_users_own(file: Path, text: bytes) -> bool:
+    """Whether a file that is to be kept is there already with that text, and no run wrote it."""
+    return file.is_file() and file.read_bytes() == text and not is_ours(file)

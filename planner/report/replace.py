@@ -254,6 +254,11 @@ def _vouched(directory: Path) -> set[tuple[str, str]]:
     return vouched
 
 
+def is_ours(file: Path) -> bool:
+    """Whether a run wrote a file, as the summary beside it says."""
+    return _is_ours(file, _vouched(file.parent))
+
+
 def _is_ours(file: Path, vouched: set[tuple[str, str]]) -> bool:
     return file.is_file() and not file.is_symlink() and (file.name, _sha256(file)) in vouched
 

@@ -143,6 +143,16 @@ def test_what_an_earlier_run_carried_goes(tmp_path: Path) -> None:
     }
 
 
+def test_a_job_is_planned_again_and_again_into_one_folder(tmp_path: Path) -> None:
+    """What the run before has carried there is written anew, and vouched for again."""
+    (tmp_path / "source").mkdir()
+    main, out = _called(tmp_path / "source"), tmp_path / "out"
+    for _ in range(3):
+        assert run("plan", main, "-o", out, "--method", "stop").exit_code == 0
+        said = json.loads((out / "summary.json").read_text())
+        assert {"program.nc", "O2000.nc"} <= set(said["files"])
+
+
 def test_called_files_beside_the_plan_stay(tmp_path: Path) -> None:
     """Into the program's own folder: what it calls is there already, and neither written nor removed."""
     main = _called(tmp_path)

@@ -22,6 +22,8 @@ SPLINE_PLACES = 513  # on a piece of a spline, at which its extent is looked at:
 PIECES_AT_ONCE = 1000  # of splines: 12 MB for three axes
 TIP_PLACES = 9  # of a block of the tool's tip at which the joints are looked at
 NO_OFFSETS = ("klipper", "marlin", "reprapfirmware")  # controls whose programs are in machine coordinates
+_COMMENT = re.compile(rb"\(.*?\)|;.*")
+_SETS = re.compile(rb"G0*(?:10|52)(?!\d)", re.IGNORECASE)  # offsets: their words are no places of the motion
 ROUNDING = 1e-6  # of coordinates [mm, deg]: no axis is beyond its travel by less
 
 
@@ -98,7 +100,8 @@ def travel_faults(
         return [], []
     assert machine is not None
     low, high = _of_joints(program, machine) if program.tool_point else block_boxes(program)
-    moves = (low != high) | (starts(program) != program.end)
+    before = starts(program)
+    moves = (low != high) | (before != program.end)
     faults, notes = [], []
     known = coordinates_known(machine)
     lines = text.splitlines()
@@ -108,6 +111,9 @@ def travel_faults(
         if not len(on) or not np.isfinite(ends[a]).any():
             continue
         least, most = low[on, a] / unit, high[on, a] / unit
+        if _named_before(lines, int(program.line[on[0]]), letter):  # a move of no length is no block
+            begin = before[on[0], a] / unit
+            least[0], most[0] = min(least[0], begin), max(most[0], begin)
         room = f"{ends[a, 0]:g} to {ends[a, 1]:g} {'mm' if unit == 1.0 else 'deg'}"
         over = np.maximum(ends[a, 0] - least, most - ends[a, 1])
         if known and over.max() > ROUNDING:
@@ -173,6 +179,14 @@ def _of_joints(program: Program, machine: Machine) -> tuple[FloatArray, FloatArr
     for a, letter in enumerate(program.axes):
         joints[..., a] = found.get(letter, places[..., a])
     return joints.min(axis=0), joints.max(axis=0)
+
+
+def _named_before(lines: list[bytes], line: int, letter: str) -> bool:
+    """Whether a program moves an axis, if only to where it is, before a line: its start is a place of the program
+    then, and not only assumed."""
+    word = re.compile(rb"(?<![A-Z#<])" + letter.encode() + rb"\s*[-+=\d.\[#]", re.IGNORECASE)
+    words = (_COMMENT.sub(b"", text) for text in lines[: line - 1])
+    return any(word.search(text) and not _SETS.search(text) for text in words)
 
 
 def _column(lines: list[bytes], line: int, letter: str) -> int:

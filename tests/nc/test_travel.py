@@ -103,6 +103,23 @@ def test_without_g54_only_lengths_are_known(to: float, is_fault: bool) -> None:
     assert "mixes both coordinates" in travel_faults(mixed, machine)[1][0]
 
 
+@pytest.mark.parametrize(
+    ("before", "is_fault"),
+    [
+        ("G0 X0 Y0\n", True),  # a move of no length: the program says where it begins
+        ("G92 X0\n", True),
+        ("(G0 X0)\nG1 Y3 ; X0\n", False),  # where it begins is assumed
+        ("G10 L2 P1 X0\n", False),
+    ],
+)
+def test_a_start_that_the_program_names_counts(before: str, is_fault: bool) -> None:
+    machine = reaching(x=(0.0, 300.0))
+    faults = found(f"G21 G90 F3000\n{before}G1 X305\nX301 Y5\n", machine)
+    assert [word for _, _, word in faults] == ["X"] * is_fault
+    known = reaching({"x": -5.0}, x=(0.0, 300.0))
+    assert [word for _, _, word in found("G21 G90 F3000\nG0 X0\nG1 X30\n", known)] == ["X"]
+
+
 def test_printers_have_no_work_offset() -> None:
     ender = load_machine("ender3")
     x = ender.axes["x"].model_copy(update={"travel_min": 0.0, "travel_max": 235.0})

@@ -33,8 +33,6 @@ def path(
     axes: str = "",
     tolerance: float | None = None,
     spline: bool = False,
-    start_velocity: float = 0.0,
-    end_velocity: float = 0.0,
 ) -> Program:
     """A program that goes straight from each point to the next, or on a spline through all of them.
 
@@ -46,13 +44,11 @@ def path(
     tolerance : contour error budget [mm]; None for that of the machine
     spline    : the cubic spline through the points with no curvature at its ends, over the lengths of the moves (in mm and
                 degrees): tangents and curvature go on at each point
-    start_velocity, end_velocity : 0; a motion begins and ends at rest
 
-    `Program.line` counts the moves from 1.
+    `Program.line` counts the moves from 1. Motions begin and end at rest.
 
     Raises InputError for arrays of another shape, values that are not finite, letters that are no axes or come twice,
-    feeds that are not above 0, a tolerance below 1e-5, splines without a feed or with a point twice running, and other
-    velocities than 0 at the ends.
+    feeds that are not above 0, a tolerance below 1e-5, and splines without a feed or with a point twice running.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -61,12 +57,6 @@ def path(
     >>> planner.plan(square, "mill", method="stop").verdict.passed
     True
     """
-    for name, velocity in (("start_velocity", start_velocity), ("end_velocity", end_velocity)):
-        if velocity != 0.0:
-            raise InputError(
-                f"{name} {velocity}: a motion begins and ends at rest; add a move before the first point or behind the "
-                "last, long enough to get up to speed or to stop, and take the part between"
-            )
     given, letters = _points(points, axes)
     moves = len(given) - 1
     if tolerance is not None and not TOLERANCE_MIN <= tolerance < np.inf:

@@ -109,8 +109,6 @@ def test_what_cannot_be_is_refused() -> None:
         ({"axes": "xx"}, "each letter once"),
         ({"axes": "xq"}, "each letter once"),
         ({"axes": "xyz"}, r"\(n, 3\)"),
-        ({"start_velocity": 5.0}, "begins and ends at rest"),
-        ({"end_velocity": 5.0}, "begins and ends at rest"),
         ({"spline": True}, "needs a feed"),
     ):
         with pytest.raises(InputError, match=said):

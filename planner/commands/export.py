@@ -134,6 +134,8 @@ def export_command(
             write_stream(new, trajectory, unit)
             text = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
         else:
+            if between == "cubic" and for_ in STRAIGHT:
+                raise InputError(_POSITIONS_ALONE, source=str(plan))
             table = Table(
                 kind=for_.value,
                 unit=unit.value,
@@ -145,8 +147,6 @@ def export_command(
             periods, miss = write_table(new, trajectory, table)
             shape = "straight moves" if for_ in STRAIGHT else "cubics"
             text = f"a row every {periods * trajectory.dt * 1e3:g} ms, {shape} between them within {miss * 1e3:.2g} µm of the setpoints"
-            if between == "cubic" and for_ in STRAIGHT:
-                raise InputError(_POSITIONS_ALONE, source=str(plan))
             if between != "cubic" and for_ not in STRAIGHT:
                 text += f'; the verdict is on interpolation = "{between}" between the setpoints'
     _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())

@@ -76,6 +76,10 @@ def smooth_command(
         f"them arcs; within {found.within / MICROMETRE:.3g} µm of the program both ways and in order, of {share:.0%} of "
         f"{whole / MICROMETRE:.3g} µm"
     )
+    if made.arcs:
+        say(
+            "  a control may run short arcs slower than lines: planner time tells, of both files; --lines writes none"
+        )
     for why, (count, line) in made.kept.items():
         say(f"  kept as they are: {count:,} line{'s' * (count > 1)}, first line {line}: {why}")
 

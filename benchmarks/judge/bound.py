@@ -2,7 +2,7 @@
 
     python -m benchmarks.judge.bound [--jobs 500] [--first 0]            into results/least-time.json and .md
 
-The jobs of solvers/joint.py by the default method; then random jobs (jobs/random_lines.py), each planned by the closed forms and by
+The jobs of jobs/searched.py by the default method; then random jobs (jobs/random_lines.py), each planned by the closed forms and by
 `optimal` and `second-order` with effort `quick`: a motion that passes its verdict and is below its bound breaks the law.
 """
 
@@ -16,8 +16,8 @@ import numpy as np
 
 import planner
 from benchmarks.jobs import random_lines
+from benchmarks.jobs.searched import jobs
 from benchmarks.record import markdown, write_results
-from benchmarks.solvers.joint import jobs
 from planner.base.errors import InputError
 from planner.base.threads import use_threads
 from planner.machine import Machine

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 import planner
+from benchmarks.jobs.searched import jobs
 from benchmarks.record import markdown, write_results
-from benchmarks.solvers.joint import jobs
 from planner.machine import Mode
 from planner.motion.shaping import shaper_of
 

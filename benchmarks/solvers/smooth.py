@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 import planner
+from benchmarks.jobs.searched import jobs
 from benchmarks.record import markdown, write_results
-from benchmarks.solvers.joint import jobs
 
 WEIGHTS = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)
 TEXT = (

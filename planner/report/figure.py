@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints.limits import JERK
+from planner.feedrate.constraints.limits import ACCELERATION, JERK, VELOCITY
 from planner.machine import ALL_AXES, LINEAR_AXES, ROTARY_AXES
 from planner.nc.extents import coordinates_known, travel_of
 from planner.nc.program import Kind
@@ -53,7 +53,7 @@ LOW_TO_HIGH = {
 
 OF_LIMITS = (
     *("feed", JERK.called("x"), JERK.called("y"), "tolerance", JERK.called("z")),
-    *(f"{quantity}.{axis}" for quantity in ("acceleration", "velocity") for axis in LINEAR_AXES),
+    *(quantity.called(axis) for quantity in (ACCELERATION, VELOCITY) for axis in LINEAR_AXES),
 )
 LIMIT_COLOURS = dict(zip(OF_LIMITS, COLOURS, strict=True)) | {"none": GREY, "rest": LIGHT}
 
@@ -101,10 +101,8 @@ class Panel:
         return all(math.isfinite(one.limit) for one in self.series)
 
 
-CLIPPED, ROOM = (
-    3.0,
-    1.5,
-)  # rapids so many times as fast as feed moves end the axis at that multiple of the latter
+# Rapids so many times as fast as feed moves end the axis at that multiple of the latter [-].
+CLIPPED, ROOM = 3.0, 1.5
 
 
 def feed_panel(motion: MotionColumns, units: Units) -> Panel:

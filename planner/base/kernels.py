@@ -8,6 +8,7 @@ A kernel that cannot be kept, because no directory can be written or the disk is
 the next run, which takes a minute for all of them, and is nothing to fail for: one warning says so.
 """
 
+import ast
 import functools
 import hashlib
 import inspect
@@ -21,12 +22,13 @@ from typing import Any
 
 # What a compiler may do to the arithmetic of a kernel that says so: multiply and add in one instruction.
 CONTRACT = {"contract"}
+_WITH_DOCSTRING = ast.Module | ast.ClassDef | ast.FunctionDef
 _TOLD_BY_REPR = (bool, int, float, complex, str, bytes, range, type(None), type(...))
 
 
 def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
     """A digest of what the kernel of a function computes: its bytecode, settings and the values that it uses,
-    and those of every kernel that it calls."""
+    and those of every kernel that it calls; docstrings and comments compute nothing."""
     seen = {id(function)}
 
     def of(value: Any) -> str:
@@ -41,7 +43,7 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
             return value.__name__
         # one of numba's intrinsics (lanes.py): it belongs together with all of its file
         if hasattr(value, "_defn"):
-            return _text_of(value._defn.__code__.co_filename)
+            return text_of(value._defn.__code__.co_filename)
         if isinstance(value, type):
             return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
         if isinstance(value, tuple | list):
@@ -56,6 +58,8 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
 
     def of_function(function: FunctionType) -> str:
         code, known = function.__code__, function.__globals__
+        if function.__doc__ is not None and code.co_consts[0] == function.__doc__:
+            code = code.replace(co_consts=(None, *code.co_consts[1:]))
         names = sorted(_names_in(code))
         uses = [(name, of(known[name])) for name in names if name in known]
         for module in [known[name] for name in names if isinstance(known.get(name), ModuleType)]:
@@ -70,9 +74,13 @@ def content_of(function: FunctionType, settings: dict[str, Any]) -> bytes:
 
 
 @functools.cache
-def _text_of(file: str) -> str:
-    """A digest of a source file."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+def text_of(file: str) -> str:
+    """A digest of a source file without its words."""
+    tree = ast.parse(Path(file).read_bytes())
+    for node in ast.walk(tree):
+        if isinstance(node, _WITH_DOCSTRING) and ast.get_docstring(node) is not None:
+            del node.body[0]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
 def _names_in(code: CodeType) -> set[str]:

@@ -6,11 +6,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from planner.base import kernel_files
-from planner.base.kernels import Kernel, njit
+from planner.base.kernels import Kernel, njit, text_of
+from planner.base.lanes import where
 
 KERNELS = """
 from typing import NamedTuple
@@ -192,4 +194,26 @@ def test_what_a_kernel_computes_is_its_content() -> None:
     ):
         contents.add(Kernel(function, settings, cache=False).content)
     assert len(contents) == 6  # the first is the same as the one before
+    assert len({_content_with(text) for text in ("Six more.", "In other words.")}) == 1
     assert len({kernel_files.place(six.py_func, six.content, of).name for of in ("float64", "int64")}) == 2
+
+
+def _content_with(text: str) -> bytes:
+    """The content of a kernel with this docstring."""
+    defined: dict[str, Any] = {"where": where}
+    exec(f'def seven(x):\n    "{text}"\n    return where(x > 0.0, x, 7.0)', defined)
+    return Kernel(defined["seven"], {}, cache=False).content
+
+
+def test_words_in_a_file_of_intrinsics_compute_nothing(tmp_path: Path) -> None:
+    texts = (
+        '"""Of one."""\ndef f(x):\n    "Of x."\n    return x',
+        '"""Of two."""\ndef f(x):\n    "Of y."\n    return x  # yes',
+    )
+    other = '"""Of one."""\ndef f(x):\n    "Of x."\n    return -x'
+    said = set()
+    for k, text in enumerate((*texts, other)):
+        file = tmp_path / f"{k}.py"
+        file.write_text(text)
+        said.add(text_of(str(file)))
+    assert len(said) == 2

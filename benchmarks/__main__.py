@@ -64,6 +64,10 @@ def _parser() -> argparse.ArgumentParser:
     compare.set_defaults(do=_compare)
     listed = commands.add_parser("list", help="suites, ways and the other scripts, with what each is for")
     listed.set_defaults(do=_list)
+    status = commands.add_parser(
+        "status", help="how far each feature is known to be right, by the tests' marks"
+    )
+    status.set_defaults(do=_status)
     commands.add_parser("campaign", help="random jobs, judged twice (benchmarks/campaign)")
     return parser
 
@@ -114,6 +118,12 @@ def _list(options: argparse.Namespace) -> int:
 
     print(listed())
     return 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    from benchmarks.status import main as written
+
+    return written()
 
 
 def _campaign(rest: list[str]) -> int:

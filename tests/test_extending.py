@@ -23,6 +23,7 @@ def seen() -> dict:
     return made
 
 
+@pytest.mark.shows("own-limits", "sampled: the examples of the page")
 def test_limits_hold_the_motion_and_are_kept(seen):
     assert seen["clamped"].verdict.passed
     assert seen["clamped"].verdict.limits["velocity.clamp side"].ratio > 0.999
@@ -37,12 +38,14 @@ def test_limits_hold_the_motion_and_are_kept(seen):
     assert {name.partition(".")[2] for name, _ in prices.ranked()} & {"arm", "clamp side"}
 
 
+@pytest.mark.shows("own-limits", "sampled: the examples of the page")
 def test_the_corner_shape_is_used_and_passes(seen):
     assert seen["rounded"].corner == "wide"
     assert seen["rounded"].verdict.passed
     assert not seen["rounded"].corners.stands.all()
 
 
+@pytest.mark.shows("own-limits", "sampled: the examples of the page")
 def test_the_method_is_judged_like_others(seen):
     assert seen["gentle"].method == "gentle"
     assert seen["gentle"].verdict.passed

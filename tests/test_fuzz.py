@@ -31,6 +31,7 @@ def sign(x):
 """
 
 
+@pytest.mark.shows("read-refused", "sampled: mutated programs end in a program or a sentence")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_inputs_end_in_a_result_or_a_sentence(kind: str, tmp_path: Path) -> None:

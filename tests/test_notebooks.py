@@ -106,6 +106,7 @@ def test_readme_shows_the_pictures_of_the_notebooks(name: str, number: int) -> N
     assert f"({file})" in (root / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.shows("notebooks", "sampled: they run, and their assertions hold")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_it_runs_without_error_or_warning(executed: dict[str, NotebookNode | Exception], name: str) -> None:

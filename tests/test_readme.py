@@ -24,6 +24,7 @@ PAGES = {"README.md": README} | {
 COMMANDS = PAGES["docs/command-line.md"]
 
 
+@pytest.mark.shows("python", "sampled: the examples of the pages run as they stand")
 @pytest.mark.slow
 def test_the_python_example_runs_and_the_output_is_that_of_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)

@@ -81,6 +81,9 @@ def of_interest(tree: ast.AST) -> Iterator[str]:
                 yield name.split(".")[0]
 
 
+@pytest.mark.shows(
+    "trust", "sampled: sockets are errors, imports are read, damaged kernels are compiled anew"
+)
 def test_no_module_has_pickles_sockets_or_code_from_data_but_those_explained() -> None:
     found = {
         (file.relative_to(ROOT).as_posix(), name)
@@ -129,6 +132,9 @@ from planner.cli import app
 """
 
 
+@pytest.mark.shows(
+    "trust", "sampled: sockets are errors, imports are read, damaged kernels are compiled anew"
+)
 @pytest.mark.slow
 def test_plans_reports_and_verdicts_open_no_socket(tmp_path: Path) -> None:
     (tmp_path / "job.ngc").write_text("G21 G90 F3000 G64 P0.05\nG1 X10\nY5\nM2\n")

@@ -49,6 +49,7 @@ def test_both_hold_everything_that_a_plan_needs(archives: tuple[Path, Path]) -> 
     assert {"README.md", "LICENSE", "pyproject.toml"} <= names
 
 
+@pytest.mark.shows("install", "sampled: into an empty environment")
 def test_it_plans_where_nothing_else_is(archives: tuple[Path, Path], tmp_path: Path) -> None:
     """In an environment of its own, into which only the packages of this one are let. The wheel is made from the source archive."""
     venv = tmp_path / "venv"

@@ -92,6 +92,7 @@ def verdicts(folder: Path) -> dict[str, dict]:
     return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in sorted(folder.glob("*.json"))}
 
 
+@pytest.mark.shows("large", "sampled: the same plans with small sizes")
 @pytest.mark.slow
 def test_in_parts_setpoints_and_verdicts_are_the_same(usual, tmp_path):
     """To rounding: one of the jobs is two straight moves in one direction, which long motions once could not be judged on."""
@@ -115,6 +116,7 @@ def test_in_parts_setpoints_and_verdicts_are_the_same(usual, tmp_path):
             assert one.read_bytes() == other.read_bytes()
 
 
+@pytest.mark.shows("large", "sampled: the same plans with small sizes")
 @pytest.mark.slow
 def test_on_other_routes_the_same_optimum_is_found(usual, tmp_path):
     before, after = verdicts(usual), verdicts(planned(tmp_path, "routes"))

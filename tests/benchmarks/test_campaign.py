@@ -40,6 +40,7 @@ def judged(found: Plan, motion: Motion, text: str = TEXT) -> list[str]:
     return faults(motion, course(blocks_of(program, MACHINE, ("x", "y", "z"), None)))
 
 
+@pytest.mark.shows("verify", "sampled: a second judge that shares no code agrees")
 @pytest.mark.parametrize("method", ["stop", "kinematic", "second-order", "optimal"])
 def test_right_motions_have_no_fault(method: str) -> None:
     found = planned(method)
@@ -184,6 +185,7 @@ FOUND_JOBS = json.loads((Path(__file__).parent / "found_jobs.json").read_text(en
 BROKEN = [pytest.param(28770, marks=pytest.mark.xfail(strict=True, reason="reversed it is faster"))]
 
 
+@pytest.mark.shows("verify", "sampled: a second judge that shares no code agrees")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 9, 11, 15, 17, 20, *FOUND, *FOUND_LAWS, *BROKEN])
 def test_jobs_of_the_campaign_are_as_they_should_be(seed: int) -> None:

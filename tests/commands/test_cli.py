@@ -19,6 +19,7 @@ from planner.commands.terminal import show
 from planner.machine import builtin_machines, load_machine
 
 
+@pytest.mark.shows("command-line", "sampled: wrong options and files exit with their code and a sentence")
 @pytest.mark.parametrize(
     "arguments",
     [["plan"], ["plan", "x", "--method", "magic"], ["plan", "x", "--tolerance", "thin"], ["nonsense"]],
@@ -199,6 +200,7 @@ def test_names_that_are_nearly_right(job: Path) -> None:
         assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
 
 
+@pytest.mark.shows("command-line", "sampled: wrong options and files exit with their code and a sentence")
 def test_options_without_an_effect_are_refused(job: Path) -> None:
     for arguments, said in (
         (["plan", job, "--json", "--corners"], "--json prints none"),

@@ -111,6 +111,7 @@ def test_without_such_a_one_any_that_passed_and_without_any_none() -> None:
 # ------------------------------------------------------------------------------------------ rows of the command
 
 
+@pytest.mark.shows("compare", "sampled: rows say what the verdicts say")
 def test_a_row_says_what_the_verdict_says(answers: Callable[..., list[str]], job: Path) -> None:
     """The hand-made verdict: velocity.y 1.0000014 is worse than velocity.x 0.5; jerk is not limited."""
     answers()
@@ -163,6 +164,7 @@ def test_what_a_method_cannot_do_is_a_row_with_its_sentence(
     assert "optimal: no feed satisfies" in table
 
 
+@pytest.mark.shows("command-line", "sampled: wrong options and files exit with their code and a sentence")
 @pytest.mark.parametrize(
     ("fir", "stop", "code"),
     [

@@ -20,6 +20,7 @@ def all_cores():
     threads.use_threads(None)
 
 
+@pytest.mark.shows("parallel", "exact: the same bytes")
 @pytest.mark.slow
 def test_the_motion_is_the_same_on_any_number_of_threads(tmp_path, all_cores):
     job = tmp_path / "job.ngc"

@@ -28,6 +28,7 @@ def speed_sq(tol_ap, tol, acceleration, rate):
     return np.minimum(acceleration, (tol - tol_ap) / rate) * tol_ap
 
 
+@pytest.mark.shows("corner-bezier", "exact: the error budget by brute force")
 @given(tol=budgets, acceleration=accelerations, rate=rates)
 @settings(max_examples=100)
 def test_the_closed_form_is_the_brute_force_optimum(tol, acceleration, rate):

@@ -59,6 +59,7 @@ def test_retreat_times_advance_is_largest_in_the_middle_of_the_fir_corner(T1, ra
     assert_product_bound(shape, 100.0 * (T1 + T2) / 2 * share)
 
 
+@pytest.mark.shows("corner-bezier", "certified: the error's bound for every accepted pair")
 def test_the_product_bound_holds_for_every_accepted_pair():
     assert_product_bound(BezierCorner(sigma2=1.5), 1.0)
     with pytest.raises(InputError, match="sigma2 = 2"):
@@ -98,6 +99,7 @@ ARC_JOBS = {
 }
 
 
+@pytest.mark.shows("corner-bezier, corner-fir", "certified: the error's bound on arcs, in order")
 @pytest.mark.parametrize("name", ARC_JOBS)
 @pytest.mark.parametrize("kind", ["bezier", "fir"])
 def test_a_corner_on_arcs_stays_within_its_bound_in_order(name, kind):

@@ -52,6 +52,7 @@ def test_up_to_the_shorter_filter_it_is_the_polynomial_pair(theta, T1, ratio, sh
         )
 
 
+@pytest.mark.shows("corner-fir", "exact: superposed pulses by brute force")
 @pytest.mark.parametrize(
     ("T1", "T2", "Tk"),
     [(0.05, 0.03, 0.02), (0.05, 0.03, 0.045), (0.05, 0.03, 0.06), (0.05, 0.03, 0.08), (0.04, 0.04, 0.05), (0.05, 0.01, 0.03)],

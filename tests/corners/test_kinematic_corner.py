@@ -79,6 +79,7 @@ def ramp_response(t: FloatArray, T1: float, T2: float) -> FloatArray:
     return R[np.searchsorted(nodes, t)]
 
 
+@pytest.mark.shows("kinematic", "exact: one limit reached and none exceeded, the error at the vertex")
 @given(seeds)
 @settings(max_examples=40)
 def test_with_zero_entry_acceleration_one_limit_is_reached_and_none_exceeded(seed):
@@ -93,6 +94,7 @@ def test_with_zero_entry_acceleration_one_limit_is_reached_and_none_exceeded(see
     assert (T2 <= T1 * (1 + 1e-12)).all()
 
 
+@pytest.mark.shows("kinematic", "exact: one limit reached and none exceeded, the error at the vertex")
 @given(seeds)
 @settings(max_examples=40)
 def test_with_zero_entry_acceleration_the_error_is_exact(seed):
@@ -258,6 +260,7 @@ def test_with_entry_deceleration_it_is_the_polynomial_pair(theta):
     np.testing.assert_allclose(shape.by_w[:, 0, :2], x, atol=1e-13)
 
 
+@pytest.mark.shows("corner-kinematic", "certified: what the rounding uses of the tolerance")
 @given(seed=seeds, tolerance=st.floats(1e-3, 0.5))
 @settings(max_examples=15)
 def test_as_a_shape_it_stays_within_the_budget(seed, tolerance):

@@ -40,6 +40,7 @@ def axis_motion(h, position, velocity, acceleration) -> AxisMotion:
     )  # fmt: skip
 
 
+@pytest.mark.shows("tolerance", "exact: what chords miss of kinks and parabolas")
 @pytest.mark.parametrize("degrees", [30, 90, 150])
 def test_chords_cut_a_kink_by_half_a_period_s_way(degrees):
     """Both samples V dt/2 from the vertex: the chord passes it at V dt/2 cos(half the inner angle); the motion hits it."""
@@ -51,6 +52,7 @@ def test_chords_cut_a_kink_by_half_a_period_s_way(degrees):
     assert far[1] == pytest.approx(V * dt / 2 * np.cos((np.pi - theta) / 2), rel=1e-9)
 
 
+@pytest.mark.shows("tolerance", "exact: what chords miss of kinks and parabolas")
 def test_chords_leave_a_parabola_by_its_bow():
     """|q''| dt^2/8 where a sample lies on either side of the vertex, half a period away."""
     a, V, dt = 1000.0, 40.0, 0.01
@@ -149,6 +151,7 @@ def coarse(dt: float, eps: float):
     return problems.machine(dt=dt, tolerance=eps, jerk=1e5)
 
 
+@pytest.mark.shows("tolerance", "sampled: every method at every period")
 @pytest.mark.slow
 @pytest.mark.parametrize(("dt", "eps"), PERIODS)
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ def third_order(program, machine):
     return feedrate_problem(refine_for_jerk(samples, machine), machine)
 
 
+@pytest.mark.shows("solver-own", "exact: closed forms of lines")
 @pytest.mark.parametrize("length", [1e-3, 0.05, 1.0, 30.0, 500.0])
 def test_a_line_from_rest_to_rest_takes_the_closed_form(length):
     problem = third_order(problems.polyline([[0, 0], [length, 0]]), problems.machine())

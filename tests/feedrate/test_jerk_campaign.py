@@ -8,6 +8,7 @@ from benchmarks.solvers.jerk_campaign import faults, small_problem
 from planner.feedrate.jerk.solver import JerkLimited
 
 
+@pytest.mark.shows("solver-own", "sampled: the first of ten thousand random problems")
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_nasty_small_problems_are_solved(first: int) -> None:
     for seed in range(first, first + 20):

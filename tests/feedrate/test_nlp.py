@@ -42,6 +42,7 @@ def bend() -> FeedrateProblem:
     return problem_of(problems.polyline([[0, 0], [3, 0], [3.5, 2]]), problems.machine())
 
 
+@pytest.mark.shows("solver-ipopt", "exact: closed forms of lines")
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize(("length", "jerk"), [(0.2, 2e4), (0.2, 2e5), (2.0, 2e5), (100.0, 2e5), (100.0, 2e6)])
 def test_a_line_takes_the_time_of_the_closed_form(solver, length, jerk):
@@ -105,6 +106,7 @@ def test_positions_speeds_and_accelerations_join(bend):
     assert h[-1] == 0.0
 
 
+@pytest.mark.shows("solver-ipopt, solver-fatrop", "compared: with each other")
 def test_both_solvers_find_the_same_optimum(bend):
     ipopt, fatrop = (JerkLimitedNLP(solver=name).solve(bend) for name in SOLVERS)
     assert fatrop.cycle_time == pytest.approx(ipopt.cycle_time, rel=1e-4)

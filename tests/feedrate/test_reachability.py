@@ -36,6 +36,7 @@ def plan(problem: FeedrateProblem) -> FeedrateSolution:
     return solution
 
 
+@pytest.mark.shows("solver-reachability", "exact: closed forms")
 @given(length=st.floats(0.1, 1e3), v=st.floats(1.0, 1e3), a=st.floats(10.0, 1e5), turn=st.floats(0.0, 6.28))
 def test_trapezoid(length: float, v: float, a: float, turn: float) -> None:
     """From rest to rest on a line, the switching points on the grid: T = L/v + v/a, or 2 sqrt(L/a) if v is not reached."""

@@ -64,6 +64,7 @@ def difference(one: FloatArray, other: FloatArray) -> float:
     return float(np.abs(one - other).sum() / np.abs(one).sum())
 
 
+@pytest.mark.shows("solver-own", "compared: ipopt and fatrop, multipliers included")
 @pytest.mark.parametrize("name", THIRD_ORDER)
 def test_every_solver_keeps_the_limits_and_takes_about_the_same_time(name, bend, solved):
     assert constraint_ratios(bend, solved[name])[0].max() <= 1 + 1e-6
@@ -73,6 +74,7 @@ def test_every_solver_keeps_the_limits_and_takes_about_the_same_time(name, bend,
     assert (v * h + a * h**2 / 2 + j * h**3 / 6)[:-1] == pytest.approx(np.diff(bend.s), rel=1e-6)
 
 
+@pytest.mark.shows("solver-own", "compared: ipopt and fatrop, multipliers included")
 @pytest.mark.parametrize("name", ["ipopt", "fatrop"])
 def test_multipliers_of_casadi_are_those_of_the_own_kernel(name):
     """On a problem whose optima are the same: the rows of the feed between points, which differ, do not matter here."""

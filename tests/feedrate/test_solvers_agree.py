@@ -57,6 +57,9 @@ def keeps_limits(problem: FeedrateProblem, solution: FeedrateSolution) -> None:
     assert not (free[:-1] & free[1:]).any()
 
 
+@pytest.mark.shows(
+    "solver-reachability, solver-toppra", "compared: with each other, on random problems and real programs"
+)
 @pytest.mark.parametrize("seed", slow_but([0, 3, 6, 9], range(0, 40, 3)))
 def test_controllable_sets(seed: int) -> None:
     """Their upper ends; from rest to rest the lower ones are 0."""
@@ -68,6 +71,9 @@ def test_controllable_sets(seed: int) -> None:
         assert other[:, 0].max() <= 1e-9 * own.max()
 
 
+@pytest.mark.shows(
+    "solver-reachability, solver-toppra", "compared: with each other, on random problems and real programs"
+)
 @pytest.mark.parametrize("part", slow_but([0, 1], range(10)))
 def test_random_problems(part: int) -> None:
     solved = [both(random_problem(seed))[0].solved for seed in SEEDS if seed % 10 == part]
@@ -88,6 +94,9 @@ def test_programs_of_the_peers(name: str, shared_dir: Path) -> None:
     both(solve(read_program(file, problems.machine()), problems.machine(), resolution=2e-2).problem)
 
 
+@pytest.mark.shows(
+    "solver-reachability, solver-toppra", "compared: with each other, on random problems and real programs"
+)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REAL)
 def test_real_programs(name: str, shared_dir: Path) -> None:

@@ -35,6 +35,7 @@ def test_rapids_and_travel_have_no_limit_where_nothing_is_fed() -> None:
     assert path.feed == pytest.approx([np.inf, 100.0, V / 0.1])
 
 
+@pytest.mark.shows("extruder", "exact: closed forms from rest to rest")
 def test_alone_it_takes_the_shortest_time_from_rest_to_rest() -> None:
     path = laid_out("G1 X10 F60 E1\nG1 E-3 F90\nG4 P250\nG1 E3 F6000\nG1 X20 E1\n")
     slow, fast = (rest_to_rest_times(*(np.array([x]) for x in (3.0, v, A, J)))[0] for v in (1.5, V))

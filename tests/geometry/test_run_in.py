@@ -25,6 +25,7 @@ def built(cut: str, speed: float = 600.0, machine: Machine = M):
     return toolpath_from_program(parse_program(HEAD.format(speed) + cut + "\nG0 X20\nM2", machine), machine)
 
 
+@pytest.mark.shows("threads", "exact: the run-in by integration")
 @pytest.mark.parametrize("pitch", [0.25, 1.0, 2.5, 8.0])
 @pytest.mark.parametrize("end", ["Z-50", "X-30 Z-20", "X-40"])
 def test_the_run_in_is_that_of_the_jerk_limited_step(pitch: float, end: str) -> None:

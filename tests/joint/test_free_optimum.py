@@ -38,6 +38,7 @@ def begun(slower: float):
     return line(), guess_from(line(), seen, np.array([0.0, motion.end]))
 
 
+@pytest.mark.shows("tube", "exact: a line from rest to rest")
 @pytest.mark.parametrize(
     "solver", [TubeOwn(), TubeNLP(), TubeNLP(solver="fatrop")], ids=["own", "ipopt", "fatrop"]
 )

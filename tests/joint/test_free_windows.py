@@ -237,6 +237,7 @@ def test_places_on_a_line_go_never_back_and_the_farthest_is_moved_by_as_little_a
 # --- what it finds -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.shows("tube", "compared: ipopt on the same problem finds nothing more")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["corner", "arcs", "pentagon", "pushed", "turned"])
 def test_ipopt_finds_nothing_more_where_it_ends(name):

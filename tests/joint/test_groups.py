@@ -188,6 +188,7 @@ def in_lanes(asked, width):
     return solve_windows(asked, LANES)
 
 
+@pytest.mark.shows("parallel", "exact: the same bytes")
 @pytest.mark.usefixtures("small_windows")
 @pytest.mark.parametrize(
     ("threads", "width", "waiting", "seed"), [(1, 1, 1, 0), (1, 3, 3, 1), (1, 4, 32, 2), (2, 4, 8, 3)]

@@ -54,6 +54,7 @@ def formula(x, u, bound):
     return np.array(found) / 2, np.array(d), np.array([np.sqrt(w[k] @ w[k] + 1e-6) for k in (0, 2)])
 
 
+@pytest.mark.shows("normal-acceleration", "certified: rows that hold between the nodes of the search")
 @pytest.mark.parametrize("axes", [2, 3, 6])
 def test_no_row_above_0_is_enough_for_the_whole_step_and_little_more_than_needed(axes):
     rng = np.random.default_rng(axes)

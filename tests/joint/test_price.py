@@ -64,6 +64,7 @@ def searched(name: str) -> Searched:
     return found(run, first.guess.slower(1.03))  # from where the searches with other limits begin, too
 
 
+@pytest.mark.shows("prices", "exact: closed forms of one line in the search")
 @pytest.mark.parametrize("name", ["line", "long line"])
 def test_lines_have_the_prices_of_their_closed_forms(name):
     """From rest to rest: T = a/j + sqrt((a/j)^2 + 4 L/a) where velocity does not limit, T = L/v + v/a + a/j where it does."""

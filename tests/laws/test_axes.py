@@ -29,6 +29,7 @@ def planned(text: str, machine: Machine, method: str) -> Plan:
     return plan
 
 
+@pytest.mark.shows("rotary", "exact: pure rotations")
 @pytest.mark.parametrize("method", ["stop", pytest.param("optimal", marks=pytest.mark.slow)])
 def test_a_pure_rotation_takes_the_time_of_its_joint(method: str) -> None:
     """Rest to rest through an angle that reaches velocity and acceleration: angle/v + v/a + a/j, whatever the radius."""
@@ -72,6 +73,7 @@ def test_axes_that_stand_still_change_nothing(method: str) -> None:
 SHORT = "G21 F4000\nG1 X20 A40 U7\nX40 Y10 A60 B10 V3 W4\nY30 Z2 C30\n"
 
 
+@pytest.mark.shows("optimal", "sampled: closed forms and mirrored, turned, scaled jobs in up to nine axes")
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_mirrored_job_in_nine_axes_takes_the_same_time(method: str) -> None:

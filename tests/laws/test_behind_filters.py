@@ -85,6 +85,7 @@ def assert_kept(made, lengths):
     np.testing.assert_allclose(position[-1], made.toolpath.end[-1], atol=1e-6)
 
 
+@pytest.mark.shows("filters", "sampled: every method within the tolerance behind them")
 @pytest.mark.slow
 @pytest.mark.parametrize("lengths", slow_but([(0.02, 0.013)], LENGTHS), ids=str)
 @pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))

@@ -52,6 +52,7 @@ def planned(job: str, method: str) -> planner.Plan:
 METHODS = ("optimal", "second-order", "bezier", "kinematic", "fir", "fir-spline", "stop")
 
 
+@pytest.mark.shows("eq-18-20", "sampled: kept by every method, broken where a constraint is dropped")
 @pytest.mark.parametrize("job", slow_but(("pentagon", "five points"), JOBS))
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_keeps_the_laws_at_every_programmed_corner(method, job):
@@ -147,6 +148,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     assert any(fault.startswith("eq. 19") for fault in free.verdict.sentences)
 
 
+@pytest.mark.shows("eq-18-20", "sampled: kept by every method, broken where a constraint is dropped")
 def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch):
     machine = problems.machine(dt=0.008, tolerance=0.01, velocity=1000.0)
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")

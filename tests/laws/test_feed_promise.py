@@ -30,6 +30,7 @@ def test_f_is_kept_along_a_line(method):
         assert found["time"] >= least.sum() * (1 - 1e-9)
 
 
+@pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
 @pytest.mark.parametrize("seed", slow_but([2, 3], range(5)))
 def test_f_is_kept_round_corners_and_on_arcs(seed):
     """Blocks that lie inside the tolerance, reversals, arcs."""
@@ -38,6 +39,7 @@ def test_f_is_kept_round_corners_and_on_arcs(seed):
         assert outcome(found) == "passed, kept", found
 
 
+@pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5, 9))
 def test_f_is_kept_by_every_method(seed):
@@ -46,6 +48,7 @@ def test_f_is_kept_by_every_method(seed):
         assert outcome(found) == "passed, kept", found
 
 
+@pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
 @pytest.mark.slow
 def test_a_slow_block_inside_the_tolerance_takes_its_time(tmp_path):
     # 1.190 s is the sum of L/F; 1.3136 s the optimum of the machine with jerk limits on the line itself

@@ -90,6 +90,7 @@ def on_equal_axes(job: str) -> Solved:
 # --- what must not change the time ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.shows("second-order", "sampled: scaled, turned, cut, joined and reversed jobs")
 @pytest.mark.parametrize("kind", CORNERS)
 @pytest.mark.parametrize("job", ["arcs", "five points", "zigzag"])
 @pytest.mark.parametrize("factor", [1e-2, 25.4, 1e3])
@@ -108,6 +109,7 @@ def test_scaling_time_scales_the_time(job, kind, factor):
     assert other.time == pytest.approx(factor * one.time, rel=1e-6)
 
 
+@pytest.mark.shows("second-order", "sampled: scaled, turned, cut, joined and reversed jobs")
 @given(seed=seeds)
 @settings(max_examples=20)
 def test_the_way_back_takes_as_long(seed):
@@ -135,6 +137,7 @@ MIRROR = np.diag([-1.0, 1, 1])
 CYCLE = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
 
+@pytest.mark.shows("second-order", "sampled: scaled, turned, cut, joined and reversed jobs")
 @pytest.mark.parametrize(
     "matrix", [QUARTER_TURN, MIRROR, CYCLE, -np.eye(3)], ids=["turn", "mirror", "cycle", "point"]
 )
@@ -213,6 +216,7 @@ TIGHTER = {
 }
 
 
+@pytest.mark.shows("second-order", "sampled: scaled, turned, cut, joined and reversed jobs")
 @pytest.mark.parametrize("limit", list(TIGHTER))
 @pytest.mark.parametrize("job", slow_but("five points", ["arcs", "zigzag", "five points", "random"]))
 def test_a_tighter_limit_never_saves_time(job, limit):

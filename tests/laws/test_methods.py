@@ -73,6 +73,7 @@ def machine(seed: int = 0, **more) -> Machine:
     )
 
 
+@pytest.mark.shows("axis-limits", "sampled: random polylines, every method")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "method", slow_but(set(HOLDING) - {"optimal", "second-order", "fir-spline"}, HOLDING)
@@ -92,6 +93,7 @@ def test_tolerance_and_limits_hold(method, seed, axes):
         assert made.trajectory.cycle_time <= made.stop_time * (1 + NOT_SLOWER[method])
 
 
+@pytest.mark.shows("fir-plain", "sampled: what they exceed is said, and is no more than proved")
 @given(seed=seeds, axes=st.integers(2, 4))
 @settings(max_examples=15)
 def test_the_plain_pulses_exceed_no_more_than_proved(seed, axes):

@@ -20,6 +20,7 @@ KINDS = ["linear", "cubic", "hold"]
 ARC = parse_program("G21 F9000\nG1 X4\nG3 X4 Y4 I0 J2\nG1 X1\n", source="a half circle")
 
 
+@pytest.mark.shows("filters", "exact: means of the motion, by the judge and by the planner")
 @pytest.mark.parametrize("seed", slow_but([2, 3, 10, 20, 27, 29], [2, 3, 5, 10, 20, 27, 29]))
 def test_plan_file_and_other_code_agree(seed):
     """Random jobs by every method, with periods of 0.25 to 8 ms and one to three filters of 1 to 60 ms."""

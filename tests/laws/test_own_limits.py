@@ -62,6 +62,7 @@ def test_what_never_binds_changes_nothing(limit: object) -> None:
     assert TOGETHER in planned(limit).sentence
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 @pytest.mark.parametrize("limit", [Guard(), Slope(), Arm()])
 def test_what_binds_is_kept_used_and_found_together(limit: object) -> None:
     plan = planned(limit)

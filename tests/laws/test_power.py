@@ -29,6 +29,7 @@ def used(plan: Plan) -> float:
     return max(plan.verdict.limits[f"power.{letter}"].ratio for letter in "xy")
 
 
+@pytest.mark.shows("power", "exact: a straight line")
 def test_a_line_takes_as_long_as_its_drive_needs() -> None:
     """With constant power v = sqrt(2 P t): F is reached after F^2/2P on F^3/3P of the way."""
     length, feed, power = 60.0, 120.0, 0.05

@@ -24,6 +24,7 @@ def zigzag(degrees: float, length: float = 3.0, lines: int = 6):
     return np.cumsum(length * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
 
 
+@pytest.mark.shows("reversals", "sampled: the time hardly depends on the angle")
 @pytest.mark.parametrize(("less", "more"), [(174.9, 175.1), (179.99, 180.0)])
 def test_the_time_hardly_depends_on_the_angle(less, more):
     """On both sides of the angle at which fixed paths rest, and at a retrace."""

@@ -32,6 +32,7 @@ def rms_jerk(plan: planner.Plan, least: float = 0.0) -> float:
     return float(np.sqrt((seen.jerk[at] ** 2).mean()))
 
 
+@pytest.mark.shows("smoothness", "sampled: on chosen jobs")
 def test_at_the_feed_jerk_is_small_for_no_time(monkeypatch: pytest.MonkeyPatch):
     """Against a search that minds it as little as on ramps: a quarter less jerk, at less than 1e-4 of the time."""
     smooth = planned(WAVE)
@@ -56,6 +57,7 @@ def test_a_rapid_straight_up_stays_on_its_line(monkeypatch: pytest.MonkeyPatch):
     assert near.cycle_time <= free.cycle_time * (1.0 + 1e-4)
 
 
+@pytest.mark.shows("smoothness", "sampled: on chosen jobs")
 def test_smooth_trades_time_for_jerk():
     plans = [planned(RETRACT, smooth=weight) for weight in (0.0, 0.03, 0.3)]
     times, jerks = [one.cycle_time for one in plans], [rms_jerk(one) for one in plans]

@@ -50,6 +50,7 @@ def of_limit(plan: Plan) -> float:
     return plan.verdict.limits[TANGENTIAL.name].ratio
 
 
+@pytest.mark.shows("tangential", "exact: a straight line")
 @pytest.mark.parametrize("method", KEPT_BY)
 def test_a_straight_line_takes_its_closed_form(method: str) -> None:
     """L/v + v/a + a/j from rest to rest at the feed v, with a the limit and not what the axes have; without a/j at second order,
@@ -146,6 +147,7 @@ def test_it_holds_the_motion_has_a_price_and_more_of_it_saves_what_was_foretold(
     assert along_path.prices.saved[TANGENTIAL.name] > 0.0
 
 
+@pytest.mark.shows("tangential", "compared: ipopt along a path")
 @pytest.mark.slow
 @pytest.mark.parametrize("corners", [[[0, 0], [5, 0]], [[0, 0], [4, 0], [4, 4]]])
 def test_along_a_path_ipopt_finds_the_same(corners: list[list[float]]) -> None:

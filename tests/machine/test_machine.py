@@ -100,6 +100,7 @@ def test_machine_files_beyond_reason(tmp_path: Path, text: str, said: str) -> No
     assert len(told) < 1000
 
 
+@pytest.mark.shows("machine-files", "exact: every key of the template is valid and every key is in it")
 def test_every_key_of_the_template_is_valid_and_every_key_is_in_it(tmp_path: Path) -> None:
     """With all optional keys uncommented the file loads, and sets every field of the record."""
     text = re.sub(r"^# (?=\[|[\w.]+ = )", "", TEMPLATE.read_text(), flags=re.MULTILINE)
@@ -137,6 +138,7 @@ def test_built_in_products_have_the_figures_of_their_sources(name: str) -> None:
 INI = Path("/usr/share/doc/linuxcnc/examples/sample-configs/by_machine")
 
 
+@pytest.mark.shows("machine-files", "compared: LinuxCNC's own configurations, where they are installed")
 @pytest.mark.parametrize(
     ("name", "file"), [("tormach", "tormach/pcnc-1100-seriesII.ini"), ("boss", "boss/boss.ini")]
 )

@@ -28,6 +28,7 @@ def planned(text: str, machine: Machine, **how: object) -> Plan:
     return plan
 
 
+@pytest.mark.shows("extruder", "exact: closed forms from rest to rest")
 def test_a_straight_block_takes_what_the_extruder_needs_from_rest_to_rest() -> None:
     length, fed, limits = 80.0, 20.0, (5.0, 12.0, 100.0)
     plan = planned(f"G21\nM83\nG1 X{length} E{fed} F6000\n", printer(*limits), effort="quick")

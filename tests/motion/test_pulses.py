@@ -70,6 +70,7 @@ def counter(train: AxisPulses, times: FloatArray) -> FloatArray:
     return np.concatenate([[0], train.count])[np.searchsorted(train.time, times, side="right")]
 
 
+@pytest.mark.shows("pulses", "certified: less than one pulse off at every instant")
 @pytest.mark.slow
 @given(seed=st.integers(0, 10**6), steps=st.floats(0.5, 4), other=st.floats(0.5, 3))
 @settings(max_examples=40)

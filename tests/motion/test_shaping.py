@@ -22,6 +22,7 @@ def remains(shaper, mode):
     return abs((shaper.weight * np.exp(-pole * (shaper.delay - shaper.length))).sum())
 
 
+@pytest.mark.shows("shaped", "exact: nothing remains of a mode behind its shaper")
 @given(st.lists(MODES, min_size=1, max_size=3))
 def test_nothing_remains_of_any_mode(modes):
     shaper = shaper_of(tuple(modes))

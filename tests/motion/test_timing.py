@@ -188,6 +188,7 @@ def ruckigs(length: float, v: float, a: float, j: float) -> Any:
     return found
 
 
+@pytest.mark.shows("stop", "compared: ruckig's own motion from rest to rest")
 @needs_ruckig
 @given(length=st.floats(-4.0, 3.0).map(lambda e: 10.0**e), v=decades, a=decades, j=decades)
 @settings(max_examples=150)
@@ -226,6 +227,7 @@ def test_known_times():
     )  # along an axis; see methods/test_methods
 
 
+@pytest.mark.shows("stop", "compared: ruckig's own motion from rest to rest")
 @needs_ruckig
 @pytest.mark.parametrize("length", [1e-3, 0.2, 5.0, 80.0])
 def test_the_stop_law_is_ruckigs_own_motion(length):

@@ -92,6 +92,9 @@ def assert_sweeps_reach_ends(program: Program) -> None:
 needs_programs = pytest.mark.skipif(not PROGRAMS, reason=f"no folder of real programs at {SHARED}")
 
 
+@pytest.mark.shows(
+    "read-linuxcnc", "compared: LinuxCNC 2.9's rs274 on real programs, where both are installed"
+)
 @pytest.mark.slow
 @needs_oracle
 @needs_programs

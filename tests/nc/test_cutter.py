@@ -60,6 +60,7 @@ def star(rng: np.random.Generator, *, arcs: bool) -> list[str]:
     return [f"X{corner[0].real:.10f} Y{corner[0].imag:.10f}", *lines]
 
 
+@pytest.mark.shows("read-linuxcnc", "exact: positions worked out by hand, cutter compensation by geometry")
 @pytest.mark.parametrize("arcs", [False, True])
 @pytest.mark.parametrize("side", ["G41.1", "G42.1"])
 @pytest.mark.parametrize(

@@ -108,6 +108,7 @@ G_TABLE = sorted(
 )
 
 
+@pytest.mark.shows("read-refused", "sampled: all codes of all tables")
 @pytest.mark.slow
 def test_g_codes() -> None:
     words = [f"G{codes.number(code)}" for code in G_TABLE]
@@ -157,6 +158,7 @@ def m_numbers(own: Iterable[int] = ()) -> list[int]:
     return [n for n in range(1000) if n % SAMPLED == 0 or n in own or in_a_table(n)]
 
 
+@pytest.mark.shows("read-refused", "sampled: all codes of all tables")
 @pytest.mark.slow
 def test_m_codes() -> None:
     words = [f"M{n}" for n in m_numbers()]
@@ -237,6 +239,7 @@ BLOCKS = (
 )  # fmt: skip
 
 
+@pytest.mark.shows("read-refused", "sampled: all codes of all tables")
 def test_blocks_of_heidenhain() -> None:
     words = (*BLOCKS_NOTHING, *BLOCKS)
     assert doing_nothing(words, ("",), conversational, HEIDENHAIN) == set(BLOCKS_NOTHING)
@@ -295,6 +298,7 @@ SPELLED = (
 )  # fmt: skip
 
 
+@pytest.mark.shows("read-refused", "sampled: all codes of all tables")
 def test_words_of_sinumerik() -> None:
     every = {
         *tables.IDLE,

@@ -93,6 +93,7 @@ def moved(ends: np.ndarray, k: int) -> bool:
     return bool(np.abs(ends[k] - (ends[k - 1] if k else 0.0)).max() > 1e-9)
 
 
+@pytest.mark.shows("rotary", "compared: LinuxCNC's rs274 in nine axes, recorded answers")
 def test_programs_in_nine_axes_agree_with_the_recorded_answers() -> None:
     machine, read = machine_of(), 0
     for text, canon in recorded()["nine axes"]:

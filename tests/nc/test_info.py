@@ -16,6 +16,7 @@ def info(tmp_path: Path, text: str) -> ProgramInfo:
     return inspect_program(path)
 
 
+@pytest.mark.shows("info", "exact: figures worked out by hand")
 def test_figures_of_a_small_program(tmp_path: Path) -> None:
     found = info(
         tmp_path,

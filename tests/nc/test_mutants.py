@@ -22,6 +22,7 @@ def programs(shared_dir: Path) -> list[list[bytes]]:
     return load_programs(shared_dir / "nc")
 
 
+@pytest.mark.shows("read-refused", "sampled: mutated programs end in a program or a sentence")
 @pytest.mark.parametrize("first", range(0, COUNT, 100))
 def test_mutants_end_in_a_program_or_in_a_message(first: int) -> None:
     found = {end_of(seed, []) for seed in range(first, first + 100)}
@@ -29,16 +30,19 @@ def test_mutants_end_in_a_program_or_in_a_message(first: int) -> None:
     assert "refused" in found
 
 
+@pytest.mark.shows("read-refused", "sampled: mutated programs end in a program or a sentence")
 def test_some_mutants_are_read() -> None:
     """3 to 8 % of them are programs still."""
     assert "read" in {end_of(seed, []) for seed in range(200)}
 
 
+@pytest.mark.shows("read-refused", "sampled: mutated programs end in a program or a sentence")
 def test_mutants_of_real_programs(programs: list[list[bytes]]) -> None:
     for seed in range(COUNT, COUNT + 100):
         end_of(seed, programs)
 
 
+@pytest.mark.shows("read-refused", "sampled: mutated programs end in a program or a sentence")
 def test_the_same_seed_makes_the_same_mutant() -> None:
     made = [mutant(np.random.default_rng(seed), []) for seed in range(50)]
     assert made[7] == mutant(np.random.default_rng(7), [])

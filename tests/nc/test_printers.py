@@ -79,6 +79,7 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.shows("read-printers", "exact: the ends of moves in files as five slicers write them")
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_lead_where_they_should(name: str) -> None:
     text, places = PROGRAMS[name]

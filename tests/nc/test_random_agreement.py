@@ -86,6 +86,7 @@ def assert_agreed(tally: Tally, count: int) -> None:
     assert tally.early <= 1 + EARLY * count
 
 
+@pytest.mark.shows("read-linuxcnc", "compared: LinuxCNC 2.9's rs274, recorded answers to random programs")
 @pytest.mark.parametrize("kind", KINDS)
 def test_programs_agree_with_the_recorded_answers(kind: str) -> None:
     tally = Tally()

@@ -20,6 +20,7 @@ def test_there_are_fifty_of_five_slicers() -> None:
     assert (len(PRINTERS), len({printer.slicer for printer in PRINTERS.values()})) == (50, 5)
 
 
+@pytest.mark.shows("read-printers", "exact: the ends of moves in files as five slicers write them")
 @pytest.mark.parametrize("name", PRINTERS)
 def test_is_read_and_leads_where_it_should(name: str) -> None:
     printer = PRINTERS[name]

@@ -224,6 +224,7 @@ KINDS: dict[str, tuple[str, str, list[tuple[str, Places]]]] = {
 CASES = [(kind, k) for kind, (_, _, lines) in KINDS.items() for k in range(len(lines))]
 
 
+@pytest.mark.shows("read-linuxcnc", "exact: positions worked out by hand, cutter compensation by geometry")
 @pytest.mark.parametrize(("kind", "k"), CASES)
 def test_programs_of_a_kind_lead_where_they_say(kind: str, k: int) -> None:
     head, tail, lines = KINDS[kind]

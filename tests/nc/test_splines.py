@@ -40,6 +40,7 @@ def rational(points: FloatArray, weights: FloatArray, knots: FloatArray, degree:
     return value[..., :-1] / value[..., -1:]
 
 
+@pytest.mark.shows("read-splines", "exact: scipy's B-splines")
 def test_a_cubic_has_its_control_points_from_both_ends() -> None:
     program = read("G5 X5 Y2 I1 J3 P-1 Q2\nG5 X9 Y2 P0 Q1")
     assert program.kind.tolist() == [Kind.RAPID, Kind.SPLINE, Kind.SPLINE]
@@ -82,6 +83,7 @@ def with_knots(points: FloatArray, weights: FloatArray, knots: FloatArray, order
     return f"G6.2 P{order} " + "\n".join(lines)
 
 
+@pytest.mark.shows("read-splines", "exact: scipy's B-splines")
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_nurbs_with_knots_are_those_of_scipy(order: int) -> None:
     rng = np.random.default_rng(10 + order)

@@ -38,6 +38,7 @@ def found(text: str, machine: Machine) -> list[tuple[int, int, str]]:
     return [(fault.line, fault.column, fault.word) for fault in faults]
 
 
+@pytest.mark.shows("travel", "exact: boxes of lines, arcs and curves")
 def test_boxes_are_those_of_the_path() -> None:
     """Of lines, arcs of all quadrants in all planes, helices and splines, block by block: against samples of the path."""
     text = (

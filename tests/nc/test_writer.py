@@ -228,6 +228,7 @@ def test_any_program(seed: int) -> None:
     check(source, random_feeds(parse_program(source, MACHINE), rng), MACHINE)
 
 
+@pytest.mark.shows("planned-ngc", "compared: LinuxCNC's rs274 reads the same path, where it is installed")
 @pytest.mark.slow
 @needs_oracle
 def test_the_control_reads_random_programs_as_we_do(tmp_path: Path) -> None:

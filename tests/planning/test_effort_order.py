@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from benchmarks.jobs import problems
 from planner.feedrate.solution import Status
 from planner.joint.parts import FoundRun
@@ -14,6 +16,7 @@ from planner.planning.methods.registry import plan
 ZIGZAG = "G21 G90 G64 P0.05 F4000\nG1 X7\nX9 Y6\nX2 Y8\nG3 X-3 Y3 J-5\nG1 X0 Y-4\nM2\n"
 
 
+@pytest.mark.shows("effort", "sampled: on chosen jobs")
 def test_what_quick_finds_is_taken_where_shorter_steps_find_nothing(monkeypatch):
     """As where the period is so long that the chords of a motion in shorter steps leave the tolerance, and those of one in longer
     steps, with which `quick` ends, do not. Its plan on splines alone is slower."""

@@ -38,6 +38,7 @@ M2
 """
 
 
+@pytest.mark.shows("block-times", "exact: the closed form from rest to rest")
 def test_blocks_from_rest_to_rest_take_the_closed_form_s_time() -> None:
     """Within one period at each of the two joints; dwells belong to no block."""
     made = StopMethod().plan(parse_program(PROGRAM, MACHINE), MACHINE)

@@ -52,6 +52,7 @@ def test_white_black_and_grey_are_where_cie_has_them() -> None:
     assert contrast("#ffffff", "#000000") == pytest.approx(21.0)
 
 
+@pytest.mark.shows("pictures", "sampled: no peak is lost, colours are told apart")
 @pytest.mark.parametrize("seen", SEEN)
 def test_limits_and_methods_are_told_apart(seen: str) -> None:
     found = {

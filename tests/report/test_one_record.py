@@ -88,6 +88,7 @@ def terminal(plan: Plan) -> dict[str, str]:
     return {line[:wide].strip(): line[wide:].strip() for line in lines if line[:wide].strip()}
 
 
+@pytest.mark.shows("said", "sampled: twelve kinds of jobs")
 @pytest.mark.parametrize("name", slow_but(("mill", "rotary axis", "times"), KINDS))
 def test_everything_says_the_same(name: str, tmp_path: Path) -> None:
     plan = plan_of(KINDS[name], tmp_path)

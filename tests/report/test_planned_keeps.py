@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 import planner
 from planner.machine import Machine
 from planner.report.planned import planned_program
@@ -15,6 +17,7 @@ TEXT = (
 )
 
 
+@pytest.mark.shows("planned-ngc", "exact: nothing but F words changes")
 def test_nothing_but_f_words_changes() -> None:
     machine = Machine(
         name="m",

@@ -48,6 +48,7 @@ def test_a_plan_without_a_grid_has_no_band() -> None:
     assert len(profiles_figure.profiles_figure(plan, UNITS["mm"]).axes) == 1 + 2 * 2
 
 
+@pytest.mark.shows("pictures", "sampled: no peak is lost, colours are told apart")
 def test_the_envelope_keeps_every_peak() -> None:
     values = np.zeros(1_000_000)
     values[[123_456, 654_321]] = 7.0, -5.0

@@ -86,6 +86,7 @@ def leftovers(place: Path) -> list[Path]:
     return list(place.glob(".planner-*"))
 
 
+@pytest.mark.shows("output", "sampled: killed before every step")
 @pytest.mark.slow
 @linux_only
 def test_killed_before_every_step(tmp_path: Path) -> None:

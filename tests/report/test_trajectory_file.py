@@ -24,6 +24,7 @@ TRAJECTORY = make_plan().trajectory
 FIELDS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
 
+@pytest.mark.shows("files", "exact: bit by bit")
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_round_trip_is_exact(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"trajectory.{suffix}"
@@ -38,6 +39,7 @@ def test_round_trip_is_exact(tmp_path: Path, suffix: str) -> None:
         assert np.array_equal(getattr(read.trajectory, name), getattr(TRAJECTORY, name)), name
 
 
+@pytest.mark.shows("files", "exact: bit by bit")
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_every_float_survives(tmp_path: Path, suffix: str) -> None:
     """All sizes of float64 that are read, subnormal ones too, and negative zero."""

@@ -22,6 +22,7 @@ def held(text: str, on: Machine) -> dict[str, float]:
     return dict(plan.grid.ranked())
 
 
+@pytest.mark.shows("activity", "exact: closed forms")
 def test_a_straight_move_is_at_its_acceleration_then_at_its_feed() -> None:
     """Two ramps of F/a and L/F - F/a in between."""
     length, ramp = 50.0, FEED / A
@@ -32,6 +33,7 @@ def test_a_straight_move_is_at_its_acceleration_then_at_its_feed() -> None:
     assert found.get("none", 0.0) < 0.01
 
 
+@pytest.mark.shows("activity", "exact: closed forms")
 def test_limits_that_are_active_together_count_in_full_each() -> None:
     """On a diagonal both axes speed up and brake at their limits together: each for the whole of the ramps, v/a of both."""
     length, ramp = 50.0 * 2**0.5, FEED / (A * 2**0.5)
@@ -42,6 +44,7 @@ def test_limits_that_are_active_together_count_in_full_each() -> None:
     assert sum(found.values()) == pytest.approx(1.0 + share, abs=0.02)
 
 
+@pytest.mark.shows("activity", "exact: closed forms")
 def test_dwells_are_nothing_of_the_motion() -> None:
     total = 50.0 / FEED + FEED / A + 0.75
     found = held(f"G21 G1 X20 F{60 * FEED}\nG4 P0.75\nX50\n", machine())

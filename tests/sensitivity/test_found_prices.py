@@ -47,6 +47,7 @@ def foretold(setting: Setting) -> float:
     return (told.least + told.most) / 2
 
 
+@pytest.mark.shows("prices", "sampled: plans made again with that limit changed")
 @pytest.mark.parametrize("ratio", [0.98, 1.1])
 @pytest.mark.parametrize("limit", ["jerk.x", "acceleration.y"])
 def test_a_plan_with_another_limit_takes_what_was_foretold(limit, ratio):

@@ -55,11 +55,13 @@ def broken(seed: int) -> list[tuple[str, float, float]]:
     return found
 
 
+@pytest.mark.shows("bound", "certified: below every motion that passes, by every method")
 @pytest.mark.parametrize("seed", [3, 12, 22, 36])
 def test_no_motion_that_passes_is_faster(seed: int) -> None:
     assert not broken(seed)
 
 
+@pytest.mark.shows("bound", "certified: below every motion that passes, by every method")
 @pytest.mark.slow
 @pytest.mark.parametrize("first", [100, 110])
 def test_no_motion_of_more_jobs_is_faster(first: int) -> None:
@@ -83,6 +85,7 @@ def test_motions_are_near_to_it(make, machine: Machine, apart: float) -> None:
     assert plan.least_time < plan.cycle_time < (1.0 + apart) * plan.least_time
 
 
+@pytest.mark.shows("bound", "exact: where the optimum is known")
 @pytest.mark.parametrize("to", ["X0.01", "X3", "X200", "X50 F300"])
 def test_a_straight_line_takes_just_that(to: str) -> None:
     plan = planner.plan(planner.read_program(text=f"G21 F6000\nG1 {to}\nM2\n"), MILL, method="stop")

@@ -113,6 +113,7 @@ def job(request) -> Job:
     return Job(text({"lines": LINES, "arcs": ARCS}[request.param]))
 
 
+@pytest.mark.shows("prices", "sampled: plans made again with that limit changed")
 @pytest.mark.slow
 def test_axis_limits_cost_what_plans_made_again_say(job):
     priced = job.prices()
@@ -131,6 +132,7 @@ def test_the_feed_costs_what_plans_made_again_say(job):
     assert job.prices().feed == pytest.approx(slope, rel=0.05, abs=NOTHING * job.time)
 
 
+@pytest.mark.shows("prices", "sampled: plans made again with that limit changed")
 @pytest.mark.usual_sizes  # grids are thinned less, and plans made more finely
 def test_the_tolerance_costs_what_plans_made_again_say(job):
     priced, tolerance = job.prices(), job.machine.tolerance

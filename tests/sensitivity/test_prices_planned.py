@@ -38,6 +38,7 @@ def test_on_rounded_corners_what_is_found_lies_in_the_range_and_the_tolerance_is
     assert rows["tolerance"]["ratio"] == pytest.approx(1.0, abs=0.12)
 
 
+@pytest.mark.shows("prices", "sampled: plans made again with that limit changed")
 @pytest.mark.slow
 def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_splines):
     cycle_time = on_splines["cycle_time_s"]

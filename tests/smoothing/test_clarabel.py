@@ -62,6 +62,7 @@ def tight(start: float) -> Accuracy:
     return Accuracy(value=0.0, first=abs(start), last=TIGHT * abs(start), relative=0.0)
 
 
+@pytest.mark.shows("splines", "compared: Clarabel and ipopt on the same problems")
 @pytest.mark.parametrize("seed", range(6))
 def test_random_corridors_have_clarabels_optimum(seed: int) -> None:
     problem, control = random_corridor(seed, 10 + 5 * seed, 1 + seed % 4, 20 + 10 * seed)
@@ -73,6 +74,7 @@ def test_random_corridors_have_clarabels_optimum(seed: int) -> None:
     )
 
 
+@pytest.mark.shows("splines", "compared: Clarabel and ipopt on the same problems")
 @pytest.mark.slow
 @pytest.mark.parametrize("job", JOBS)
 def test_splines_of_plans_have_clarabels_optimum(job: str) -> None:

@@ -70,6 +70,7 @@ def objective(problem, c):
     return total
 
 
+@pytest.mark.shows("splines", "compared: Clarabel and ipopt on the same problems")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_same_optimum_as_ipopt(seed):
@@ -86,6 +87,7 @@ def test_same_optimum_as_ipopt(seed):
     np.testing.assert_array_equal(found.control[[0, -1]], control[[0, -1]])
 
 
+@pytest.mark.shows("splines", "compared: Clarabel and ipopt on the same problems")
 @pytest.mark.parametrize("iterations", [1, 2, 3, 5])
 def test_every_iterate_is_inside_the_corridor(iterations):
     problem, control = random_corridor(7, 20, 3, 40)

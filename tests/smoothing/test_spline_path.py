@@ -56,6 +56,7 @@ def frechet(curve, vertices):
     return reach[-1]
 
 
+@pytest.mark.shows("splines", "certified: deviation of the splines, against brute force")
 @pytest.mark.slow
 @given(seeds)
 @settings(max_examples=15)

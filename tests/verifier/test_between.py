@@ -82,6 +82,7 @@ def times(motion, seed, count=30):
     )
 
 
+@pytest.mark.shows("between", "exact: extremes of cubics")
 @pytest.mark.parametrize("seed", range(20))
 def test_extremes_between_places_are_those_of_the_motion(seed):
     motion = cubics(seed)
@@ -104,6 +105,7 @@ def test_extremes_between_places_are_those_of_the_motion(seed):
         assert np.linalg.norm(dense[0] - chord, axis=1).max() <= known[OPEN] * (1 + 1e-9)
 
 
+@pytest.mark.shows("between", "exact: extremes of cubics")
 def test_the_peak_of_a_velocity_between_two_places_is_found_exactly():
     h, jerk = 0.01, 4e4
     motion = Cubics(

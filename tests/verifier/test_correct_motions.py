@@ -25,6 +25,7 @@ from planner.verifier import verify
 M = machine()
 
 
+@pytest.mark.shows("verify", "exact: right motions have the ratios of closed forms")
 def test_line_at_the_limits_has_ratio_one():
     toolpath = Moves().line(30, feed=200).toolpath(M)
     motion = polyline([(0, 0, 0), (30, 0, 0)], feed=100)
@@ -48,6 +49,7 @@ def test_jerk_limited_line_has_jerk_ratio_one():
         assert verdict.limits[name].ratio == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.shows("normal-acceleration", "exact: on a circle, by the judge")
 def test_a_circle_has_the_normal_acceleration_and_chord_error_of_the_closed_forms():
     limited = machine(normal_acceleration=500.0)
     toolpath = Moves((10.0, 0, 0)).arc((0, 0), 2 * np.pi).toolpath(limited)
@@ -73,6 +75,7 @@ def test_helices_are_on_their_own_path(sweep, rise):
     assert [fault for fault in verdict.sentences if not fault.startswith(("end", "start", "stop"))] == []
 
 
+@pytest.mark.shows("verify", "exact: right motions have the ratios of closed forms")
 @pytest.mark.parametrize("angle", [10.0, 90.0, 150.0])
 def test_a_corner_cut_by_the_whole_budget_passes_and_is_measured(angle):
     turn = np.deg2rad(angle)

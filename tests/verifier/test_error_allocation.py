@@ -57,6 +57,7 @@ angles = st.floats(8.0, 165.0).map(np.deg2rad)
 headings = st.floats(-np.pi, np.pi)
 
 
+@pytest.mark.shows("eq-18-20", "exact: closed forms and brute force")
 @given(theta=angles, heading=headings, share=st.floats(0.05, 2.0), cut=st.floats(0.002, 0.045))
 @settings(max_examples=40)
 def test_a_circle_in_a_corner_is_measured_as_what_it_is(theta, heading, share, cut):
@@ -82,6 +83,7 @@ def test_a_circle_in_a_corner_is_measured_as_what_it_is(theta, heading, share, c
     assert bool(laws_broken(verdict)) == (found.held == 0)
 
 
+@pytest.mark.shows("eq-18-20", "exact: closed forms and brute force")
 @given(
     theta=angles, heading=headings, dt=st.floats(3e-4, 1e-2), eps=st.floats(0.003, 0.1),
     filters=st.sampled_from([(), (0.02,), (0.02, 0.013)]), normal=st.sampled_from([None, 300.0]),

@@ -48,6 +48,7 @@ def faults(plan: Plan, motion: Trajectory, mode: str) -> list[str]:
     return [fault for fault in found.sentences if "exact path" in fault]
 
 
+@pytest.mark.shows("exact-path", "sampled: verified within 1 nm of lines, arcs and curves")
 @pytest.mark.parametrize("block", range(6))
 def test_samples_beside_the_path_are_found_on_every_kind_of_block(plan: Plan, block: int) -> None:
     aside = np.array(

@@ -42,6 +42,7 @@ def test_what_was_planned_passes(plan: Plan) -> None:
     assert judged(plan, plan.trajectory.extruder) == []
 
 
+@pytest.mark.shows("extruder", "sampled: faults put into its places are found")
 def test_places_that_are_not_those_of_the_program_are_found(plan: Plan) -> None:
     assert plan.trajectory is not None
     right, t = plan.trajectory.extruder, plan.trajectory.t

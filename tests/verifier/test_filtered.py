@@ -47,6 +47,7 @@ def joined(parts):
     return (np.concatenate(column) for column in zip(*parts, strict=True))
 
 
+@pytest.mark.shows("filters", "exact: means of the motion, by the judge and by the planner")
 @pytest.mark.parametrize(("kind", "lengths"), list(product(KINDS, FILTERS)))
 @pytest.mark.parametrize("dt", [0.001, 0.005])
 def test_judge_and_planner_find_the_mean_of_the_last_delay(kind, lengths, dt):

@@ -58,6 +58,7 @@ def test_a_thread_at_its_feed_passes() -> None:
     assert not threads(judge(down(FEED), toolpath()))
 
 
+@pytest.mark.shows("threads", "sampled: motions out of step are named")
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 0.999])
 def test_a_thread_below_its_feed_falls_out_of_step(share: float) -> None:
     """At the share q of the feed the tool is (1/q - 1) l behind at the end of the stretch l, half of it about the mean."""

@@ -112,6 +112,9 @@ def largest(verdict, name) -> float:
     )
 
 
+@pytest.mark.shows(
+    "axis-limits", "exact: the speed at which the judge finds a limit used up is the planner's"
+)
 @pytest.mark.parametrize("name", ["feed", "velocity", "normal_acceleration", "acceleration", "jerk"])
 def test_the_judge_finds_the_limit_used_up_at_the_speed_of_the_planner(name):
     machine = machine_with(velocity=90.0, acceleration=300.0, jerk=4e3, normal_acceleration=250.0)

@@ -269,12 +269,14 @@ def test_the_motion_itself_passes(seed):
     assert alone.passed, alone.faults
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 @pytest.mark.parametrize("mutation", MOTIONS, ids=lambda each: each.__name__)
 def test_mutated_motions_are_found(mutation):
     missed = [seed for seed in SEEDS if passes(job := Job(seed), motion=mutation(job)).passed]
     assert missed == []
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 @pytest.mark.parametrize("given", [Given(), Given(columns=())], ids=["with columns", "positions only"])
 @pytest.mark.parametrize("mutation", SAMPLES, ids=lambda each: each.__name__)
 def test_mutated_samples_are_found(mutation, given):

@@ -58,6 +58,7 @@ def integrated(frequency: float, damping: float, end: float) -> tuple[float, flo
     return float(most), float(np.hypot(y, (speed + damping * w * y) / turn))
 
 
+@pytest.mark.shows("shaped", "sampled: an integrated oscillator under the motions")
 @pytest.mark.parametrize(("frequency", "damping"), [(7.0, 0.0), (18.0, 0.02), (45.0, 0.2), (160.0, 0.05)])
 def test_ringing_is_that_of_an_integrated_oscillator(frequency, damping):
     (found,) = ringing_of(motion(0.001), machine(Mode(frequency=frequency, damping=damping)))

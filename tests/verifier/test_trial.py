@@ -8,6 +8,7 @@ from benchmarks.judge.mutations import KINDS
 from benchmarks.judge.verifier_trial import CLOCKS, WRONG, correct_of, faults_of, jittering_of, wrong_of
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 @pytest.mark.slow
 def test_every_kind_of_fault_is_found():
     rows = faults_of(0, len(KINDS))
@@ -15,6 +16,7 @@ def test_every_kind_of_fault_is_found():
     assert [row for row in rows if not row["found"]] == []
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 @pytest.mark.parametrize("which", range(len(WRONG)), ids=lambda which: WRONG[which].__name__)
 def test_a_motion_of_another_program_is_refused_and_passes_by_its_own(which):
     rows = wrong_of(which, 2)
@@ -22,6 +24,7 @@ def test_a_motion_of_another_program_is_refused_and_passes_by_its_own(which):
     assert not any(row["own"] for row in rows)
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 def test_correct_motions_from_files_pass():
     """Those of ruckig and TOPP-RA too."""
     pytest.importorskip("ruckig")
@@ -31,6 +34,7 @@ def test_correct_motions_from_files_pass():
     assert [row for row in rows if row["answer"] != "passed"] == []
 
 
+@pytest.mark.shows("verify", "sampled: twenty kinds of proved faults at random places")
 def test_correct_motions_of_clocks_that_jitter_pass():
     pytest.importorskip("ruckig")
     pytest.importorskip("toppra")

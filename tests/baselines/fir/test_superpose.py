@@ -42,6 +42,7 @@ legs = st.lists(
 )
 
 
+@pytest.mark.shows("fir", "exact: the filtered command by brute force")
 @pytest.mark.slow
 @given(legs=legs, T1=st.floats(2e-3, 0.1), ratio=st.floats(0.05, 1.0))
 @settings(max_examples=60)

@@ -118,6 +118,7 @@ def test_reach_from_where_a_ramp_would_have_begun_backwards(share, gain, a, j):
     assert gain_max(V, (V + gain / 2) * time, a, j) == pytest.approx(gain, rel=1e-9)
 
 
+@pytest.mark.shows("kinematic", "compared: ruckig, the time of every leg")
 @needs_ruckig
 @given(seeds)
 @settings(max_examples=30)

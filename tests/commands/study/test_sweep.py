@@ -94,6 +94,7 @@ def test_a_setting_twice_and_grids_without_end() -> None:
 # ------------------------------------------------------------------------------------------ points
 
 
+@pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
 def test_a_point_is_the_plan_with_its_settings() -> None:
     """A square from stop to stop: four times as much jerk saves 1 - 4^(-1/3) of the time, as long as nothing else limits it."""
     machine = MILL.model_copy(
@@ -178,6 +179,7 @@ def test_failures_are_rows_and_the_exit_code(job: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
 @pytest.mark.slow
 def test_processes_of_this_machine_find_the_same(job: Path, tmp_path: Path) -> None:
     ranges = ("--vary", "tolerance=0.01,0.02,0.04", "--method", "stop")
@@ -228,6 +230,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]], subprocess.Pop
             process.communicate()
 
 
+@pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 def test_a_cluster_goes_on_without_a_worker_that_is_killed(

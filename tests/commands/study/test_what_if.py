@@ -134,6 +134,7 @@ def test_a_forecast_agrees_with_the_prices_it_is_made_of(worth: float, ratio: fl
     assert forecast(prices, [Setting(name="tolerance", value=1.0)], MILL, math.nan) is None
 
 
+@pytest.mark.shows("what-if", "sampled: forecasts beside plans made again")
 @pytest.mark.slow
 def test_forecasts_beside_plans_made_again() -> None:
     """On single corners a price is a number: within a fifth of what planning again saves, alone and together."""

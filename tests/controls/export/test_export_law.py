@@ -36,6 +36,10 @@ def _planned(text: str) -> Plan:
     return planner.plan(planner.read_program(text=text, machine=mill), mill, method="kinematic")
 
 
+@pytest.mark.shows(
+    "export-grbl, export-klipper, export-marlin, export-linuxcnc",
+    "sampled: random programs read back from three starts with two sets of offsets",
+)
 def test_law() -> None:
     outcomes = law(range(QUICK), 2)
     for control in CONTROLS:  # few programs, but every kind of export is among them
@@ -43,6 +47,10 @@ def test_law() -> None:
     assert {("grbl", "as it is"), ("linuxcnc", "as it is")} <= outcomes
 
 
+@pytest.mark.shows(
+    "export-grbl, export-klipper, export-marlin, export-linuxcnc",
+    "sampled: random programs read back from three starts with two sets of offsets",
+)
 @pytest.mark.slow
 def test_law_from_all_starts() -> None:
     assert law(range(10_000, 10_000 + MANY), 3)

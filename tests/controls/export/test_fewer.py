@@ -104,6 +104,9 @@ STEPS = st.lists(
 )
 
 
+@pytest.mark.shows(
+    "smooth", "certified: the distance both ways and in order, by code that shares none with the writer"
+)
 @settings(max_examples=25, deadline=None)
 @given(STEPS, st.floats(30.0, 120.0), st.booleans())
 def test_the_path_stays_within_in_order(steps: list[tuple[float, ...]], part: float, arcs: bool) -> None:
@@ -198,6 +201,7 @@ def test_numbers_units_line_ends_and_offsets(unit: tuple[str, float, int], end: 
     assert "\r" not in made.text.decode().replace("\r\n", "")
 
 
+@pytest.mark.shows("smooth", "compared: LinuxCNC's rs274 reads the arcs, where it is installed")
 @pytest.mark.skipif(
     shutil.which("rs274") is None, reason="LinuxCNC's rs274 is missing (package linuxcnc-uspace)"
 )

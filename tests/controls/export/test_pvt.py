@@ -29,6 +29,7 @@ def table(directory: Path) -> dict[str, np.ndarray]:
     return {name: read[name] for name in read.dtype.names}
 
 
+@pytest.mark.shows("export-pvt", "compared: SciPy's cubics between the rows")
 @pytest.mark.parametrize("within", [1e-4, 1e-3, 1e-2])
 def test_cubics_between_rows_stay_within_the_distance(
     tmp_path: Path, motion: Trajectory, within: float
@@ -69,6 +70,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, motion: Trajectory) -> None:
         write_table(tmp_path, motion, Table(unit="cm"))
 
 
+@pytest.mark.shows("export-pt", "exact: straight moves between rows, within the distance")
 def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajectory) -> None:
     periods, miss = write_table(tmp_path, motion, Table(kind="pt", cycle=0.004))
     read = np.genfromtxt(tmp_path / "pt.csv", delimiter=",", names=True)
@@ -82,6 +84,7 @@ def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajector
     assert max(off) == pytest.approx(miss, abs=2e-8)
 
 
+@pytest.mark.shows("export-twincat", "exact: columns of the file")
 def test_tables_of_a_time_and_a_position(tmp_path: Path, motion: Trajectory) -> None:
     _, miss = write_table(tmp_path, motion, Table(kind="twincat", within=1e-2))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["x.txt", "y.txt", "z.txt"]
@@ -92,6 +95,7 @@ def test_tables_of_a_time_and_a_position(tmp_path: Path, motion: Trajectory) -> 
     assert miss <= 1e-2
 
 
+@pytest.mark.shows("export-ros", "exact: keys and units of the message")
 def test_a_message_of_ros(tmp_path: Path, motion: Trajectory) -> None:
     _, miss = write_table(tmp_path, motion, Table(kind="joint-trajectory", joints=("one", "two", "three")))
     said = json.loads((tmp_path / "trajectory.json").read_text())

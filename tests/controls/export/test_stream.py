@@ -28,6 +28,7 @@ def motion() -> Trajectory:
     return plan.trajectory
 
 
+@pytest.mark.shows("export-stream", "exact: the rows are the setpoints")
 def test_rows_are_the_setpoints(tmp_path: Path, motion: Trajectory) -> None:
     write_stream(tmp_path, motion)
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted(FILES)
@@ -55,6 +56,7 @@ def as_ordinary_user(directory: Path) -> list[str]:
     return ["runuser", "-u", "nobody", "--", *home]
 
 
+@pytest.mark.shows("export-stream", "compared: LinuxCNC's HAL puts out every row, where it is installed")
 @pytest.mark.slow
 @pytest.mark.skipif(
     not shutil.which("halrun"), reason="LinuxCNC's HAL (package linuxcnc-uspace) is not installed"

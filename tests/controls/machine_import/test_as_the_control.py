@@ -329,6 +329,7 @@ def test_reprapfirmware_has_jumps_per_minute_and_travel(tmp_path: Path) -> None:
     assert travel(imported(tmp_path, text.replace("M208 X-5 Y0 Z0 S1\n", "M208 X-5:230\n")), "x") == (-5, 230)
 
 
+@pytest.mark.shows("import-linuxcnc", "compared: LinuxCNC's own reader of INI files, where it is installed")
 @pytest.mark.skipif(not INIVAR.exists(), reason="LinuxCNC's inivar is not installed")
 def test_linuxcnc_s_own_reader_finds_the_same(tmp_path: Path) -> None:
     """`inivar` prints the value that LinuxCNC takes; of included files it knows nothing: the script `linuxcnc` puts them in."""

@@ -99,6 +99,7 @@ def imported(tmp_path: Path, text: str, **options) -> Imported:
     return import_machine(file, **options)
 
 
+@pytest.mark.shows("import-linuxcnc", "exact: numbers and units worked out by hand")
 def test_linuxcnc_has_the_smallest_limit_of_axis_and_joints_in_mm(tmp_path: Path) -> None:
     machine = imported(tmp_path, LINUXCNC).machine
     x, y, z = (machine.axes[letter] for letter in "xyz")
@@ -111,6 +112,7 @@ def test_linuxcnc_has_the_smallest_limit_of_axis_and_joints_in_mm(tmp_path: Path
     assert machine.feed_max == pytest.approx(4 * 25.4)
 
 
+@pytest.mark.shows("import-grbl", "exact: numbers and units worked out by hand")
 def test_grbl_has_rates_per_minute(tmp_path: Path) -> None:
     found = imported(tmp_path, GRBL, ramp_time=0.02)
     x, z = found.machine.axes["x"], found.machine.axes["z"]
@@ -128,6 +130,7 @@ def test_klipper_takes_saved_settings_and_skips_macros(tmp_path: Path) -> None:
     assert [(mode.frequency, mode.damping) for mode in machine.modes] == [(57.2, 0.1), (34.0, 0.05)]
 
 
+@pytest.mark.shows("import-klipper", "exact: numbers and units worked out by hand")
 def test_klipper_takes_the_last_of_equal_settings_and_included_files(tmp_path: Path) -> None:
     (tmp_path / "limits.cfg").write_text("[printer]\nmax_accel: 700\n")
     found = imported(tmp_path, KLIPPER.replace("[mcu]", "[include lim*.cfg]\n[mcu]"))
@@ -144,6 +147,7 @@ def test_a_circle_of_included_files_ends(tmp_path: Path) -> None:
         import_machine(tmp_path / "a.cfg")
 
 
+@pytest.mark.shows("import-marlin", "exact: numbers and units worked out by hand")
 def test_marlin_has_the_smaller_of_axis_and_path_acceleration(tmp_path: Path) -> None:
     found = imported(tmp_path, MARLIN)
     axes = found.machine.axes
@@ -157,6 +161,7 @@ def test_marlin_has_the_smaller_of_axis_and_path_acceleration(tmp_path: Path) ->
     assert inches.machine.axes["x"].velocity == pytest.approx(500.0 * 25.4)
 
 
+@pytest.mark.shows("import-reprapfirmware", "exact: numbers and units worked out by hand")
 def test_reprapfirmware_has_the_same_commands_but_velocities_per_minute(tmp_path: Path) -> None:
     found = imported(tmp_path, MARLIN + "M566 X600 Y600\n")
     assert [found.machine.axes[letter].velocity for letter in "xyz"] == pytest.approx(

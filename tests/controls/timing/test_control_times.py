@@ -121,6 +121,9 @@ def test_linuxcnc_stands_between_rapids_and_feed_moves() -> None:
     assert time_of(text.format("G1"), "linuxcnc") < stops - 0.05
 
 
+@pytest.mark.shows(
+    "time-grbl, time-marlin", "sampled: random paths by block-by-block models of their buffers"
+)
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("way", ["grbl", "marlin", "jerk"])
 def test_models_agree_with_the_planners_block_by_block(way: str, seed: int) -> None:

@@ -41,6 +41,7 @@ def measured(guess: Machine, true: Machine, control: str, seed: int = 0) -> Foun
     return fitted(times, guess, control)
 
 
+@pytest.mark.shows("fit", "sampled: known settings come back from noisy times")
 @pytest.mark.parametrize("control", TIMED)
 @pytest.mark.parametrize(("scale", "seed"), [(0.7, 1), (1.4, 2)])
 def test_known_settings_come_back(control: str, scale: float, seed: int, tmp_path: Path) -> None:

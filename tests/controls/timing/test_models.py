@@ -55,6 +55,7 @@ def test_a_straight_move_is_a_trapezoid(name: str) -> None:
     assert time_of(parts, control) == pytest.approx(20 / 100 + 100 / 2000), "straight joints cost nothing"
 
 
+@pytest.mark.shows("time-klipper, time-marlin, time-grbl", "exact: closed forms of corners")
 def test_a_corner_is_passed_at_the_speed_of_its_law() -> None:
     """Two legs of 20 mm with a right angle: each side loses what braking from 100 mm/s to v and back takes."""
     points = np.array([[0, 0], [20.0, 0], [20, 20]])
@@ -230,6 +231,9 @@ def test_what_the_machine_says_of_its_control_counts_for_that_control() -> None:
     )
 
 
+@pytest.mark.shows(
+    "time-grbl, time-klipper", "compared: recorded times of their own code, on programs in ../shared"
+)
 @pytest.mark.parametrize("job", PEERS)
 def test_predictions_are_near_the_controls_own_code(job: str) -> None:
     file = SHARED / "peers" / "programs" / f"{job}.ngc"

@@ -75,11 +75,13 @@ def grid_and_problem(program, machine):
     return before, after, feedrate_problem(after, machine)
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 def test_every_solver_has_its_test():
     assert {OWN, *CLOSE} == set(THIRD_ORDER)
     assert {REACHABILITY, "toppra"} == set(SECOND_ORDER)
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSE)
 def test_solvers_with_jerk_limits_keep_them_in_the_same_time(name, program):
@@ -91,6 +93,7 @@ def test_solvers_with_jerk_limits_keep_them_in_the_same_time(name, program):
             assert other.prices.limits[limit] == pytest.approx(price, rel=0.05)
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 def test_solvers_without_jerk_limits_find_the_same_time(program):
     times = [
         planned(program, [Jump(), Arm()], method="second-order", solver=name).trajectory.cycle_time
@@ -99,6 +102,7 @@ def test_solvers_without_jerk_limits_find_the_same_time(program):
     assert times[1] == pytest.approx(times[0], rel=1e-9)
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 @pytest.mark.slow
 def test_a_solver_of_ones_own_gives_a_motion_with_exact_kinematics(program):
     """On intervals of a um, too, where the tolerance of ipopt would show as jerk."""
@@ -117,6 +121,7 @@ def test_a_solver_of_ones_own_gives_a_motion_with_exact_kinematics(program):
     assert constraint_ratios(problem, found)[0].max() <= 1.0 + 1e-12
 
 
+@pytest.mark.shows("own-limits", "sampled: kept, reached, judged, by all solvers")
 def test_points_beside_a_jump_are_not_nearer_than_rounding_tells_apart(program):
     before, after, _ = grid_and_problem(program, MILL.with_own([Jump()]))
     shortest = [np.diff(samples.s)[samples.intervals].min() for samples in (before, after)]

@@ -29,6 +29,7 @@ def motion(axes: int, count: int = 30) -> np.ndarray:
     return rng.normal(size=(4, count, axes)) * size
 
 
+@pytest.mark.shows("tool-point", "exact: derivatives by casadi, circles by the table alone")
 @pytest.mark.parametrize("data", CHAINS, ids=lambda data: data["type"])
 def test_derivatives_are_those_of_casadi(data: dict) -> None:
     """Casadi differentiates q(p(t)) three times by t; both come from the same closed form, by different rules."""

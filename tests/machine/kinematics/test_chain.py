@@ -47,6 +47,7 @@ def table(found: Chain, place: dict[str, np.ndarray]) -> np.ndarray:
     return np.stack([place[letter] for letter in found.axes], axis=1)
 
 
+@pytest.mark.shows("tool-point", "compared: LinuxCNC's kinematics, where they are installed")
 @pytest.mark.parametrize("name", ["xyzac-trt", "xyzbc-trt", "head-head b"])
 def test_joints_are_those_of_linuxcnc(name: str, tmp_path: Path) -> None:
     """Its component in a process of its own: 5axiskins is head-head with b reversed, its pivot and tool in one length."""

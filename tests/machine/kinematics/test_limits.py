@@ -54,6 +54,7 @@ def test_a_point_on_the_axis_of_the_table_turns_at_the_joint_limit() -> None:
     )
 
 
+@pytest.mark.shows("tool-point", "exact: derivatives by casadi, circles by the table alone")
 @pytest.mark.slow
 def test_a_circle_at_the_tip_by_the_table_alone_takes_the_time_of_its_axis() -> None:
     """Points of a circle about the axis, the tool turning with them: the linear joints stay where they are but for the chords."""

@@ -24,6 +24,7 @@ from planner.nc.text import program_text
 MACHINE = load_machine("plotter")
 
 
+@pytest.mark.shows("read-plotters", "exact: one drawing in several dialects is one path")
 @pytest.mark.slow
 @given(strokes=drawings, dialect=dialect)
 @settings(max_examples=80)

@@ -23,6 +23,7 @@ def plan() -> planner.Plan:
     return planner.plan(parse_program(TEXT, MACHINE), MACHINE, method="second-order").require()
 
 
+@pytest.mark.shows("tool-point", "sampled: planned at the tip, judged in the joints")
 @pytest.mark.slow
 def test_planned_at_the_tip_and_judged_in_the_joints(plan: planner.Plan) -> None:
     assert plan.verdict is not None

@@ -27,6 +27,7 @@ def counted(*lines: str, times: Times | None = None) -> dict[str, tuple[int, flo
     return {it.what: (it.count, it.each) for it in beside_motion(program(*lines), machine)}
 
 
+@pytest.mark.shows("beside", "exact: counted by hand, and a spindle followed step by step")
 def test_counted_by_hand() -> None:
     lines = (
         "T1 M6",
@@ -59,6 +60,7 @@ def test_counted_by_hand() -> None:
     assert counted("M0", "M1", times=Times(m_codes={"M0": 30.0})) == {"M0": (1, 30.0), "M1": (1, None)}
 
 
+@pytest.mark.shows("beside", "exact: counted by hand, and a spindle followed step by step")
 @pytest.mark.parametrize("seed", range(20))
 def test_a_spindle_followed_step_by_step(seed: int) -> None:
     codes = np.random.default_rng(seed).choice([3, 4, 5, 6, 8], 40)

@@ -26,6 +26,7 @@ def notes(text: str, **tool: float) -> list[str]:
 PROGRAM = "G21 G90 G94\nT3 M6\nS10000 M3\nG0 X1\nG1 X10 F2000\nX20 F2400\nT4\nX30\nM6\nG1 X40 F9000\n"
 
 
+@pytest.mark.shows("cutting", "exact: worked out by hand")
 def test_feed_per_tooth_is_f_over_s_and_flutes() -> None:
     assert notes(PROGRAM, flutes=2, feed_per_tooth_max=0.12) == []
     (said,) = notes(PROGRAM, flutes=2, feed_per_tooth_max=0.11)

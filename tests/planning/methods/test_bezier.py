@@ -69,6 +69,7 @@ def run_through(made, corner: BezierCorner | None = None):
     return line, made.corners.theta[run], made.corners.feed_planned[run], path.d[line], path.tol_ap[line]
 
 
+@pytest.mark.shows("bezier", "exact: corner speeds of eq. 19 and 20")
 @pytest.mark.parametrize("sigma2", [1.0, 0.9])
 def test_corners_have_the_speed_of_equations_19_and_20(sigma2):
     """eps_ch = A Ts^2/8 = 0.02, eps_ap = 0.03. With eq. (16) as printed, d = 4 eps cos, the first corner would be 1.6 times as slow."""
@@ -172,6 +173,7 @@ def test_a_corner_is_run_through_only_where_that_is_faster():
     assert shallow.trajectory.cycle_time < 0.95 * shallow.stop_time
 
 
+@pytest.mark.shows("bezier", "sampled: random paths verified, never slower than stopping")
 @given(seed=st.integers(0, 10**6), dims=st.integers(2, 3))
 @settings(max_examples=12)
 def test_random_paths_are_verified_and_never_slower_than_stopping(seed, dims):

@@ -27,6 +27,7 @@ def fir(program, machine=MACHINE):
     return made
 
 
+@pytest.mark.shows("fir", "sampled: verified on the shared jobs")
 @pytest.mark.parametrize("name", sorted(JOBS))
 def test_jobs_are_verified(name):
     made = fir(JOBS[name])
@@ -60,6 +61,7 @@ def test_the_papers_pentagon():
     assert whole.verdict.vertex_error_mm == pytest.approx(0.1, rel=2e-3)
 
 
+@pytest.mark.shows("fir-plain", "sampled: what they exceed is said, and is no more than proved")
 def test_the_plain_mode_says_what_it_exceeds():
     """At 72 degrees the axis acceleration of an overlap goes up to 1.18 of V/T1; the safe mode pays for it with 2 % of the time."""
     plain, safe = FirMethod(plain=True).plan(JOBS["pentagon"], MACHINE), fir(JOBS["pentagon"])

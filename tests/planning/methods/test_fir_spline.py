@@ -43,6 +43,7 @@ def guide_on(curve: Nurbs, machine: Machine, feed: float = 100.0) -> ChordGuide:
 radii, shares = st.floats(0.1, 100.0), st.floats(0.05, 1.0)
 
 
+@pytest.mark.shows("fir-spline", "exact: the filtered error on a circle")
 @given(rho=radii, lag=st.floats(0.01, 3.0), T1=st.floats(0.005, 0.1), ratio=shares)
 def test_the_error_on_a_circle_is_exact(rho, lag, T1, ratio):
     """rho [1 - sinc sinc]; docs/papers.md 001: simulation = formula."""

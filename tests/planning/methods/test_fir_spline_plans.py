@@ -21,6 +21,7 @@ MACHINE = problems.machine()
 T1, T2 = 0.05, 0.03  # the papers' filters
 
 
+@pytest.mark.shows("fir-spline", "sampled: random curves within tolerance and limits")
 @pytest.mark.slow
 @given(seed=st.integers(0, 10**6), axes=st.integers(2, 3), tolerance=st.floats(-2.5, -0.7))
 @settings(max_examples=12)
@@ -118,6 +119,7 @@ def test_the_plain_filters_are_those_of_paragraph_19():
     assert made.sentence == "filters of 60 to 60 ms in all"
 
 
+@pytest.mark.shows("fir-spline-plain", "exact: the filters and speed of the paper")
 def test_the_plain_speed_on_a_weak_machine_is_v_acc():
     """sqrt(a rho) where everything else allows more; the setpoints run at it, less what the filters cut off."""
     machine = problems.machine(acceleration=100.0, jerk=1e8, tolerance=5.0)

@@ -79,6 +79,7 @@ def test_times_of_the_shared_jobs():
     assert times == pytest.approx({"pentagon": 1.0238, "zigzag": 2.8645, "circle": 1.7143}, abs=2e-4)
 
 
+@pytest.mark.shows("kinematic", "sampled: random paths verified, never slower than stopping")
 @pytest.mark.slow
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=20)

@@ -32,6 +32,9 @@ OVER_BOUND = {
 }  # fmt: skip
 
 
+@pytest.mark.shows(
+    "optimal", "sampled: between the bound and a stop at every block, verified, on the shared jobs"
+)
 @pytest.mark.parametrize("corner", ["bezier", "fir"])
 @pytest.mark.parametrize("name", slow_but(("pentagon", "five points"), JOBS))
 def test_jobs_are_verified_with_their_jerk_limited(name, corner):

@@ -30,6 +30,7 @@ def test_the_pentagon_takes_what_the_papers_setting_gives():
     )
 
 
+@pytest.mark.shows("stop", "exact: the closed form of every block")
 def test_the_plan_is_verified_and_as_long_as_the_closed_form(planned):
     assert planned.require().verdict.passed, planned.verdict.faults
     assert planned.trajectory.cycle_time == pytest.approx(planned.stop_time, rel=1e-6)

@@ -90,6 +90,7 @@ def test_something_is_at_its_limit_all_the_time():
     assert np.mean(ratio > 0.98) > 0.9
 
 
+@pytest.mark.shows("tube", "sampled: scaled, turned and backward jobs take the same time")
 @pytest.mark.slow
 def test_scaled_lengths_and_limits_take_the_same_time():
     k = 7.0
@@ -100,6 +101,7 @@ def test_scaled_lengths_and_limits_take_the_same_time():
     )
 
 
+@pytest.mark.shows("tube", "sampled: scaled, turned and backward jobs take the same time")
 @pytest.mark.slow
 def test_turned_by_a_right_angle_takes_the_same_time():
     made = verified(corner(90, first=90.0))

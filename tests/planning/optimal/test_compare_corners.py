@@ -67,6 +67,7 @@ def shaped(program):
     return rounded, spline_shape(rounded, MACHINE)
 
 
+@pytest.mark.shows("optimal", "sampled: never slower than single corners")
 @pytest.mark.parametrize("name", slow_but("five points", JOBS))
 def test_auto_is_never_slower_than_single_corners(name):
     auto = OptimalMethod().plan(JOBS[name], MACHINE)

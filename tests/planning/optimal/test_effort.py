@@ -22,6 +22,7 @@ def test_every_name_has_an_effort_and_more_points_a_coarser_grid():
         assert grids == sorted(grids)
 
 
+@pytest.mark.shows("effort", "sampled: on chosen jobs")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "program", [problems.zigzag(20), problems.star_spiral(40)], ids=lambda own: own.source

@@ -44,6 +44,7 @@ def feed_at(plan: Plan, place: FloatArray) -> float:
     return float(plan.trajectory.feed[near].min())
 
 
+@pytest.mark.shows("exact-path", "sampled: verified within 1 nm of lines, arcs and curves")
 def test_optimal_follows_it_and_stops_where_the_curvature_jumps() -> None:
     exact, rounded = (planned(TEXT.format(mode=mode), "optimal", effort="quick") for mode in ("G61", "G64"))
     assert off(exact).max() < 1e-9

@@ -15,12 +15,14 @@ WITHIN, KNOWN = 1e-4, 2e-5
 SEEDS = (1, 2, 3)
 
 
+@pytest.mark.shows("optimal", "exact: cycle times of jobs whose optimum is known, to 1e-4")
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("sort", [sort for sort, _ in SORTS], ids=lambda sort: sort.__name__)
 def test_optimal_takes_the_time_that_is_known(sort, seed):
     assert -KNOWN < above(job(sort, seed)) < WITHIN
 
 
+@pytest.mark.shows("reversals", "exact: jobs that turn back whose optimum is known")
 @pytest.mark.parametrize("seed", [144, 539, 591])
 def test_windows_that_ran_round_and_round_end(seed):
     """Steps that are shortened again and again for what they bend."""

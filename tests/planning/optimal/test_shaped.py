@@ -26,6 +26,7 @@ def pentagon():
     return problems.all_jobs()["pentagon"]
 
 
+@pytest.mark.shows("shaped", "sampled: an integrated oscillator under the motions")
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["optimal", "second-order"])
 def test_pentagon_does_not_ring_and_is_faster_than_filters(pentagon, method):

@@ -31,6 +31,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return page
 
 
+@pytest.mark.shows("report", "sampled: columns against the plan, distances by another formula")
 @pytest.mark.usual_sizes
 def test_columns_are_the_motions_of_the_methods(file: Path) -> None:
     page = file.read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ def plan() -> Plan:
     return planner.plan(planner.path(SQUARE, feed=50.0), "mill", method="kinematic")
 
 
+@pytest.mark.shows("python", "exact: points are the program that the same text gives")
 def test_points_are_the_program_that_the_same_text_gives(plan: Plan) -> None:
     text = "G21 G90 F3000\nG1 X20 Y0\nX20 Y20\nX0 Y20\nX0 Y0\n"
     read = planner.read_program(text=text)

@@ -110,6 +110,7 @@ METRIC = (
 )
 
 
+@pytest.mark.shows("read-fanuc, read-haas", "exact: the same moves written out")
 @pytest.mark.parametrize("unit", ["G21", "G20"])
 @pytest.mark.parametrize("name", CASES)
 def test_as_written_out(name: str, unit: str) -> None:

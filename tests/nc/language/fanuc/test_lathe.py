@@ -105,6 +105,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.shows("read-lathes", "exact: the same moves written out")
 @pytest.mark.parametrize("name", CASES)
 def test_lathe_words_and_cycles(name: str) -> None:
     text, out = CASES[name]
@@ -238,6 +239,10 @@ def test_blocks_of_a_cycle_say_where_they_come_from() -> None:
     assert dict(program.expansion.calls) == {"profile N10 to N20": 2}
 
 
+@pytest.mark.shows(
+    "read-fanuc",
+    "compared: LinuxCNC's rs274 reads the flat programs of lathes the same, where it is installed",
+)
 @needs_oracle
 def test_linuxcnc_reads_the_flat_program(tmp_path: Path) -> None:
     source = (

@@ -44,6 +44,7 @@ FANUC = {
 }  # fmt: skip
 
 
+@pytest.mark.shows("read-fanuc", "exact: the same moves written out")
 @pytest.mark.parametrize("name", FANUC)
 def test_macros_move_as_their_written_form(name: str) -> None:
     macro, plain = FANUC[name]

@@ -116,6 +116,7 @@ def program(seed: int) -> str:
     return "\n".join([*head, *lines, "M30", ""]) + SUBPROGRAMS
 
 
+@pytest.mark.shows("read-fanuc", "sampled: random programs by a second reading that shares no code")
 @pytest.mark.parametrize("seed", range(60))
 def test_both_readings_move_alike(seed: int) -> None:
     text = program(seed)

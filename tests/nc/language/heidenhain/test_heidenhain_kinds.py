@@ -65,6 +65,7 @@ PLACES: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.shows("read-heidenhain", "exact: positions worked out by hand or by geometry")
 @pytest.mark.parametrize("kind", PLACES)
 def test_programs_of_each_kind_come_to_their_places(kind: str) -> None:
     body, places = PLACES[kind]

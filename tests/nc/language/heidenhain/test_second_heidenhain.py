@@ -119,6 +119,7 @@ def program(seed: int) -> str:
     return "\n".join([f"0 BEGIN PGM T {unit}", *numbered, f"{len(body) + 1} END PGM T {unit}", ""])
 
 
+@pytest.mark.shows("read-heidenhain", "sampled: random programs by a second reading that shares no code")
 @pytest.mark.parametrize("seed", range(60))
 def test_both_readings_move_alike(seed: int) -> None:
     text = program(seed)

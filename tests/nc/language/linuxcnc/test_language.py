@@ -125,6 +125,7 @@ def agreeing_blocks(texts: list[str], answers: list[Canon]) -> int:
     return blocks
 
 
+@pytest.mark.shows("read-linuxcnc", "compared: LinuxCNC 2.9's rs274, recorded answers to random programs")
 def test_programs_that_compute_agree_with_the_recorded_answers() -> None:
     assert agreeing_blocks(*map(list, zip(*recorded()["language"], strict=True))) > 150
 
@@ -140,6 +141,7 @@ def test_random_programs_agree(tmp_path: Path) -> None:
 # --- against programs written out -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.shows("expand", "exact: the flat program moves as the one with loops")
 @pytest.mark.parametrize("seed", range(12))
 def test_the_flat_program_moves_as_the_one_with_loops(seed: int) -> None:
     text = Generator(np.random.default_rng(100 + seed)).text()

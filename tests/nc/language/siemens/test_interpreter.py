@@ -13,6 +13,8 @@ import json
 import random
 from pathlib import Path
 
+import pytest
+
 ANSWERS = Path(__file__).with_name("interpreter_answers.json.gz")
 COUNT = 150
 SINGLE = 2e-5  # of single precision, at values below 100
@@ -59,6 +61,9 @@ def places(rows: list[list[float | None]]) -> list[list[float]]:
     return found
 
 
+@pytest.mark.shows(
+    "read-siemens", "compared: nc-gcode-interpreter 0.1.9, recorded answers to random programs"
+)
 def test_another_interpreter_comes_to_the_same_places() -> None:
     import numpy as np
 

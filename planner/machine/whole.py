@@ -43,6 +43,7 @@ EXTRUDER = "e"  # follows the path, and is no axis of it
 TOOL_DIGITS = 9  # of a tool number: more do not fit the 32 bits of a control
 _FURTHER_OFFSET = re.compile(r"g54\.1p([1-9]|[1-9]\d|[12]\d\d|300)")  # G54.1 P1 to P300
 _MACRO_OF, _MACRO = re.compile(r"M[1-9]\d{0,3}|M0"), re.compile(r"[A-Za-z_]\w*(\.\d)?")
+_COMMAND = re.compile(r"[A-Za-z_]\w*(\.\d+)?", re.ASCII)
 WORK_OFFSETS = ("g54", "g55", "g56", "g57", "g58", "g59", "g59.1", "g59.2", "g59.3")
 
 
@@ -68,6 +69,7 @@ class Machine(Record):
                           that is worth the tolerance
     macros              : what the control does for an M code or T: the name of its macro, by the code ("M6"),
                           for exports
+    gcode_macros        : lines that Klipper runs for a command of that name
     kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not
                           known
     control             : what is set in the control's own planner, or None: its defaults
@@ -95,6 +97,7 @@ class Machine(Record):
     control: ControlData | None = None
     tools: dict[str, ToolData] = Field(default_factory=dict)
     macros: dict[str, str] = Field(default_factory=dict)
+    gcode_macros: dict[str, str] = Field(default_factory=dict)
     positions: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     work_offsets: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     _own: tuple[OwnLimit, ...] = PrivateAttr(default=())
@@ -144,6 +147,14 @@ class Machine(Record):
         if not isinstance(tools, dict):
             return tools
         return {n: {"length": t} if isinstance(t, int | float | str) else t for n, t in tools.items()}
+
+    @field_validator("gcode_macros")
+    @classmethod
+    def _commands(cls, macros: dict[str, str]) -> dict[str, str]:
+        for name in macros:
+            if not _COMMAND.fullmatch(name):
+                raise ValueError(f"'{name}' is no command of Klipper; write e.g. PRINT_START")
+        return {name.upper(): lines for name, lines in macros.items()}
 
     @model_validator(mode="after")
     def _names_known(self) -> Machine:

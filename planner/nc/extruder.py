@@ -50,20 +50,20 @@ _WITH_MOVES = np.array([0, 10, 20, 30, 50, 170, 180, 190, 200, 210, 640, 900, 91
 
 
 class Retraction(NamedTuple):
-    """From a line on: the length that G10 takes back, what G11 adds to it [mm], and their speeds [mm/s]."""
+    """From a row on: the length that G10 takes back, what G11 adds to it [mm], and their speeds [mm/s]."""
 
-    line: int = 0
+    row: int = 0
     length: float = 0.0
     speed: float = PRINTER_FEED
     extra: float = 0.0
     speed_forward: float = 0.0
 
-    def changed(self, name: str, given: Mapping[str, float], line: int) -> Retraction:
+    def changed(self, name: str, given: Mapping[str, float], row: int) -> Retraction:
         """As a command of `RETRACTIONS` changes it."""
         per = 1.0 if name == SET_RETRACTION else SECONDS_PER_MINUTE
         found = {of: given[key] for key, of in _KEYS[name].items() if given.get(key, -1.0) >= 0.0}
         speeds = {of: value / per for of, value in found.items() if of.startswith("speed")}
-        return self._replace(line=line, **found | speeds)
+        return self._replace(row=row, **found | speeds)
 
 
 class _Fed(NamedTuple):
@@ -75,6 +75,7 @@ class _Fed(NamedTuple):
 
 def with_extruder(
     program: Program,
+    row: Array,
     words: Words,
     rows: int,
     factors: Sequence[tuple[int, float]] = (),
@@ -85,18 +86,19 @@ def with_extruder(
     InputError for an E word beside more than one move or beside another G code, and for one alone before the
     first F word.
 
+    row     : (B,) that each block comes from
     words   : of the program; of these the first `rows` rows
-    factors : by which F counts from a line on (M220)
-    states  : line, name, and whether it is brought back, of the states that are kept (saved_states.py)
-    retractions : how G10 and G11 feed from a line on
+    factors : by which F counts from a row on (M220)
+    states  : row, name, and whether it is brought back, of the states that are kept (saved_states.py)
+    retractions : how G10 and G11 feed from a row on
     """
     state = np.zeros(rows, dtype=np.int64)
     names = list(dict.fromkeys(name for _, name, _ in states))
     for of, name, back in states:
-        state[words.line[:rows] == of] = (1 + names.index(name)) * (-1 if back else 1)
+        state[of] = (1 + names.index(name)) * (-1 if back else 1)
     fed = _Fed(*_fed(words.letter, words.value, words.first[: rows + 1], _WITH_MOVES, state))
-    of_line, factor = zip((0, 1.0), *factors, strict=True)
-    fed.feed[:] *= np.array(factor)[np.searchsorted(of_line, words.line[:rows], side="right") - 1]
+    of_row, factor = zip((0, 1.0), *factors, strict=True)
+    fed.feed[:] *= np.array(factor)[np.searchsorted(of_row, np.arange(rows), side="right") - 1]
     _retract(fed, words, rows, retractions)
     if not fed.amount.any():
         return program
@@ -104,7 +106,7 @@ def with_extruder(
     line, unknown = words.line[given], np.isnan(fed.amount[given])
     _refuse_any(program, line[unknown], "an E word beside a G code that is none of G0 to G3, G5 and G92")
     of_moves = np.flatnonzero(np.isin(program.kind, MOVES))
-    first, last = (np.searchsorted(program.line[of_moves], line, side=side) for side in ("left", "right"))
+    first, last = (np.searchsorted(row[of_moves], given, side=side) for side in ("left", "right"))
     alone, several = last == first, last - first > 1
     text = "an E word beside more than one move; write G0 to G3 alone on its line"
     _refuse_any(program, line[several], text)
@@ -112,16 +114,16 @@ def with_extruder(
     _refuse_any(program, line[without], "an E word alone before the first F word; write its feed")
     extruded = np.zeros(len(program))
     extruded[of_moves[first[~alone]]] = fed.amount[given[~alone]]
-    at = np.searchsorted(program.line, line[alone], side="right")
+    at = np.searchsorted(row, given[alone], side="right")
     return _with_stops(program, extruded, at, line[alone], _Fed(*(c[given[alone]] for c in fed)))
 
 
 def _retract(fed: _Fed, words: Words, rows: int, retractions: Sequence[Retraction]) -> None:
     """Put what G10 and G11 feed into the rows: of two that are the same in turn the first."""
-    back, of_line = 0.0, [of.line for of in retractions]
+    back, of_row = 0.0, [of.row for of in retractions]
     for row in words.rows_with(words.find("G", 10.0, 11.0)) if retractions else ():
         letter, value = words.of_rows(row)
-        known = bisect_right(of_line, int(words.line[row])) - 1
+        known = bisect_right(of_row, row) - 1
         if row >= rows or known < 0 or np.isin(letter, [ord("L"), ord("P")]).any():
             continue
         of, forward = retractions[known], bool((value[letter == _G] == 11.0).any())

@@ -142,7 +142,7 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     else:
         if name in settings.RETRACTIONS and (found.extended or "s" in given):
             before = ignored.retractions[-1] if ignored.retractions else Retraction()
-            now = before.changed(name, given, block.line)
+            now = before.changed(name, given, row)
             ignored.retractions += [now] * (now.length > 0.0)
             if given.get("z"):
                 ignored.count(settings.SCALE_M, name, block.line)

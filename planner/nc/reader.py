@@ -9,6 +9,8 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine, load_machine
@@ -18,10 +20,11 @@ from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import detect
 from planner.nc.lexer import Words, split_words, text_alone
+from planner.nc.macros import Called, written_out
 from planner.nc.points import are_points, read_points
 from planner.nc.printer import is_printer
-from planner.nc.program import Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, LATHE, SIEMENS, Reading
+from planner.nc.program import Expansion, Program
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, KLIPPER, LATHE, SIEMENS, Reading
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
@@ -131,12 +134,17 @@ def execute(
         data, leader = detect.without_leader(data, reading)
         if leader:
             interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
-    words = split_words(data, block_delete=reading.block_delete)
+    called = None
+    if machine is not None and machine.gcode_macros and language != SIEMENS and not reading.strict:
+        called = written_out(data, machine.gcode_macros, reading.ignore)
+    words = split_words(data if called is None else called.data, block_delete=reading.block_delete)
+    if called is not None:
+        words = dataclasses.replace(words, line=called.line[words.line - 1], files=called.files)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     mark = detect.siemens_mark(words, source) if reading.dialect == AUTO else ""
     language = SIEMENS if mark else language
-    prints = language != SIEMENS and not reading.strict and is_printer(words)
+    prints = called is not None or (language != SIEMENS and not reading.strict and is_printer(words))
     if prints:
         interpreter.ignored.read_printer()
     dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
@@ -161,13 +169,36 @@ def execute(
             why = f"{faults[0].message} (read as a Sinumerik's because of {mark}; --dialect says otherwise)"
             faults = [dataclasses.replace(faults[0], message=why), *faults[1:]]
         return interpreter, program, faults
+    # of printers, whose lines make several blocks in macros: the row that a block comes from
+    words = dataclasses.replace(words, frame=np.arange(len(words.line), dtype=np.int32))
     interpreter.execute(interpreter.in_seconds(words))
     interpreter.note_what_follows(words)
     program, faults = interpreter.program(), interpreter.faults()
     if interpreter.ignored.follows and not len(faults):
-        of_lines = interpreter.limits.factors, interpreter.saved.marks, interpreter.ignored.retractions
-        program = with_extruder(program, words, interpreter.rows_read, *of_lines)
-    return interpreter, program, faults
+        of_rows = interpreter.limits.factors, interpreter.saved.marks, interpreter.ignored.retractions
+        row = interpreter.table.block.frame[: interpreter.table.blocks]
+        if len(row) != len(program):  # the tool centre point has divided rapids
+            row = np.searchsorted(words.line, program.line)
+        program = with_extruder(program, row, words, interpreter.rows_read, *of_rows)
+    return (
+        (interpreter, program, faults)
+        if called is None
+        else (interpreter, *_of_macros(called, program, faults))
+    )
+
+
+def _of_macros(called: Called, program: Program, faults: Sequence[Fault]) -> tuple[Program, Sequence[Fault]]:
+    """A program with macros written out, and its faults with the calls that led to them."""
+    faults = [
+        dataclasses.replace(f, source="", column=1, message=f"{f.message} (in the macro {f.source})")
+        if f.source
+        else f
+        for f in faults
+    ]
+    left = tuple(f"the macro {name} is not run: {why}" for name, why in called.left.items())
+    expansion = Expansion(dialect=KLIPPER, calls=tuple(called.calls.items()), turns=0, rows=len(called.line))
+    notes = (*program.notes, *left)
+    return dataclasses.replace(program, notes=notes, expansion=expansion if called.calls else None), faults
 
 
 def load(path: str | Path) -> bytes:

@@ -21,6 +21,7 @@ ARC_CENTRES = (AUTO, ABSOLUTE, INCREMENTAL)
 REFUSE, IGNORE = "refuse", "ignore"
 EXTRUDERS = (AUTO, REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
+KLIPPER = "klipper"  # whose macros a program calls
 LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
 _ALIASES = {"haas": FANUC, "grbl": LINUXCNC, "sinumerik": SIEMENS}
 DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, *_ALIASES)

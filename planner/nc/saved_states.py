@@ -43,7 +43,7 @@ class SavedStates:
     def __init__(self) -> None:
         self.kept: dict[str, _Kept] = {}
         self.shift = np.zeros(3)
-        self.marks: list[tuple[int, str, bool]] = []  # line, name, and whether the state is brought back
+        self.marks: list[tuple[int, str, bool]] = []  # row, name, and whether the state is brought back
 
     def take(self, setting: Setting, state: State, table: BlockTable, line: int) -> None:
         """Execute a command. Raises WordFault for a state that was not kept."""
@@ -53,7 +53,7 @@ class SavedStates:
             kept = _Kept(state.position.copy(), state.absolute, state.g92.copy(), self.shift.copy(), *feeds)
             self.kept[name[0] + setting.slot] = kept
             if name == SAVE:
-                self.marks.append((line, setting.slot, False))
+                self.marks.append((table.frame, setting.slot, False))
         elif name in (RESTORE, "G61"):
             back = self.kept.get({RESTORE: "S", "G61": "G"}[name] + setting.slot)
             if back is None:
@@ -85,7 +85,7 @@ class SavedStates:
             target[axes] = back.position[axes]
             _go(target, speed, state, table, line)
             return
-        self.marks.append((line, setting.slot, True))
+        self.marks.append((table.frame, setting.slot, True))
         state.absolute, self.shift = back.absolute, back.shift.copy()
         state.g92[:] = back.g92
         state.apply_offsets()

@@ -44,7 +44,7 @@ class LimitsInForce:
     """The limits in force, and of those that were so on a move the lowest."""
 
     def __init__(self) -> None:
-        self.factors: list[tuple[int, float]] = []  # by which F counts from a line on, as M220 sets them
+        self.factors: list[tuple[int, float]] = []  # by which F counts from a row on, as M220 sets them
         self._now: dict[tuple[str, str], float] = {}
         self._seen: list[dict[tuple[str, str], float]] = []  # on moves
         self._blocks = 0  # that were looked at
@@ -73,7 +73,7 @@ class LimitsInForce:
             factor = given["s"] / 100.0 if given.get("s", 0.0) > 0.0 else factor
             state.feed *= factor / state.feed_factor
             state.feed_factor = factor
-            self.factors.append((line, factor))
+            self.factors.append((table.frame, factor))
             return
         self._line = self._line or line
         self._take_limits(setting.name, given, state.unit, line, findings)

@@ -179,6 +179,11 @@ def _text(
         lines += ["", f"[axes.{letter}]", *(_line(quantity, limit) for quantity, limit in limits.items())]
         lines += ["wrapped = true  # WRAPPED_ROTARY"] * (letter in found.wrapped)
     lines += _tables(found)
+    if found.macros:
+        lines += ["", "[gcode_macros]"]
+    for name, text in found.macros.items():
+        escaped = text.expandtabs().replace("\\", "\\\\").replace('"', '\\"')
+        lines += [f'"{name}" = """', *escaped.split("\n"), '"""']
     for mode in found.modes:
         lines += [
             "",

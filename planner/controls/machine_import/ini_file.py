@@ -105,7 +105,9 @@ def _klipper_tables(text: str, source: str) -> Settings:
         found = bare.strip()
         depth = len(bare) - len(bare.lstrip())
         if not found or (key and depth > indent):
-            continue  # what goes on belongs to macros
+            if found and table.startswith("gcode_macro"):
+                config.go_on(table, key, found)
+            continue
         header, setting = _TABLE.match(found), _SETTING.match(found)
         if header:
             table, key = header.group(1), ""

@@ -19,6 +19,7 @@ from planner.controls.machine_import.settings import (
 )
 
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
+_MACRO = re.compile(r"gcode_macro\s+(\w+(?:\.\d+)?)", re.IGNORECASE | re.ASCII)
 # Klipper's own values where the file does not say them (klippy/toolhead.py).
 _DAMPING = 0.1  # [-]
 _CORNER_SPEED = Sourced(5.0, "Klipper's default")  # [mm/s]
@@ -64,6 +65,7 @@ def settings(text: str, source: str) -> ControlSettings:
             "minimum_cruise_ratio": _cruise_ratio(config, along),
         },
         travel=_travel(config),
+        macros=_macros(config),
         modes=tuple(modes.values()),
         notes=(*config.notes, *_notes(config)),
     )
@@ -88,10 +90,25 @@ def _notes(config: Settings) -> list[str]:
         said.append(
             "Klipper reads no G2 and G3 here, for want of [gcode_arcs]: programs with arcs fail on it"
         )
-    macros = [re.fullmatch(r"gcode_macro ([GM]\d+(\.\d+)?)", name, re.IGNORECASE) for name in config.names]
-    if codes := dict.fromkeys(macro[1].upper() for macro in macros if macro):
-        said.append(f"codes that macros of this machine replace are read as usual: {', '.join(codes)}")
+    macros = [_MACRO.fullmatch(name) for name in config.names]
+    renamed = [macro[1].upper() for macro in macros if macro and config.text(macro[0], "rename_existing")]
+    if renamed:
+        said.append(f"commands that macros of this machine replace are read as usual: {', '.join(renamed)}")
     return said
+
+
+def _macros(config: Settings) -> dict[str, str]:
+    """The lines of macros by their names; without those that replace a command. Their variables stand in
+    front, where no macro changes them."""
+    macros: dict[str, str] = {}
+    fixed = not any("SET_GCODE_VARIABLE" in (config.text(table, "gcode") or "") for table in config.names)
+    for table in dict.fromkeys(config.names):
+        macro, lines = _MACRO.fullmatch(table), config.text(table, "gcode")
+        if macro and lines is not None and config.text(table, "rename_existing") is None:
+            own = [key for key in config.keys(table) if fixed and key.startswith("variable_")]
+            sets = (f"{{% set {key[9:]} = {config.text(table, key)} %}}" for key in own)
+            macros[macro[1].upper()] = "".join(sets) + lines.strip("\n")
+    return macros
 
 
 def _travel(config: Settings) -> dict[str, tuple[Sourced | None, Sourced | None]]:

@@ -58,6 +58,7 @@ class ControlSettings:
     corner_jump: Mapping[str, Sourced] = field(default_factory=dict)
     # keys of the table [kinematics] of a machine file; "type" is a text
     kinematics: Mapping[str, Sourced | str] = field(default_factory=dict)
+    macros: Mapping[str, str] = field(default_factory=dict)  # lines of commands by their names
     modes: tuple[FoundMode, ...] = ()  # vibration modes that the control suppresses
     # what of the settings has no counterpart in a machine file, one sentence each
     notes: tuple[str, ...] = ()
@@ -90,6 +91,11 @@ class Settings:
         """Take in a setting behind those of the same key that are there."""
         self._found.setdefault((table, key), []).append(setting)
 
+    def go_on(self, table: str, key: str, text: str) -> None:
+        """Add a line to the last setting of a key."""
+        found = self._found[table, key]
+        found[-1] = found[-1]._replace(text=f"{found[-1].text}\n{text}")
+
     def counts_last(self) -> None:
         """Keep only the last of equal keys."""
         self._found = {key: found[-1:] for key, found in self._found.items()}
@@ -102,6 +108,10 @@ class Settings:
     def texts(self, table: str, key: str) -> list[str]:
         """The texts of all equal keys."""
         return [found.text for found in self._found.get((table, key), [])]
+
+    def keys(self, table: str) -> list[str]:
+        """The keys of a table."""
+        return [key for name, key in self._found if name == table]
 
     def text(self, table: str, key: str) -> str | None:
         """The text of a setting, the first of equal keys; None where it is not set."""

@@ -103,7 +103,7 @@ def test_klipper_reads_values_comments_and_tables_as_its_parser_does(tmp_path: P
     assert limits(imported(tmp_path, text), "x") == (210.0, 1700.0)
     text = (
         PRINTER
-        + "[Printer]\nmax_accel: 5\n[gcode_macro M600]\ngcode:\n  M117 hi\n[stepper_x]\nposition_max: 220\n"
+        + "[Printer]\nmax_accel: 5\n[gcode_macro M600]\nrename_existing: M600.1\ngcode:\n  M117 hi\n[stepper_x]\nposition_max: 220\n"
     )
     found = imported(tmp_path, text)
     assert limits(found, "x") == (210.0, 1900.0), "tables differ in upper and lower case"

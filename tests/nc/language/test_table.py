@@ -62,6 +62,9 @@ READ: dict[str, list[tuple[str, dict]]] = {
             MILL,
         )
     ],
+    "macros of Klipper": [
+        ("M83\nGO_THERE X=5\nGO_THERE X=6\n", {**MILL, "gcode_macros": {"GO_THERE": "G1 X{params.X} F600"}})
+    ],
     "`elseif`": [
         (FIRST + "#1=2\no1 if [#1 EQ 1]\nG1 X1 F9\no1 elseif [#1 EQ 2]\nG1 X5 F600\no1 endif\nM2", MILL)
     ],

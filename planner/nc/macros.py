@@ -21,6 +21,7 @@ import numpy as np
 from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.nc.printer import command_of
+from planner.nc.reading import KLIPPER
 
 CALLS_MAX = 100_000  # of a program: macros that call others by the hundred never end
 _TEXT_MAX, _NUMBER_MAX = 1_000, 1e15  # of expressions and values: no coordinate needs more
@@ -43,6 +44,7 @@ class Called(NamedTuple):
     files : as `Words.files`: where macros begin, with their names, and where the program goes on
     calls : how often each was run
     left  : by name why a macro is not run
+    dialect : "klipper", or "apt" of CL files (cl_file.py)
     """
 
     data: bytes
@@ -50,6 +52,7 @@ class Called(NamedTuple):
     files: tuple[tuple[int, str], ...]
     calls: Counter[str]
     left: dict[str, str]
+    dialect: str = KLIPPER
 
 
 class _Unknown(Exception):

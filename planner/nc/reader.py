@@ -24,7 +24,19 @@ from planner.nc.macros import Called, written_out
 from planner.nc.points import are_points, read_points
 from planner.nc.printer import is_printer
 from planner.nc.program import Expansion, Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, FANUC, HEIDENHAIN, KLIPPER, LATHE, SIEMENS, Reading
+from planner.nc.reading import (
+    ABSOLUTE,
+    AS_USUAL,
+    AUTO,
+    CL,
+    FANUC,
+    HEIDENHAIN,
+    KLIPPER,
+    LATHE,
+    LINUXCNC,
+    SIEMENS,
+    Reading,
+)
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
@@ -124,6 +136,9 @@ def execute(
     data = reading.kept(data, source)
     for first, last in reading.lines:
         interpreter.findings.assume(f"lines {first} to {last} are left out, as --ignore says", first)
+    called = rewritten(data, machine, reading, source)
+    if called is not None and called.dialect == CL:
+        reading = dataclasses.replace(reading, dialect=LINUXCNC)
     language = detect.language_of(data) if reading.dialect == AUTO else reading.dialect
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
@@ -134,9 +149,6 @@ def execute(
         data, leader = detect.without_leader(data, reading)
         if leader:
             interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
-    called = None
-    if machine is not None and machine.gcode_macros and language != SIEMENS and not reading.strict:
-        called = written_out(data, machine.gcode_macros, reading.ignore)
     words = split_words(data if called is None else called.data, block_delete=reading.block_delete)
     if called is not None:
         words = dataclasses.replace(words, line=called.line[words.line - 1], files=called.files)
@@ -144,7 +156,8 @@ def execute(
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     mark = detect.siemens_mark(words, source) if reading.dialect == AUTO else ""
     language = SIEMENS if mark else language
-    prints = called is not None or (language != SIEMENS and not reading.strict and is_printer(words))
+    calls = called is not None and called.dialect == KLIPPER
+    prints = calls or (language != SIEMENS and not reading.strict and is_printer(words))
     if prints:
         interpreter.ignored.read_printer()
     dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
@@ -180,25 +193,35 @@ def execute(
         if len(row) != len(program):  # the tool centre point has divided rapids
             row = np.searchsorted(words.line, program.line)
         program = with_extruder(program, row, words, interpreter.rows_read, *of_rows)
-    return (
-        (interpreter, program, faults)
-        if called is None
-        else (interpreter, *_of_macros(called, program, faults))
-    )
+    if called is not None:
+        program, faults = _of_called(called, program, faults)
+    return interpreter, program, faults
 
 
-def _of_macros(called: Called, program: Program, faults: Sequence[Fault]) -> tuple[Program, Sequence[Fault]]:
-    """A program with macros written out, and its faults with the calls that led to them."""
+def rewritten(data: bytes, machine: Machine | None, reading: Reading, source: str) -> Called | None:
+    """The G code of a CL file, or of a program with macros; None for others. Raises InputError."""
+    if detect.is_cl_file(data):
+        from planner.nc.cl_file import codes_of  # 10 ms
+
+        return codes_of(data, machine, source)
+    if machine is None or not machine.gcode_macros or reading.strict:
+        return None
+    return written_out(data, machine.gcode_macros, reading.ignore)
+
+
+def _of_called(called: Called, program: Program, faults: Sequence[Fault]) -> tuple[Program, Sequence[Fault]]:
+    """A program that was rewritten, and its faults with the macros that led to them."""
+    within = (f"{fault.message} (in the macro {fault.source})" for fault in faults)
     faults = [
-        dataclasses.replace(f, source="", column=1, message=f"{f.message} (in the macro {f.source})")
-        if f.source
-        else f
-        for f in faults
+        dataclasses.replace(fault, source="", column=1, message=text) if fault.source else fault
+        for fault, text in zip(faults, within, strict=True)
     ]
-    left = tuple(f"the macro {name} is not run: {why}" for name, why in called.left.items())
-    expansion = Expansion(dialect=KLIPPER, calls=tuple(called.calls.items()), turns=0, rows=len(called.line))
-    notes = (*program.notes, *left)
-    return dataclasses.replace(program, notes=notes, expansion=expansion if called.calls else None), faults
+    notes = *program.notes, *(f"the macro {name} is not run: {why}" for name, why in called.left.items())
+    if called.calls or called.dialect == CL:
+        calls = tuple(called.calls.items())
+        expansion = Expansion(dialect=called.dialect, calls=calls, turns=0, rows=len(called.line))
+        program = dataclasses.replace(program, expansion=expansion)
+    return dataclasses.replace(program, notes=notes), faults
 
 
 def load(path: str | Path) -> bytes:

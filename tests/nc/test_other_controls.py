@@ -106,12 +106,6 @@ def test_lines_that_are_refused_by_name(line: str, column: int, said: str) -> No
     assert "--ignore" not in str(caught.value)
 
 
-@pytest.mark.parametrize("line", ["GOTO/1,2,3", "FROM / 0,0,5", "FEDRAT/100,MMPM"])
-def test_a_cl_file_is_named(line: str) -> None:
-    with pytest.raises(InputError, match=r"a CL file \(APT\).*post-processor"):
-        parse_program(f"PARTNO/A\n{line}\nFINI\n")
-
-
 def test_blanks_of_pages_and_padding_are_blanks() -> None:
     for text in ("G1\u00a0X7 Y1", "\u00a0G1 X7\u00a0Y1\u00a0"):
         assert same(between(text), between("G1 X7 Y1"))

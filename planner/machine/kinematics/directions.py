@@ -55,12 +55,11 @@ def _least_motion(pairs: FloatArray, free: float) -> FloatArray:
     at_pole = np.abs(np.sin(pairs[:, :, 0])) <= free
     chosen = pairs.copy()
     cost, before = np.array([0.0, 1e-9]), np.zeros((count, 2), dtype=np.int64)  # of equals the first
-    paths = [chosen[:, 0].copy(), chosen[:, 1].copy()]
     for n in range(1, count):
         found, ways = np.full(2, np.inf), []
         for k in range(2):
             for j in range(2):
-                old, new = paths[j][n - 1], pairs[n, k].copy()
+                old, new = chosen[n - 1, j], pairs[n, k].copy()
                 new[1] = old[1] if at_pole[n, k] else _nearest(new[1], old[1])
                 step = cost[j] + float(np.abs(new - old).max())
                 if step < found[k]:
@@ -68,19 +67,15 @@ def _least_motion(pairs: FloatArray, free: float) -> FloatArray:
             before[n, k] = best
             ways.append(at)
         chosen[n] = ways
-        cost, paths = found, [_put(paths[before[n, k]], chosen[n, k], n) for k in range(2)]
-    angles = paths[int(cost.argmin())]
+        cost = found
+    angles, k = np.empty((count, 2)), int(cost.argmin())
+    for n in reversed(range(count)):
+        angles[n], k = chosen[n, k], int(before[n, k])
     pole = np.abs(np.sin(angles[:, 0])) <= free
     if pole.any() and not pole.all():
         place = np.arange(count)
         angles[pole, 1] = np.interp(place[pole], place[~pole], angles[~pole, 1])
     return angles
-
-
-def _put(path: FloatArray, pair: FloatArray, n: int) -> FloatArray:
-    out = path.copy()
-    out[n] = pair
-    return out
 
 
 def _nearest(angle: float, to: float) -> float:

@@ -62,11 +62,6 @@ _MODELS = (
     ("a model (STEP)", rb"\A\s*ISO-10303-21\s*;", _CAM),
     ("a drawing (SVG)", rb"(?s)\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", _CAM),
     ("a document (PDF)", rb"\A%PDF-\d", _CAM),
-    (
-        "a CL file (APT)",
-        rb"(?mi)^[ \t]*(?:GOTO|FROM|FEDRAT|MULTAX|LOADTL|PARTNO|CUTTER)[ \t]*/",
-        "run it through the post-processor of the CAM system and give the G code",
-    ),
     ("an archive (ZIP, 3MF)", rb"\APK\x03\x04", "unpack it and give the program in it"),
     ("a machine file", rb"(?m)^\[axes\.[a-z]\]", "give the program, and the machine file as -m FILE"),
     (
@@ -76,6 +71,7 @@ _MODELS = (
         "make a machine file of it (planner machine import) and give that as -m FILE",
     ),
 )
+_CL_FILE = re.compile(rb"(?mi)^[ \t]*(?:GOTO|FROM|FEDRAT|MULTAX|LOADTL|PARTNO|CUTTER)[ \t]*/")
 # A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
 _STL_HEAD, _STL_TRIANGLE = 84, 50
 LATHE_NOTE = (
@@ -132,6 +128,11 @@ def is_plotter_file(data: bytes, source: str) -> bool:
     if _HPGL.match(head):
         return not _MACRO.match(head)
     return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
+
+
+def is_cl_file(data: bytes) -> bool:
+    """True if a text is a CL file (APT)."""
+    return _CL_FILE.search(data[:_LOOKED_AT]) is not None
 
 
 def language_of(data: bytes) -> str | None:

@@ -11,10 +11,9 @@ from planner.machine import Machine
 from planner.nc.faults import require_none
 from planner.nc.integers import LENGTHS, DwellWords
 from planner.nc.lexer import Words
-from planner.nc.macros import written_out
 from planner.nc.program import Program, plain
-from planner.nc.reader import execute, interpret
-from planner.nc.reading import FANUC, KLIPPER, Reading
+from planner.nc.reader import execute, interpret, rewritten
+from planner.nc.reading import CL, FANUC, KLIPPER, Reading
 
 DECIMALS = 7  # of a number
 _LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
@@ -83,8 +82,8 @@ def flat_program(
     require_none(faults, source)
     if program.expansion is None:
         return None
-    if program.expansion.dialect == KLIPPER and machine is not None:
-        called = written_out(data, machine.gcode_macros, reading.ignore)
+    if program.expansion.dialect in (KLIPPER, CL):
+        called = rewritten(data, machine, reading, source)
         return ("" if called is None else called.data.decode("utf-8", "replace")), program
     fanuc = program.expansion.dialect == FANUC
     flat = Flat(source, points=fanuc or (machine is not None and machine.dialect is not None))

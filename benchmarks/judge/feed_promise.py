@@ -6,7 +6,8 @@ Every program has 3 to 8 blocks of 0.03 to 3 mm, whose F changes by up to a fact
 to 2 mm: along one axis, along a slope, round corners in two and three axes, and with arcs, in turn, on machine `mill` with
 setpoints every 0.25 ms. Of each method is counted: passed by the verdict, and kept by the other code
 (benchmarks/judge/passages.py), which finds no stretch that is run sooner than the blocks on it take at their F; passed and not
-kept; not passed.
+kept; not passed. The other code has the motion that the verifier was given, at the ends of its pieces and every 16 us: setpoints
+alone do not tell where a vertex is passed on a bend.
 """
 
 from __future__ import annotations
@@ -23,17 +24,23 @@ from benchmarks.judge.passages import Motion, saved
 from benchmarks.record import markdown, write_results
 from planner.base.errors import InputError
 from planner.machine import Machine, load_machine
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
+from planner.planning.job import job as job_module
 from planner.planning.job.plan import Plan
 from planner.planning.methods.registry import plan
+from planner.verifier import Verdict
 
 Array = np.ndarray
 STREAM = 61  # of random numbers
 METHODS = ("optimal", "second-order", "kinematic", "stop", "bezier", "fir")
 KINDS = ("line", "slope", "plane", "space", "arcs")
 PERIOD = 0.00025  # of setpoints [s]
-# What the other code may find to be run too soon [s]: between setpoints it does not know where a vertex is passed on a bend.
-KEPT = 0.25 * PERIOD
+PARTS = 16  # of a period, at whose ends the other code looks at a motion
+SHORTEST = 1e-8  # [s] between two places that it looks at
+# What the other code may find to be run too soon [s]: it looks at 64 places from one time to the next.
+KEPT = 0.02 * PERIOD
 MARK = np.pi / 8  # [rad] between the points of an arc that are passed in order
 BLOCKS = (3, 9)  # from, below
 LENGTHS = (-1.5, 0.5)  # powers of ten [mm]
@@ -99,14 +106,36 @@ def _arc(at: Array, end: Array, beside: float) -> tuple[str, Array]:
     return words, points
 
 
-def too_soon(made: Plan, job: Case) -> float:
-    """The most time that the motion of a plan saves against F on any stretch, by the other code [s]."""
-    assert made.trajectory is not None
-    chunks = list(made.trajectory.chunks())
-    t, p, v = (np.concatenate([getattr(c, name) for c in chunks]) for name in Motion._fields)
-    column = ["xyz".index(axis) for axis in made.trajectory.axes]
+class Judged:
+    """The motions that the verifier is given while plans are made, as a context."""
+
+    def __enter__(self) -> Judged:
+        self._usual, self._seen = job_module.verify, list[tuple[Trajectory, MotionInTime]]()
+        job_module.verify = self._verify  # type: ignore[assignment]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        job_module.verify = self._usual
+
+    def _verify(self, trajectory: Trajectory, *given: Any, motion: MotionInTime, **more: Any) -> Verdict:
+        self._seen.append((trajectory, motion))
+        return self._usual(trajectory, *given, motion=motion, **more)
+
+    def motion_of(self, made: Plan) -> MotionInTime:
+        """What the setpoints of a plan were taken from."""
+        assert made.trajectory is not None
+        x = made.trajectory.position
+        return next(motion for seen, motion in self._seen[::-1] if np.array_equal(seen.position, x))
+
+
+def too_soon(motion: MotionInTime, job: Case) -> float:
+    """The most time that a motion saves against F on any stretch, by the other code [s]."""
+    t = np.unique(np.concatenate([motion.t, [0.0, motion.end], np.arange(0.0, motion.end, PERIOD / PARTS)]))
+    t = t[np.append(True, np.diff(t) > SHORTEST)]
+    seen = motion.at(t, PERIOD)
+    column = ["xyz".index(axis) for axis in seen.axes]
     position, velocity = np.zeros((2, len(t), 3))
-    position[:, column], velocity[:, column] = p, v
+    position[:, column], velocity[:, column] = seen.position, seen.velocity
     return saved(Motion(t, position, velocity), job.points, job.within, job.feeds)
 
 
@@ -120,8 +149,10 @@ def row(seed: int, method: str, kind: str | None = None) -> dict[str, Any]:
     job = case(seed, kind)
     began = time.process_time()
     found: dict[str, Any] = {"seed": seed, "kind": job.kind, "method": method}
+    judged = Judged()
     try:
-        made = plan(parse_program(job.text, source=f"job {seed}"), machine(), method=method)
+        with judged:
+            made = plan(parse_program(job.text, source=f"job {seed}"), machine(), method=method)
     except InputError as fault:
         return found | {"passed": False, "saved": None, "said": str(fault)}
     found["cpu"] = time.process_time() - began
@@ -131,7 +162,7 @@ def row(seed: int, method: str, kind: str | None = None) -> dict[str, Any]:
     return found | {
         "time": made.cycle_time,
         "passed": verdict.passed,
-        "saved": too_soon(made, job),
+        "saved": too_soon(judged.motion_of(made), job),
         "verdict": verdict.limits["feed"].ratio,
         "said": (verdict.faults or ("",))[0],
     }

@@ -32,16 +32,20 @@ OPEN, UNKNOWN, BENT = range(3)
 
 class Between(NamedTuple):
     """What lies before each of n places, since the one before: largest velocity and acceleration of each axis (n, A),
-    and speed (n,), 0 where it has no maximum."""
+    and speed (n,), 0 where it has no maximum; how long its cubic stands for the
+    motion, then that of the place itself (n,) [s], NaN where several pieces lie between."""
 
     velocity: FloatArray
     acceleration: FloatArray
     speed: FloatArray
+    cut: FloatArray
 
 
 def nothing_between(places: int, axes: int) -> Between:
     """To be filled by `look_between`."""
-    return Between(np.zeros((places, axes)), np.zeros((places, axes)), np.zeros(places))
+    return Between(
+        np.zeros((places, axes)), np.zeros((places, axes)), np.zeros(places), np.full(places, np.nan)
+    )
 
 
 @kernel()
@@ -77,8 +81,11 @@ def look_between(
         whole = e == before
         to = h if whole else edges[before] - t[k - 1]
         back = 0.0 if whole else t[k] - edges[e - 1]
-        if (not whole and h - to - back > PERIOD_ROUNDING) or not _agree(columns, limits, k, to, back):
+        single = whole or h - to - back <= PERIOD_ROUNDING
+        found.cut[k] = h - back if single else np.nan
+        if not (single and _agree(columns, limits, k, to, back)):
             known[UNKNOWN] += 1.0
+            found.cut[k] *= 0.5 if whole else 1.0
             to = back = 0.0
         _segment(columns, k - 1, to, k, work, found)
         _segment(columns, k, -back, k, work, found)

@@ -21,7 +21,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
-from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
+from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Cubics, Switches
 from planner.verifier.worst import COLUMN, DIFFERENCE, Worst
 
 
@@ -37,9 +37,9 @@ class Feeds:
         self._left = list[Chords]()  # blocks: put together when they are judged
         self._gap = 0.0  # between them at most [s]
 
-    def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
+    def take(self, new: Chords, skip: int, first: Array, last: Array, cubics: Cubics) -> None:
         """The next samples, with the pieces `first` and `last` (n,) each can be on (`Switches.take`)."""
-        self._switches.take(new, skip, first, last)
+        self._switches.take(new, skip, first, last, cubics)
         new = Chords(*(column[skip:].copy() for column in new))
         before = self._left[-1].t[-1:] if self._left else new.t[:1]
         self._left += [new] if len(new.t) else []

@@ -27,7 +27,7 @@ from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, matc
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.power import look_at_power
 from planner.verifier.stops import AtStop
-from planner.verifier.switches import Bounds, Chords
+from planner.verifier.switches import Bounds, Chords, Cubics
 from planner.verifier.tangential import look_at_tangential
 from planner.verifier.user_limits import look_at_user_limits
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst
@@ -128,7 +128,6 @@ class Watch:
         place = nowhere(len(t))
         cubic = velocity if self._cubic else velocity[:0]
         match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
-        self._take_feeds(t, position, velocity, skip, place)
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
         # by columns: the worst of each is looked for
@@ -137,9 +136,11 @@ class Watch:
         block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
         if self._edges is None:
             look_at_axes(block, limits, seen.worst)
+            cubics = Cubics(np.empty((0, *position.shape)), np.full(len(t), np.nan))
         else:
             stacked = np.stack([position, velocity, acceleration, jerk])
-            self._take_between(block, self._edges, stacked, place)
+            cubics = Cubics(stacked, self._take_between(block, self._edges, stacked, place))
+        self._take_feeds(t, position, velocity, skip, place, cubics)
         look_at_tangential(block, limits, seen.worst)
         power = GROUPS * len(limits.axes) + ROWS_ALONE
         look_at_power(block, limits, seen.worst, power)
@@ -147,18 +148,25 @@ class Watch:
         self._travelled = float(block.travelled_to()[-1])
 
     def _take_feeds(
-        self, t: FloatArray, position: FloatArray, velocity: FloatArray, skip: int, place: Located
+        self,
+        t: FloatArray,
+        position: FloatArray,
+        velocity: FloatArray,
+        skip: int,
+        place: Located,
+        cubics: Cubics,
     ) -> None:
         speed = np.full(len(t), np.nan)
         if self._limits.judged[0]:
             speed = np.sqrt(np.einsum("na,na->n", velocity, velocity))
         chords = Chords(t, np.zeros(len(t)), np.zeros(len(t)), speed, place.piece, position)
-        self._feeds.take(chords, skip, place.first, place.last)
+        self._feeds.take(chords, skip, place.first, place.last, cubics)
 
     def _take_between(
         self, block: SampleBlock, edges: FloatArray, columns: FloatArray, place: Located
-    ) -> None:
-        """Take in a block of a motion and what lies between its times; `columns` (4, n, A) as in `look_between`."""
+    ) -> FloatArray:
+        """Take in a block of a motion and what lies between its times; `columns` (4, n, A) as in `look_between`. -> (n,) as
+        `Between.cut`"""
         limits, worst, skip = self._limits, self.seen.worst, block.skip
         axes = len(limits.axes)
         found, edge = (
@@ -179,6 +187,7 @@ class Watch:
         feed[skip:] = np.maximum(feed[skip:], np.append(self._feed_before, feed[skip:-1]))
         self._feed_before = float(feed[-1])
         worst.take(GROUPS * axes + FEED, found.speed[:, None], feed[:, None], COLUMN, block)
+        return found.cut
 
     def finish(self) -> None:
         """No more samples: judge what had to wait for them."""

@@ -10,19 +10,10 @@ over the chords of the motion, by dynamic programming over the vertices that eac
 (matching.py). A vertex is settled once the motion cannot be on the block before it any more. A full stop is
 passed where the motion rests.
 
-What sampling cannot tell: between two samples a motion with |acceleration| <= a is within b = a h^2 / 8 of
-its chord, and its direction within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the
-farthest that the nearest place of the motion and that of the chords can be apart, since the samples next to
-it are exact). A place nearest to a vertex at the distance d has its direction across that to the vertex, so
-that it is at most
-
-    reach  =  min( (d + b) r / (1 - r),  8 (d + b),  2 h (w + a h) )  +  rounding
-
-away along the motion from where the chords have it. The second term is for slow motions, whose direction may turn by
-any angle in a period (r >= 1): the nearest place of the chords is at most d + b from the vertex at its time, so that of the
-motion is too, and the two are at most 2 (d + b) apart; the way between them is taken as at most four times that. Of vertices
-that are nearest out of order the place together is known to two chords. So far from the switch a place belongs to both
-blocks, and the larger F counts. On a straight line d = 0, and at 100 mm/s, 4,000 mm/s2 and 1 ms that is 3e-5 mm.
+Where the motion runs on cubics that is the place on them, known to rounding; where only its samples are known it is the place of
+the chord, and known to a `reach` (nearest.py). So far from the switch a place belongs to both blocks, and the larger F counts. On a
+straight line at 100 mm/s, 4,000 mm/s2 and 1 ms the reach of a chord is 3e-5 mm; where bends are slow, and the tolerance is wide, it
+is micrometres. Of vertices that are nearest out of order within one chord the place together counts.
 """
 
 import math
@@ -32,28 +23,23 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.verifier.kernel import kernel
+from planner.verifier.nearest import nearest, reach_of
 from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, reach_chord
 from planner.verifier.worst import ROUNDING_ULPS
 
 # cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked
 # at [mm2]; place: where it is passed along the chords from the start [mm]; begin, end: from where the block
-# after it may have begun, and to where the one before it may last; weight, group: of the vertices that are
-# passed together
+# after it may have begun, and to where the one before it may last; group: number of vertices
+# passed together; chord: on which, of those kept
 SWITCH = np.dtype(
-    [("cost", "f8"), ("place", "f8"), ("begin", "f8"), ("end", "f8"), ("weight", "f8"), ("group", "i8")]
+    [(name, "f8") for name in ("cost", "place", "begin", "end")] + [("group", "i8"), ("chord", "i8")]
 )
 # first, count, offset: the vertices that were looked at, and where the marks of those that came nearer begin;
-# begin: place of the chord's start [mm]; step, h, error: its length [mm], duration [s], rounding [mm]
+# begin: place of the chord's start [mm]; step, h, cut, error: its length [mm], duration, end of the cubic that it begins with
+# (NaN where it is not known) [s], rounding [mm]
 CHORD = np.dtype(
-    [
-        ("first", "i8"),
-        ("count", "i8"),
-        ("offset", "i8"),
-        ("begin", "f8"),
-        ("step", "f8"),
-        ("h", "f8"),
-        ("error", "f8"),
-    ]
+    [(name, "i8") for name in ("first", "count", "offset")]
+    + [(name, "f8") for name in ("begin", "step", "h", "cut", "error")]
 )
 # In `state`: the first vertex not settled; first and behind the last of the chords kept; marks used.
 OPEN, HEAD, TAIL, USED = range(4)
@@ -62,7 +48,6 @@ SURE, TRAVELLED, JUDGED = range(3)  # in `along`: the open vertex is not passed,
 RUN_THROUGH = 1e3
 # How much more firmly the place of a full stop is held than others passed together with it [-].
 FIRM = 1e9
-AROUND = 8.0  # way between the nearest places of motion and chords, of their distance from the vertex (module text) [-]
 ROOM = 4096  # chords and marks there is room for at first
 
 
@@ -90,12 +75,22 @@ class Chords(NamedTuple):
     position: FloatArray
 
 
+class Cubics(NamedTuple):
+    """Between n samples: columns (4, n, A), position and its derivatives at each; cut (n,) how long the cubic of the sample before
+    lasts, from the end of which on it is that of the sample itself [s], NaN where that is not known."""
+
+    columns: FloatArray
+    cut: FloatArray
+
+
 class Kept(NamedTuple):
-    """Chords since the last vertex that was settled: `CHORD` (C,), their ends (C, 2, A) [mm], and marks."""
+    """Chords since the last vertex that was settled: `CHORD` (C,), their ends (C, 2, 4, A) as in `Cubics`, and marks; a place that
+    is worked with (A,)."""
 
     chord: Array
     ends: FloatArray
     mark: Array
+    work: FloatArray
 
 
 class Switches:
@@ -112,9 +107,10 @@ class Switches:
         self.switch["cost"][1:] = np.inf
         self.state, self.along = np.array([1, 0, 0, 0], dtype=np.int64), np.zeros(3)
         self._pieces, self._bounds = pieces, bounds
-        self._kept = Kept(np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, axes)), np.zeros(ROOM, np.bool_))
+        room = np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, 4, axes)), np.zeros(ROOM, np.bool_)
+        self._kept = Kept(*room, np.zeros(axes))
 
-    def take(self, new: Chords, skip: int, first: Array, last: Array) -> None:
+    def take(self, new: Chords, skip: int, first: Array, last: Array, cubics: Cubics) -> None:
         """The next samples, from `skip` on; those before were given already. first, last: (n,) the pieces
         each can be on (matching.py). place and error of `new` are written here."""
         k = skip
@@ -128,6 +124,7 @@ class Switches:
                 new,
                 k,
                 (first, last),
+                cubics,
                 self._bounds,
             )
             if k < len(new.t):
@@ -150,11 +147,11 @@ class Switches:
             or 2 * (tail - head) > len(self._kept.chord)
             or 2 * used > len(self._kept.mark)
         )
-        chord, ends, mark = (np.zeros(((1 + full) * len(c), *c.shape[1:]), c.dtype) for c in self._kept)
+        chord, ends, mark = (np.zeros(((1 + full) * len(c), *c.shape[1:]), c.dtype) for c in self._kept[:3])
         chord[: tail - head], ends[: tail - head] = self._kept.chord[head:tail], self._kept.ends[head:tail]
         mark[:used] = self._kept.mark[begin : begin + used]
         chord["offset"][: tail - head] -= begin
-        self._kept = Kept(chord, ends, mark)
+        self._kept = Kept(chord, ends, mark, self._kept.work)
         self.state[HEAD], self.state[TAIL], self.state[USED] = 0, tail - head, used
 
 
@@ -168,6 +165,7 @@ def _passed(
     new: Chords,
     skip: int,
     can: tuple[Array, Array],
+    cubics: Cubics,
     bounds: Bounds,
 ) -> int:
     """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind;
@@ -191,10 +189,21 @@ def _passed(
         along[TRAVELLED] += step
         new.place[k], new.error[k] = along[TRAVELLED], rounding
         if step > 0.0:
-            _look(pieces, switch, state, along, kept, new, k, last, (begin, step, h, rounding), bounds)
+            chord = begin, step, h, cubics.cut[k], rounding
+            _look(pieces, switch, state, along, kept, new, k, last, chord, cubics.columns, bounds)
         if k and can[0][k] >= state[OPEN]:
             _settle(pieces, switch, state, along, kept, min(can[0][k], len(switch) - 2), bounds)
     return n
+
+
+@kernel(inline=True)
+def _put_ends(ends, position, columns, k):
+    """The samples k - 1 and k, with the derivatives that there are, into `ends` (2, 4, A)."""
+    for side in range(2):
+        for axis in range(position.shape[1]):
+            ends[side, 0, axis] = position[k - 1 + side, axis]
+            for order in range(1, columns.shape[0]):
+                ends[side, order, axis] = columns[order, k - 1 + side, axis]
 
 
 @kernel()
@@ -207,18 +216,21 @@ def _look(
     new: Chords,
     k: int,
     last: int,
-    chord: tuple[float, float, float, float],
+    chord: tuple[float, float, float, float, float],
+    columns: FloatArray,
     bounds: Bounds,
 ) -> None:
     """Which vertices, from the open one to `last`, the chord to sample k is a better place for."""
-    first, axes = state[OPEN], new.position.shape[1]
+    first, at, before = state[OPEN], state[TAIL], 0.0
     if last < first:
         return
-    at, before = state[TAIL], 0.0
-    _, step, h, rounding = chord
+    _, step, h, cut, rounding = chord
     bow = bounds.acceleration * h * h / 8.0
+    _put_ends(kept.ends[at], new.position, columns, k)
     for i in range(first, last + 1):
         _, _, apart = reach_chord(new.position[k - 1], new.position[k], pieces, i, 0.0)
+        if cut >= 0.0 and before + max(apart - bow, 0.0) ** 2 < switch[i]["cost"]:
+            apart, _, _, _ = nearest(pieces.vertex[i], kept.ends[at], cut, h)
         cost = before + apart * apart
         if pieces.joint[i]["stop"] and (
             step > 4.0 * bow + 2.0 * rounding or apart > bow + rounding + PLACE_ROUNDING
@@ -232,12 +244,11 @@ def _look(
     # nearer than ever, and no other vertex: what was before does not matter
     if last == first and kept.mark[state[USED]]:
         at = state[HEAD] = 0
+        _put_ends(kept.ends[at], new.position, columns, k)
         kept.mark[0], state[USED], along[SURE] = True, 0, chord[0]
     row = kept.chord[at]
     row["first"], row["count"], row["offset"] = first, last + 1 - first, state[USED]
-    row["begin"], row["step"], row["h"], row["error"] = chord
-    for axis in range(axes):
-        kept.ends[at, 0, axis], kept.ends[at, 1, axis] = new.position[k - 1, axis], new.position[k, axis]
+    row["begin"], row["step"], row["h"], row["cut"], row["error"] = chord
     state[TAIL] = at + 1
     state[USED] += last + 1 - first
 
@@ -275,17 +286,16 @@ def _settle(
             continue
         head = here if i == last else head
         row = kept.chord[here]
-        share, apart = _foot(pieces.vertex[i], kept.ends[here])
-        switch[i]["place"] = row["begin"] + share * row["step"]
+        found = nearest(pieces.vertex[i], kept.ends[here], row["cut"], row["h"])
+        switch[i]["place"], switch[i]["chord"] = row["begin"] + found[1] * row["step"], here
         if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
-            reach = _reach(apart, row["step"], row["h"], bounds.acceleration)
+            reach = reach_of(found, kept.ends[here], row["cut"], row["h"], bounds.acceleration, row["error"])
             switch[i]["end"] = reach + row["error"] + PLACE_ROUNDING
-        switch[i]["begin"] = 2.0 * row["step"]  # from here on how far the place of several is unknown
     spent = switch[last]["cost"]
     for i in range(first, last + 1):
         switch[i]["place"] = max(switch[i]["place"], along[SURE])
-        switch[i]["weight"], switch[i]["group"] = FIRM if pieces.joint[i]["stop"] else 1.0, 1
-        _pool(switch, first, i)
+        switch[i]["group"] = 1
+        _pool(pieces, switch, state, along[SURE], kept, first, i, bounds)
     for i in range(first, last + 1):
         place, reach = switch[i]["place"], switch[i]["end"]
         switch[i]["end"] = place + reach
@@ -303,43 +313,46 @@ def _settle(
 
 
 @kernel()
-def _pool(switch: Array, first: int, i: int) -> None:
-    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed
-    together, at the mean of these places: on a chord that is where they are together nearest."""
+def _pool(
+    pieces: ProgramPieces,
+    switch: Array,
+    state: Array,
+    least: float,
+    kept: Kept,
+    first: int,
+    i: int,
+    bounds: Bounds,
+) -> None:
+    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together, at `least` or
+    further on, where the motion is nearest to the mean of them; of chords that is known to two of them."""
     n = i
     while n > first and switch[n]["place"] < switch[n - 1]["place"]:
-        begin, weight = n - switch[n - 1]["group"], switch[n]["weight"] + switch[n - 1]["weight"]
-        moved = switch[n]["weight"] * (switch[n]["place"] - switch[n - 1]["place"])
-        place = switch[n - 1]["place"] + moved / weight
-        for m in range(begin, i + 1):
-            switch[m]["place"], switch[m]["weight"], switch[m]["group"] = place, weight, i + 1 - begin
-            switch[m]["end"] = max(switch[m]["end"], switch[m]["begin"])
-        n = begin
+        n -= switch[n - 1]["group"]
+        weight, reach, here = 0.0, 0.0, switch[i]["chord"]
+        for m in range(n, i + 1):
+            firm = FIRM if pieces.joint[m]["stop"] else 1.0
+            weight, reach = weight + firm, max(reach, switch[m]["end"])
+            for axis in range(len(kept.work)):
+                before = kept.work[axis] if m > n else 0.0
+                kept.work[axis] = before + (pieces.vertex[m, axis] - before) * firm / weight
+        found = _nearest_to_work(kept, here)
+        for way in (-1, 1):
+            while state[HEAD] <= here + way < state[TAIL]:
+                other = _nearest_to_work(kept, here + way)
+                if other[0] >= found[0]:
+                    break
+                here, found = here + way, other
+        row = kept.chord[here]
+        own = 2.0 * row["step"]
+        if not math.isnan(row["cut"]):
+            own = reach_of(found, kept.ends[here], row["cut"], row["h"], bounds.acceleration, row["error"])
+        for m in range(n, i + 1):
+            switch[m]["place"], switch[m]["chord"] = max(row["begin"] + found[1] * row["step"], least), here
+            switch[m]["group"] = i + 1 - n
+            switch[m]["end"] = max(reach, own + row["error"] + PLACE_ROUNDING)
 
 
-@kernel()
-def _foot(vertex: FloatArray, ends: FloatArray) -> tuple[float, float]:
-    """Share of the chord (2, A) at which it is nearest to a vertex (A,), and its distance there."""
-    along, length_sq = 0.0, 0.0
-    for axis in range(len(vertex)):
-        move = ends[1, axis] - ends[0, axis]
-        along += (vertex[axis] - ends[0, axis]) * move
-        length_sq += move * move
-    share, apart_sq = min(max(along / length_sq, 0.0), 1.0), 0.0
-    for axis in range(len(vertex)):
-        apart_sq += (ends[0, axis] + share * (ends[1, axis] - ends[0, axis]) - vertex[axis]) ** 2
-    return share, math.sqrt(apart_sq)
-
-
-@kernel()
-def _reach(apart: float, step: float, h: float, acceleration: float) -> float:
-    """How far the nearest place of a motion can be from that of its chord (module text) [mm]."""
-    if not math.isfinite(acceleration):
-        return 4.0 * step
-    pace, push = step / h, acceleration * h
-    turn = 1.5 * push / pace
-    near = apart + push * h / 8.0
-    reach = min(AROUND * near, 2.0 * h * (pace + push))
-    if turn < 1.0:
-        reach = min(reach, near * turn / (1.0 - turn))
-    return reach
+@kernel(inline=True)
+def _nearest_to_work(kept, at):
+    """As `nearest` finds on the chord `at` the place that is worked with."""
+    return nearest(kept.work, kept.ends[at], kept.chord[at]["cut"], kept.chord[at]["h"])

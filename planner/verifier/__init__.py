@@ -9,6 +9,7 @@ constraint, no solver. What it checks, and how sharp each check is:
     claims.py     how each figure is known: exact, certified, sampled, assumed
     limits.py     velocity, acceleration, jerk per axis, normal acceleration: on the columns and on differences of the delivered
                   positions
+    nearest.py    where a motion is nearest to a vertex, exactly where it runs on cubics
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
     feed.py       the feed against the F word of that block, of every chord and every delivered speed
     worst.py      the worst of every quantity, and differences of positions

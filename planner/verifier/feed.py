@@ -12,7 +12,7 @@ F is the speed in x, y and z alone where these move, in u, v and w where only th
 axes. Beside a corner the parts of a motion in these axes differ from those of its block, so the chord in them
 alone is compared with F, too.
 
-Where a block begins and ends to within `reach` (switches.py), both are meant, and the larger F counts.
+Where a block begins and ends to within `reach` (nearest.py), both are meant, and the larger F counts.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
-from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Cubics, Switches
+from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
 from planner.verifier.worst import COLUMN, DIFFERENCE, Worst
 
 
@@ -37,9 +37,9 @@ class Feeds:
         self._left = list[Chords]()  # blocks: put together when they are judged
         self._gap = 0.0  # between them at most [s]
 
-    def take(self, new: Chords, skip: int, first: Array, last: Array, cubics: Cubics) -> None:
-        """The next samples, with the pieces `first` and `last` (n,) each can be on (`Switches.take`)."""
-        self._switches.take(new, skip, first, last, cubics)
+    def take(self, new: Chords, skip: int) -> None:
+        """The next samples, as `Switches.take`."""
+        self._switches.take(new, skip)
         new = Chords(*(column[skip:].copy() for column in new))
         before = self._left[-1].t[-1:] if self._left else new.t[:1]
         self._left += [new] if len(new.t) else []
@@ -47,7 +47,7 @@ class Feeds:
         pace = float(np.linalg.norm(self._bounds.velocity))
         push = self._bounds.acceleration * gap
         room = 2.0 * gap * (pace + (push if np.isfinite(push) else pace))  # the longest reach of a vertex
-        self._judge(float(self._switches.along[SURE]) - room)
+        self._judge(float(self._switches.found.along[SURE]) - room)
 
     def finish(self) -> None:
         """No more samples: judge what is left."""
@@ -62,8 +62,8 @@ class Feeds:
             return
         worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
         over = np.zeros(len(chords.t))
-        known = int(self._switches.state[OPEN])
-        switch = self._switches.switch
+        known = int(self._switches.found.state[OPEN])
+        switch = self._switches.found.switch
         done = _judged(
             self._pieces, self._groups, switch, known, self._block, chords, until, worst, sample, over
         )
@@ -72,8 +72,8 @@ class Feeds:
         k = int(sample[0])
         if k >= 0:
             seen = tuple(worst.tolist())
-            self._worst.keep(self._row, seen, float(chords.t[k]), chords.position[k], int(chords.piece[k]))
-        self._switches.along[JUDGED] = float(chords.place[done - 1])
+            self._worst.keep(self._row, seen, float(chords.t[k]), chords.state[k, 0], int(chords.piece[k]))
+        self._switches.found.along[JUDGED] = float(chords.place[done - 1])
         self._left = [Chords(*(column[done - 1 :].copy() for column in chords))]
         self._gap = float(np.diff(self._left[0].t).max(initial=0.0))
 
@@ -132,7 +132,7 @@ def _judged(
                 square = 0.0
                 for a in range(len(groups)):
                     if groups[a] == pieces.piece[i]["by"]:
-                        square += (chords.position[k, a] - chords.position[k - 1, a]) ** 2
+                        square += (chords.state[k, 0, a] - chords.state[k - 1, 0, a]) ** 2
                 part = max(np.sqrt(square) - chords.error[k] - chords.error[k - 1], 0.0) / h
                 if part < least * pieces.piece[i]["word"]:
                     least, value, word = part / pieces.piece[i]["word"], part, pieces.piece[i]["word"]

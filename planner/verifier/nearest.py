@@ -4,27 +4,22 @@ Where it runs on cubics there (between.py), p the way from the vertex, its dista
 
     f  =  p . p'  =  c0 + c1 x + ... + c5 x^5,        x = 0 to 1 over a cubic:
 
-a place is nearest where f goes from below 0 to above, or at an end. Where c1 > |2 c2| + ... + |5 c5| there is no second such
-place; else each of `PARTS` parts is looked at by itself. With the speed v and g = f' / v^2 = 1 + p.a / v^2 there, it is known at a
-distance d to
+a place is nearest where f goes from below 0 to above, or at an end. Where c1 > |2 c2| + ... + |5 c5| there is but one such
+place; else each of `PARTS` parts is looked at by itself. With g = p'^2 + p.p'' over v^2 there, v the speed, it is known to
 
-    reach  =  sqrt( 2 (d + e) e / g )  +  2 (dp + d dv / v) / g,
+    reach  =  sqrt( 2 (d + e) e / g )  +  2 (dp + d dv / v) / g        at the distance d,
 
-the first for the rounding e of a distance, the second for motions that are no cubics: the cubics of both ends stand for them, as far
-as half of the time or to where a piece of the motion ends, and dp and dv are what they differ by there: over the time h
+the first for the rounding e of distances, the second for motions that are no cubics: the cubics of both ends stand for them, to
+half of the time or to where a piece of the motion ends; over h, what these differ by there is dv, and dp = |x - x'| + h dv / 8.
 
-    dp  =  |x - x'| + h |v - v'| / 8,        dv  =  |v - v'|.
-
-Where only the ends are known the nearest place of the chord stands for it, and the motion with |acceleration| <= a is within
-b = a h^2 / 8 of the chord, its direction within a sine of r = (3/2) a h / w of the chord's, w its mean speed (3/2 h is the
-farthest that the nearest place of the motion and that of the chords can be apart, since the samples next to it are exact). A
-place nearest to a vertex at the distance d has its direction across that to the vertex, so that it is at most
+Where only the ends are known the chord stands for the motion, which with |acceleration| <= a is within b = a h^2 / 8 of it, and
+within a sine of r = (3/2) a h / w of its direction, w its mean speed (3/2 h is the farthest that the nearest places of both can be
+apart, since the ends are exact). A nearest place has its direction across that to the vertex, so that it is at most
 
     reach  =  min( (d + b) r / (1 - r),  8 (d + b),  2 h (w + a h) )
 
-away along the motion from where the chord has it. The second term is for slow motions, whose direction may turn by any angle in
-a period (r >= 1): the nearest place of the chords is at most d + b from the vertex at its time, so that of the motion is too, and
-the two are at most 2 (d + b) apart; the way between them is taken as at most four times that.
+away along the motion. The second is for slow motions, which may turn by any angle (r >= 1): the nearest places of both are at most
+d + b from the vertex, and 2 (d + b) apart; the way between them is taken as at most four times that.
 """
 
 import math

@@ -28,16 +28,8 @@ PERIOD_ROUNDING = 1e-9
 
 STRAIGHT = -1  # row of the arc of a line
 PIECE = np.dtype(
-    [
-        ("budget", "f8"),
-        ("feed", "f8"),
-        ("word", "f8"),
-        ("by", "i8"),
-        ("x0", "f8"),
-        ("x1", "f8"),
-        ("arc", "i8"),
-        ("segment", "i8"),
-    ]
+    [(name, "f8") for name in ("budget", "feed", "word", "x0", "x1")]
+    + [(name, "i8") for name in ("by", "arc", "segment")]
 )
 JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 

@@ -16,18 +16,12 @@ from planner.verifier.between import UNKNOWN, look_between, nothing_between
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
 from planner.verifier.kernel import kernel
-from planner.verifier.limits import (
-    FEED,
-    GROUPS,
-    ROWS_ALONE,
-    look_at_axes,
-    rows_of,
-)
+from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
 from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.power import look_at_power
 from planner.verifier.stops import AtStop
-from planner.verifier.switches import Bounds, Chords, Cubics
+from planner.verifier.switches import Bounds, Chords
 from planner.verifier.tangential import look_at_tangential
 from planner.verifier.user_limits import look_at_user_limits
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst
@@ -112,18 +106,9 @@ class Watch:
             # copies: views would keep the whole block
             self._carried = [column[-BACK:].copy() for column in columns]
 
-    def _take_block(
-        self,
-        t: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        acceleration: FloatArray,
-        jerk: FloatArray,
-        *,
-        skip: int,
-    ) -> None:
-        """Take in one block, the carried samples first."""
-        pieces, limits, seen = self._pieces, self._limits, self.seen
+    def _take_block(self, t: FloatArray, *of_axes: FloatArray, skip: int) -> None:
+        """Take in one block, the carried samples first; of_axes: position and its derivatives (n, A)."""
+        pieces, limits, seen, (position, velocity, *_) = self._pieces, self._limits, self.seen, of_axes
         seen.take(t, position, skip)
         place = nowhere(len(t))
         cubic = velocity if self._cubic else velocity[:0]
@@ -131,36 +116,27 @@ class Watch:
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
         # by columns: the worst of each is looked for
-        of_axes = map(np.asfortranarray, (position, velocity, acceleration, jerk))
-        columns = dict(zip(COLUMNS[1:], of_axes, strict=True))
+        columns = dict(zip(COLUMNS[1:], map(np.asfortranarray, of_axes), strict=True))
         block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
         if self._edges is None:
             look_at_axes(block, limits, seen.worst)
-            cubics = Cubics(np.empty((0, *position.shape)), np.full(len(t), np.nan))
+            stacked, cut = position[None], np.full(len(t), np.nan)
         else:
-            stacked = np.stack([position, velocity, acceleration, jerk])
-            cubics = Cubics(stacked, self._take_between(block, self._edges, stacked, place))
-        self._take_feeds(t, position, velocity, skip, place, cubics)
+            stacked = np.stack(of_axes)
+            cut = self._take_between(block, self._edges, stacked, place)
+        self._take_feeds(block, place, cut, np.ascontiguousarray(stacked.transpose(1, 0, 2)))
         look_at_tangential(block, limits, seen.worst)
         power = GROUPS * len(limits.axes) + ROWS_ALONE
         look_at_power(block, limits, seen.worst, power)
         look_at_user_limits(block, limits, seen.worst, power + len(limits.axes))
         self._travelled = float(block.travelled_to()[-1])
 
-    def _take_feeds(
-        self,
-        t: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        skip: int,
-        place: Located,
-        cubics: Cubics,
-    ) -> None:
-        speed = np.full(len(t), np.nan)
+    def _take_feeds(self, block: SampleBlock, place: Located, cut: FloatArray, state: FloatArray) -> None:
+        speed, nothing = np.full(len(block.t), np.nan), np.zeros((2, len(block.t)))
         if self._limits.judged[0]:
-            speed = np.sqrt(np.einsum("na,na->n", velocity, velocity))
-        chords = Chords(t, np.zeros(len(t)), np.zeros(len(t)), speed, place.piece, position)
-        self._feeds.take(chords, skip, place.first, place.last, cubics)
+            speed = np.sqrt(np.einsum("na,na->n", block.velocity, block.velocity))
+        chords = Chords(block.t, *nothing, speed, place.piece, place.first, place.last, cut, state)
+        self._feeds.take(chords, block.skip)
 
     def _take_between(
         self, block: SampleBlock, edges: FloatArray, columns: FloatArray, place: Located
@@ -169,10 +145,8 @@ class Watch:
         `Between.cut`"""
         limits, worst, skip = self._limits, self.seen.worst, block.skip
         axes = len(limits.axes)
-        found, edge = (
-            nothing_between(len(block.t), axes),
-            int(np.searchsorted(edges, block.t[max(skip - 1, 0)], "right")),
-        )
+        found = nothing_between(len(block.t), axes)
+        edge = int(np.searchsorted(edges, block.t[max(skip - 1, 0)], "right"))
         unknown = self.seen.known[UNKNOWN]
         bounds = limits.per_axis + np.array([[0.0], [0.0], [0.0 if limits.jerk_limited else np.inf]])
         look_between(

@@ -64,7 +64,9 @@ class Chords(NamedTuple):
 
     t, place, error : (n,) [s]; length of chords from the start [mm]; largest rounding error [mm]
     speed           : (n,) as delivered [mm/s], NaN where it was not
-    piece, position : (n,), (n, A) where each is, to be told
+    piece           : (n,) where each is, to be told; first, last: (n,) the pieces it can be on (matching.py)
+    cut             : (n,) as `Between.cut` [s], NaN where nothing is known between
+    state           : (n, D, A) position, and derivatives where `cut` is known
     """
 
     t: FloatArray
@@ -72,165 +74,133 @@ class Chords(NamedTuple):
     error: FloatArray
     speed: FloatArray
     piece: Array
-    position: FloatArray
-
-
-class Cubics(NamedTuple):
-    """Between n samples: columns (4, n, A), position and its derivatives at each; cut (n,) how long the cubic of the sample before
-    lasts, from the end of which on it is that of the sample itself [s], NaN where that is not known."""
-
-    columns: FloatArray
+    first: Array
+    last: Array
     cut: FloatArray
+    state: FloatArray
 
 
-class Kept(NamedTuple):
-    """Chords since the last vertex that was settled: `CHORD` (C,), their ends (C, 2, 4, A) as in `Cubics`, and marks; a place that
-    is worked with (A,)."""
-
-    chord: Array
-    ends: FloatArray
-    mark: Array
-    work: FloatArray
-
-
-class Switches:
+class Passing(NamedTuple):
     """Where a motion passes the vertices, as far as its samples tell.
 
     switch  : (N+1,) `SWITCH`
     state   : (4,) as named above
     along   : (3,) likewise; its last number is for who judges, and what is judged stays
+    work    : (A,) a place that is worked with
+    chord, ends, mark : chords since the last vertex that was settled: `CHORD` (C,), position and its derivatives at
+              their ends (C, 2, 4, A), and marks
     """
+
+    switch: Array
+    state: Array
+    along: FloatArray
+    work: FloatArray
+    chord: Array
+    ends: FloatArray
+    mark: Array
+
+
+class Switches:
+    """Where a motion passes the vertices: `found`."""
 
     def __init__(self, pieces: ProgramPieces, bounds: Bounds):
         vertices, axes = pieces.vertex.shape
-        self.switch = np.zeros(vertices, dtype=SWITCH)
-        self.switch["cost"][1:] = np.inf
-        self.state, self.along = np.array([1, 0, 0, 0], dtype=np.int64), np.zeros(3)
-        self._pieces, self._bounds = pieces, bounds
-        room = np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, 4, axes)), np.zeros(ROOM, np.bool_)
-        self._kept = Kept(*room, np.zeros(axes))
+        switch = np.zeros(vertices, dtype=SWITCH)
+        switch["cost"][1:] = np.inf
+        whole = switch, np.array([1, 0, 0, 0], dtype=np.int64), np.zeros(3), np.zeros(axes)
+        kept = np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, 4, axes)), np.zeros(ROOM, np.bool_)
+        self._pieces, self._bounds, self.found = pieces, bounds, Passing(*whole, *kept)
 
-    def take(self, new: Chords, skip: int, first: Array, last: Array, cubics: Cubics) -> None:
-        """The next samples, from `skip` on; those before were given already. first, last: (n,) the pieces
-        each can be on (matching.py). place and error of `new` are written here."""
+    def take(self, new: Chords, skip: int) -> None:
+        """The next samples, from `skip` on; those before were given already. place and error of `new` are written here."""
         k = skip
         while k < len(new.t):
-            k = _passed(
-                self._pieces,
-                self.switch,
-                self.state,
-                self.along,
-                self._kept,
-                new,
-                k,
-                (first, last),
-                cubics,
-                self._bounds,
-            )
+            k = _passed(self._pieces, self.found, new, k, self._bounds)
             if k < len(new.t):
                 self._make_room()
 
     def finish(self) -> None:
         """No more samples: settle what was looked at."""
-        seen = np.flatnonzero(np.isfinite(self.switch["cost"][:-1]))
-        if len(seen) and seen[-1] >= self.state[OPEN]:
-            last = int(seen[-1])
-            _settle(self._pieces, self.switch, self.state, self.along, self._kept, last, self._bounds)
+        seen = np.flatnonzero(np.isfinite(self.found.switch["cost"][:-1]))
+        if len(seen) and seen[-1] >= self.found.state[OPEN]:
+            _settle(self._pieces, self.found, int(seen[-1]), self._bounds)
 
     def _make_room(self) -> None:
         """Leave out chords and marks not needed any more; twice the room where they are not half of them."""
-        head, tail = int(self.state[HEAD]), int(self.state[TAIL])
-        begin = int(self._kept.chord["offset"][head]) if tail > head else int(self.state[USED])
-        used = int(self.state[USED]) - begin
-        full = (
-            not (head or begin)
-            or 2 * (tail - head) > len(self._kept.chord)
-            or 2 * used > len(self._kept.mark)
-        )
-        chord, ends, mark = (np.zeros(((1 + full) * len(c), *c.shape[1:]), c.dtype) for c in self._kept[:3])
-        chord[: tail - head], ends[: tail - head] = self._kept.chord[head:tail], self._kept.ends[head:tail]
-        mark[:used] = self._kept.mark[begin : begin + used]
+        old, state = self.found, self.found.state
+        head, tail = int(state[HEAD]), int(state[TAIL])
+        begin = int(old.chord["offset"][head]) if tail > head else int(state[USED])
+        used = int(state[USED]) - begin
+        full = not (head or begin) or 2 * (tail - head) > len(old.chord) or 2 * used > len(old.mark)
+        chord, ends, mark = (np.zeros(((1 + full) * len(c), *c.shape[1:]), c.dtype) for c in old[-3:])
+        chord[: tail - head], ends[: tail - head] = old.chord[head:tail], old.ends[head:tail]
+        mark[:used] = old.mark[begin : begin + used]
         chord["offset"][: tail - head] -= begin
-        self._kept = Kept(chord, ends, mark, self._kept.work)
-        self.state[HEAD], self.state[TAIL], self.state[USED] = 0, tail - head, used
+        self.found = old._replace(chord=chord, ends=ends, mark=mark)
+        state[HEAD], state[TAIL], state[USED] = 0, tail - head, used
 
 
 @kernel()
-def _passed(
-    pieces: ProgramPieces,
-    switch: Array,
-    state: Array,
-    along: FloatArray,
-    kept: Kept,
-    new: Chords,
-    skip: int,
-    can: tuple[Array, Array],
-    cubics: Cubics,
-    bounds: Bounds,
-) -> int:
+def _passed(pieces: ProgramPieces, found: Passing, new: Chords, skip: int, bounds: Bounds) -> int:
     """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind;
     places and errors into `new`. -> the first sample there was no room for, or their number"""
-    n, axes = new.position.shape
+    switch, state, along = found.switch, found.state, found.along
+    n, _, axes = new.state.shape
     ulp = ROUNDING_ULPS * 2.0**-52
     for k in range(skip, n):
         h = new.t[k] - new.t[k - 1] if k else 0.0
         push = bounds.acceleration * h if math.isfinite(bounds.acceleration) else 0.0
         step_sq, error_sq, begin = 0.0, 0.0, along[TRAVELLED]
         for axis in range(axes):
-            move = abs(new.position[k, axis] - new.position[k - 1, axis]) if k else 0.0
+            move = abs(new.state[k, 0, axis] - new.state[k - 1, 0, axis]) if k else 0.0
             step_sq += move * move
-            error = ulp * (abs(new.position[k, axis]) + begin + bounds.velocity[axis] * new.t[k])
+            error = ulp * (abs(new.state[k, 0, axis]) + begin + bounds.velocity[axis] * new.t[k])
             error += bounds.digits[axis] + (bounds.digits[axes] * (move / h + push) if k else 0.0)
             error_sq += error * error
         step, rounding = math.sqrt(step_sq), math.sqrt(error_sq)
-        last = min(can[1][k] + 1, len(switch) - 2)
-        if state[TAIL] == len(kept.chord) or state[USED] + max(last + 1 - state[OPEN], 0) > len(kept.mark):
+        last = min(new.last[k] + 1, len(switch) - 2)
+        if state[TAIL] == len(found.chord) or state[USED] + max(last + 1 - state[OPEN], 0) > len(found.mark):
             return k
         along[TRAVELLED] += step
         new.place[k], new.error[k] = along[TRAVELLED], rounding
         if step > 0.0:
-            chord = begin, step, h, cubics.cut[k], rounding
-            _look(pieces, switch, state, along, kept, new, k, last, chord, cubics.columns, bounds)
-        if k and can[0][k] >= state[OPEN]:
-            _settle(pieces, switch, state, along, kept, min(can[0][k], len(switch) - 2), bounds)
+            _look(pieces, found, new, k, last, (begin, step, h, new.cut[k], rounding), bounds)
+        if k and new.first[k] >= state[OPEN]:
+            _settle(pieces, found, min(new.first[k], len(switch) - 2), bounds)
     return n
 
 
 @kernel(inline=True)
-def _put_ends(ends, position, columns, k):
-    """The samples k - 1 and k, with the derivatives that there are, into `ends` (2, 4, A)."""
+def _put_ends(ends, new, k):
+    """What is known of the samples k - 1 and k into `ends` (2, 4, A)."""
     for side in range(2):
-        for axis in range(position.shape[1]):
-            ends[side, 0, axis] = position[k - 1 + side, axis]
-            for order in range(1, columns.shape[0]):
-                ends[side, order, axis] = columns[order, k - 1 + side, axis]
+        for order in range(new.state.shape[1]):
+            for axis in range(new.state.shape[2]):
+                ends[side, order, axis] = new.state[k - 1 + side, order, axis]
 
 
 @kernel()
 def _look(
     pieces: ProgramPieces,
-    switch: Array,
-    state: Array,
-    along: FloatArray,
-    kept: Kept,
+    found: Passing,
     new: Chords,
     k: int,
     last: int,
     chord: tuple[float, float, float, float, float],
-    columns: FloatArray,
     bounds: Bounds,
 ) -> None:
     """Which vertices, from the open one to `last`, the chord to sample k is a better place for."""
+    switch, state, along = found.switch, found.state, found.along
     first, at, before = state[OPEN], state[TAIL], 0.0
     if last < first:
         return
     _, step, h, cut, rounding = chord
     bow = bounds.acceleration * h * h / 8.0
-    _put_ends(kept.ends[at], new.position, columns, k)
+    _put_ends(found.ends[at], new, k)
     for i in range(first, last + 1):
-        _, _, apart = reach_chord(new.position[k - 1], new.position[k], pieces, i, 0.0)
+        _, _, apart = reach_chord(new.state[k - 1, 0], new.state[k, 0], pieces, i, 0.0)
         if cut >= 0.0 and before + max(apart - bow, 0.0) ** 2 < switch[i]["cost"]:
-            apart, _, _, _ = nearest(pieces.vertex[i], kept.ends[at], cut, h)
+            apart, _, _, _ = nearest(pieces.vertex[i], found.ends[at], cut, h)
         cost = before + apart * apart
         if pieces.joint[i]["stop"] and (
             step > 4.0 * bow + 2.0 * rounding or apart > bow + rounding + PLACE_ROUNDING
@@ -239,14 +209,14 @@ def _look(
         better = cost < switch[i]["cost"]
         if better:
             switch[i]["cost"] = cost
-        kept.mark[state[USED] + i - first] = better
+        found.mark[state[USED] + i - first] = better
         before = switch[i]["cost"]
     # nearer than ever, and no other vertex: what was before does not matter
-    if last == first and kept.mark[state[USED]]:
+    if last == first and found.mark[state[USED]]:
         at = state[HEAD] = 0
-        _put_ends(kept.ends[at], new.position, columns, k)
-        kept.mark[0], state[USED], along[SURE] = True, 0, chord[0]
-    row = kept.chord[at]
+        _put_ends(found.ends[at], new, k)
+        found.mark[0], state[USED], along[SURE] = True, 0, chord[0]
+    row = found.chord[at]
     row["first"], row["count"], row["offset"] = first, last + 1 - first, state[USED]
     row["begin"], row["step"], row["h"], row["cut"], row["error"] = chord
     state[TAIL] = at + 1
@@ -254,17 +224,10 @@ def _look(
 
 
 @kernel()
-def _settle(
-    pieces: ProgramPieces,
-    switch: Array,
-    state: Array,
-    along: FloatArray,
-    kept: Kept,
-    last: int,
-    bounds: Bounds,
-) -> None:
+def _settle(pieces: ProgramPieces, found: Passing, last: int, bounds: Bounds) -> None:
     """The vertices up to `last` are passed where the chords so far have them, with those behind that were
     looked at; what has been judged stays."""
+    switch, state, along = found.switch, found.state, found.along
     first, at, head = state[OPEN], state[TAIL] - 1, state[HEAD]
     top = last
     while top + 1 < len(switch) - 1 and switch[top + 1]["cost"] < np.inf:
@@ -272,9 +235,9 @@ def _settle(
     for i in range(top, first - 1, -1):
         here = at
         while here >= state[HEAD]:
-            row = kept.chord[here]
+            row = found.chord[here]
             behind = i - row["first"]
-            if 0 <= behind < row["count"] and kept.mark[row["offset"] + behind]:
+            if 0 <= behind < row["count"] and found.mark[row["offset"] + behind]:
                 break
             here -= 1
         if i <= last:
@@ -285,17 +248,16 @@ def _settle(
         if i > last:
             continue
         head = here if i == last else head
-        row = kept.chord[here]
-        found = nearest(pieces.vertex[i], kept.ends[here], row["cut"], row["h"])
-        switch[i]["place"], switch[i]["chord"] = row["begin"] + found[1] * row["step"], here
+        row = found.chord[here]
+        near = nearest(pieces.vertex[i], found.ends[here], row["cut"], row["h"])
+        switch[i]["place"], switch[i]["chord"] = row["begin"] + near[1] * row["step"], here
         if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
-            reach = reach_of(found, kept.ends[here], row["cut"], row["h"], bounds.acceleration, row["error"])
-            switch[i]["end"] = reach + row["error"] + PLACE_ROUNDING
+            switch[i]["end"] = _reach(near, found.ends[here], row, bounds)
     spent = switch[last]["cost"]
     for i in range(first, last + 1):
         switch[i]["place"] = max(switch[i]["place"], along[SURE])
         switch[i]["group"] = 1
-        _pool(pieces, switch, state, along[SURE], kept, first, i, bounds)
+        _pool(pieces, found, first, i, bounds)
     for i in range(first, last + 1):
         place, reach = switch[i]["place"], switch[i]["end"]
         switch[i]["end"] = place + reach
@@ -312,47 +274,37 @@ def _settle(
     state[OPEN], state[HEAD] = last + 1, head
 
 
+@kernel(inline=True)
+def _reach(near, ends, row, bounds):
+    """How far a place is unknown along the motion, with all rounding [mm]."""
+    own = reach_of(near, ends, row["cut"], row["h"], bounds.acceleration, row["error"])
+    return own + row["error"] + PLACE_ROUNDING
+
+
 @kernel()
-def _pool(
-    pieces: ProgramPieces,
-    switch: Array,
-    state: Array,
-    least: float,
-    kept: Kept,
-    first: int,
-    i: int,
-    bounds: Bounds,
-) -> None:
-    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together, at `least` or
-    further on, where the motion is nearest to the mean of them; of chords that is known to two of them."""
-    n = i
+def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bounds) -> None:
+    """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together,
+    where the motion is nearest to the mean of them; of chords that is known to two of them."""
+    switch, state, work, n = found.switch, found.state, found.work, i
     while n > first and switch[n]["place"] < switch[n - 1]["place"]:
         n -= switch[n - 1]["group"]
         weight, reach, here = 0.0, 0.0, switch[i]["chord"]
         for m in range(n, i + 1):
             firm = FIRM if pieces.joint[m]["stop"] else 1.0
             weight, reach = weight + firm, max(reach, switch[m]["end"])
-            for axis in range(len(kept.work)):
-                before = kept.work[axis] if m > n else 0.0
-                kept.work[axis] = before + (pieces.vertex[m, axis] - before) * firm / weight
-        found = _nearest_to_work(kept, here)
+            for axis in range(len(work)):
+                before = work[axis] if m > n else 0.0
+                work[axis] = before + (pieces.vertex[m, axis] - before) * firm / weight
+        near = nearest(work, found.ends[here], found.chord[here]["cut"], found.chord[here]["h"])
         for way in (-1, 1):
             while state[HEAD] <= here + way < state[TAIL]:
-                other = _nearest_to_work(kept, here + way)
-                if other[0] >= found[0]:
+                row = found.chord[here + way]
+                other = nearest(work, found.ends[here + way], row["cut"], row["h"])
+                if other[0] >= near[0]:
                     break
-                here, found = here + way, other
-        row = kept.chord[here]
-        own = 2.0 * row["step"]
-        if not math.isnan(row["cut"]):
-            own = reach_of(found, kept.ends[here], row["cut"], row["h"], bounds.acceleration, row["error"])
+                here, near = here + way, other
+        row = found.chord[here]
+        own = 2.0 * row["step"] if math.isnan(row["cut"]) else _reach(near, found.ends[here], row, bounds)
         for m in range(n, i + 1):
-            switch[m]["place"], switch[m]["chord"] = max(row["begin"] + found[1] * row["step"], least), here
-            switch[m]["group"] = i + 1 - n
-            switch[m]["end"] = max(reach, own + row["error"] + PLACE_ROUNDING)
-
-
-@kernel(inline=True)
-def _nearest_to_work(kept, at):
-    """As `nearest` finds on the chord `at` the place that is worked with."""
-    return nearest(kept.work, kept.ends[at], kept.chord[at]["cut"], kept.chord[at]["h"])
+            switch[m]["place"] = max(row["begin"] + near[1] * row["step"], found.along[SURE])
+            switch[m]["chord"], switch[m]["group"], switch[m]["end"] = here, i + 1 - n, max(reach, own)

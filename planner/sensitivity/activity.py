@@ -47,5 +47,5 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray,
         active=active,
         reached=reached,
         active_names=names,
-        share=lasting @ reached / lasting.sum(),
+        share=np.array([lasting[here].sum() for here in reached.T]) / lasting.sum(),
     )

@@ -38,6 +38,13 @@ class SplineShape:
     left: FloatArray
     reserve: float  # the part of the tolerance that it leaves to chord and filter errors [mm]
 
+    def laid(self) -> "SplineShape":
+        """The same without corridor and sites, which only laying the splines needs: half a kilobyte a leg."""
+        corridor, sites = (
+            type(of)(*(column[:0].copy() for column in of)) for of in (self.corridor, self.splines.sites)
+        )
+        return dataclasses.replace(self, corridor=corridor, splines=self.splines._replace(sites=sites))
+
 
 def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed

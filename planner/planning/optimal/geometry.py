@@ -41,7 +41,7 @@ def corner_shape(
 def splined_with_stops(
     rounded: SmoothPath, machine: Machine, blend_tangents: bool, tell: Tell = tell_nobody
 ) -> tuple[SmoothPath, SplineShape]:
-    """The splines of a path, and the path with full stops where runs get none (module text)."""
+    """The splines of a path, as they are laid, and the path with full stops where runs get none (module text)."""
     shape = spline_shape(rounded, machine)
     _tell_of(shape, tell, 0)
     for again in range(STOP_ROUNDS):
@@ -52,7 +52,7 @@ def splined_with_stops(
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
         _tell_of(shape, tell, len(at))
-    return rounded, shape
+    return rounded, shape.laid()
 
 
 def _tell_of(shape: SplineShape, tell: Tell, stops: int) -> None:

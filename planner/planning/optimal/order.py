@@ -38,9 +38,9 @@ class Order(ABC):
         """The time-optimal motion on a path, on a grid of that resolution (feedrate/sampling/samples.py); a
         failure is the status of its solution. Raises NotSolvedError where no grid follows the path."""
         with job.stage("geometry"):
-            samples = sample_path(path, job.machine, resolution, third_order=self.jerk_limited)
-        with job.stage("solve") as progress:
-            planned = self._solved(path, samples, job.machine, progress)
+            samples = [sample_path(path, job.machine, resolution, third_order=self.jerk_limited)]
+        with job.stage("solve") as progress:  # on a grid of its own: this one is held by no name from here on
+            planned = self._solved(path, samples.pop(), job.machine, progress)
         facts: dict[str, Any] = {"points": len(planned.samples), "runs": len(planned.samples.piece) - 1}
         facts["resolution"] = resolution
         if planned.solution.iterations:

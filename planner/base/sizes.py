@@ -39,7 +39,7 @@ class Sizes:
     samples_kept: int = _size(PARTS, 2**20, 50)  # more are evaluated when they are asked for: 138 MB
     samples_at_once: int = _size(PARTS, 65_536, 77)  # of those: 9 MB
     times_at_once: int = _size(PARTS, 100_000, 350)  # of a finely sampled motion: 20 MB
-    row_group: int = _size(PARTS, 2**20, 101)  # samples in memory while a file is written: 138 MB
+    row_group: int = _size(PARTS, 2**18, 101)  # samples in memory while a file is written: 35 MB
     text_rows: int = _size(PARTS, 100_000, 60)  # setpoints written as text together: 10 MB
     # of a program in a language that are executed together, at most
     program_rows: int = _size(PARTS, 100_000, 50)

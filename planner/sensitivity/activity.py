@@ -10,7 +10,7 @@ lowest is active. "none" is the time in which no limit is reached, "rest" that o
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.sensitivity.records import GridHistory
@@ -47,5 +47,11 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray,
         active=active,
         reached=reached,
         active_names=names,
-        share=np.array([lasting[here].sum() for here in reached.T]) / lasting.sum(),
+        share=times_of(reached, lasting) / lasting.sum(),
     )
+
+
+def times_of(reached: Array, lasting: FloatArray) -> FloatArray:
+    """(n,) how long each of n limits is active [s]; `reached` (P, n) in intervals that last so long (P,). As a product of
+    matrices it would take `reached` as floats."""
+    return np.array([lasting[here].sum() for here in reached.T])

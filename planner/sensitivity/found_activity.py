@@ -20,7 +20,7 @@ from planner.joint.shares import shares
 from planner.joint.splice import Spliced, SplicedRun
 from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
-from planner.sensitivity.activity import HELD, NONE, REST
+from planner.sensitivity.activity import HELD, NONE, REST, times_of
 from planner.sensitivity.records import GridHistory
 
 TOLERANCE = "tolerance"
@@ -100,7 +100,7 @@ def found_history(
         active=np.concatenate(rows.active),
         reached=reached,
         active_names=names,
-        share=np.diff(t, append=slowed.end) @ reached / slowed.end,
+        share=times_of(reached, np.diff(t, append=slowed.end)) / slowed.end,
     )
 
 

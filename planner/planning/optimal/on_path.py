@@ -44,6 +44,12 @@ class OnPath:
         problem = dataclasses.replace(problem, bound_names=names, feed_sq_bound=first[problem.feed_sq_bound])
         return dataclasses.replace(self, problem=problem)
 
+    def without_prices(self) -> OnPath:
+        """The same without what the solver knows of prices, 150 bytes a point."""
+        return dataclasses.replace(
+            self, solution=dataclasses.replace(self.solution, prices=None, multipliers=None)
+        )
+
     def motion(self) -> Motion:
         """The motion in time; the problem must be solved."""
         return Motion(samples=self.samples, law=law_of_solution(self.samples, self.solution))

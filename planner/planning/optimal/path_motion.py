@@ -118,7 +118,7 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
         planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
     except NotSolvedError:  # no grid follows the splines
         return None
-    return planned if planned.solution.solved else None
+    return planned.without_prices() if planned.solution.solved else None
 
 
 def _rounded(job: Job, settings: Settings) -> SmoothPath:

@@ -17,7 +17,7 @@ from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
 from planner.smoothing.relax import Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
-from planner.smoothing.sites import Splines, run_control, run_knots
+from planner.smoothing.sites import Sites, Splines, run_control, run_knots
 from planner.smoothing.windows import REACH
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
@@ -40,9 +40,8 @@ class SplineShape:
 
     def laid(self) -> "SplineShape":
         """The same without corridor and sites, which only laying the splines needs: half a kilobyte a leg."""
-        corridor, sites = (
-            type(of)(*(column[:0].copy() for column in of)) for of in (self.corridor, self.splines.sites)
-        )
+        corridor = Corridor(*(column[:0].copy() for column in self.corridor))
+        sites = Sites(*(column[:0].copy() for column in self.splines.sites))
         return dataclasses.replace(self, corridor=corridor, splines=self.splines._replace(sites=sites))
 
 

@@ -191,16 +191,21 @@ class TubeRun:
 
     def points(self, leg: Array, x: FloatArray) -> FloatArray:
         """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
-        turned = (self.rate[leg] * x)[:, None]
-        circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
-        straight = self.base[leg] + self.drift[leg] * x[:, None]
-        return self._on_curves(leg, x, 0, straight + self.radius[leg, None] * circle)
+        found = self.base[leg] + self.drift[leg] * x[:, None]
+        if self.radius.any():
+            turned = (self.rate[leg] * x)[:, None]
+            circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
+            found += self.radius[leg, None] * circle
+        return self._on_curves(leg, x, 0, found)
 
     def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
         """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
-        turned = (self.rate[leg] * x)[:, None]
-        across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
-        return self._on_curves(leg, x, 1, self.drift[leg] + (self.radius * self.rate)[leg, None] * across)
+        found = self.drift[leg]
+        if self.radius.any():
+            turned = (self.rate[leg] * x)[:, None]
+            across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
+            found += (self.radius * self.rate)[leg, None] * across
+        return self._on_curves(leg, x, 1, found)
 
     def _on_curves(self, leg: Array, x: FloatArray, order: int, others: FloatArray) -> FloatArray:
         """The x-derivative of this order of the legs that are curves, the `others` (n, A) of those that are

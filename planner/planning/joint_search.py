@@ -143,6 +143,7 @@ def joint_plan(
         other = joint_plan(job, settings, planned, longer, others, start=start)
     if made is None:
         return other
+    start.forget()
     delivered = slower or made.delivered
     for k in (*made.plans, *made.stays):
         why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"

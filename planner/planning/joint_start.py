@@ -31,6 +31,12 @@ class Start(RunsInTime):
         self._guesses: dict[int, Guess] = {}
         self.in_long_steps: dict[int, TubeSolution] = {}
 
+    def forget(self) -> None:
+        """Let go of what only a search needs: half a kilobyte a step."""
+        self._guesses.clear()
+        self.in_long_steps.clear()
+        vars(self).pop("seen", None)
+
     def guess(self, k: int, run: TubeRun) -> Guess:
         """The motion along run k, cut into steps."""
         if k not in self._guesses:

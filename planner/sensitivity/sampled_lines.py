@@ -53,7 +53,7 @@ LASTING = 0.8  # lines that are sampled take so long from an end to the middle, 
 ROOM = 0.1  # by which the start of the programme takes longer [-]
 ENOUGH, ITERATIONS = 2e-5, 40  # gap at which a programme ends [-], and after how many iterations at last
 NEAR = 1e-3  # the same of speeds at corners [-]
-# lines that are sampled, those that take longest for their tolerance; 5,000 of 250,000 took four times as long for a lower bound
+# lines that are sampled, those that take longest for their tolerance; 5,000 take five times as long, for 0.1 % at most
 MOST = 1000
 
 
@@ -93,7 +93,9 @@ def chains_of(run: Way, sampled: Sampled) -> Array:
     held = (run.tolerance > 0.0) | run.stop
     some = run.line & held[:-1] & held[1:] & ~(run.stop[:-1] & run.stop[1:])
     longer = np.where(some, sampled.half / np.maximum(LASTING * sampled.crossed, TINY), 0.0)
-    fits = longer > max(1.0, float(np.sort(longer)[-MOST - 1]) if len(longer) > MOST else 0.0)
+    fits = np.zeros(len(longer), dtype=bool)
+    fits[np.argsort(-longer, kind="stable")[:MOST]] = True
+    fits &= longer > 1.0
     joined = fits[1:] & fits[:-1] & ~run.stop[1:-1]
     begin = np.flatnonzero(fits & ~np.append(False, joined))
     end = np.flatnonzero(fits & ~np.append(joined, False)) + 1

@@ -138,17 +138,18 @@ def test_multipliers_bound_the_programme(seed: int) -> None:
     assert bounds_by_part(program, z, at.part)[0] < best.fun
 
 
-def test_programmes_of_fewer_lines_bound_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_samples_of_fewer_lines_bound_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     way = way_of(toolpath_from_program(problems.zigzag(21), MILL), MILL, ())
     y, sampled = way.tangent / way.feed[:, None], sampled_legs(way)
 
-    def bound(at_a_time: int) -> float:
-        monkeypatch.setattr(sampled_lines, "AT_A_TIME", at_a_time)
+    def bound(lines: int) -> float:
+        monkeypatch.setattr(sampled_lines, "MOST", lines)
         found = chains_of(way, sampled)
+        assert np.diff(found).sum() == min(lines, len(y))
         inside = np.zeros(len(y), dtype=bool)
         for begin, end in found:
             inside[begin:end] = True
-        # lines that are left out are between two chains, and take what their feed makes of them
+        # lines that are left out take what their feed makes of them
         left = (y * np.diff(way.point, axis=0)).sum(axis=1)[~inside].sum()
         return float(chain_times(way, sampled, found, y).sum() + left)
 
